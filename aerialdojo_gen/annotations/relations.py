@@ -14,7 +14,7 @@ import shapely
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import DIRECTIONS
 

@@ -11,8 +11,7 @@ import resource
 import sys
 from collections.abc import Iterator, Sequence
 
-from aerialdojo_gen.base.disk import DISK_ERRORS
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError, UsageError
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
 _LEAST_FILES = 64

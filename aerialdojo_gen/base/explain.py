@@ -69,15 +69,15 @@ def _keys_at(model: type[BaseModel], path: Sequence[str | int]) -> list[str]:
         if isinstance(step, int):
             continue
         fields = {(field.alias or key): field for key, field in model.model_fields.items()}
-        inner = _model_in(fields[step].annotation) if step in fields else None
+        inner = model_in(fields[step].annotation) if step in fields else None
         if inner is None:
             return []
         model = inner
     return sorted(field.alias or key for key, field in model.model_fields.items())
 
 
-def _model_in(annotation: Any) -> type[BaseModel] | None:
+def model_in(annotation: Any) -> type[BaseModel] | None:
     """Find the model of a field, also where it may be None or stands in a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next(filter(None, map(_model_in, typing.get_args(annotation))), None)
+    return next(filter(None, map(model_in, typing.get_args(annotation))), None)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from aerialdojo_gen.base.shipped import home
+
 
 @dataclass(frozen=True)
 class PaperScene:
@@ -124,16 +126,9 @@ def shares() -> dict[str, float]:
 
 def files() -> list[Path]:
     """Return the CSV files that stages take quotas from."""
-    return [_folder() / name for name in ("inventory.csv", "splits.csv")]
-
-
-def _folder() -> Path:
-    # In a checkout the pipelines lie beside the package, in a wheel within it.
-    package = Path(__file__).resolve().parents[1]
-    root = package.parent if (package.parent / "pipelines").is_dir() else package / "_shipped"
-    return root / "pipelines" / "paper"
+    return [home() / "pipelines" / "paper" / name for name in ("inventory.csv", "splits.csv")]
 
 
 def _rows(name: str) -> list[dict[str, str]]:
-    with (_folder() / name).open(encoding="utf-8", newline="") as file:
+    with (home() / "pipelines" / "paper" / name).open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))

@@ -1,4 +1,4 @@
-"""Pictures as PNG and JPEG files in memory: how each kind is encoded, and how they are decoded.
+"""Pictures as PNG and JPEG files in memory: encoding, decoding, size from the header, pictures for a model.
 
 Pictures are RGB here, as everywhere in this package; OpenCV's own order of channels ends in this module. The settings
 decide the bytes of what is stored, so that changing one makes new files.
@@ -7,6 +7,8 @@ decide the bytes of what is stored, so that changing one makes new files.
 from __future__ import annotations
 
 import base64
+import struct
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -94,3 +96,83 @@ def data_url(file: bytes) -> str:
 def media_type(file: bytes) -> str:
     """Name the media type of a PNG or JPEG: ``image/png`` or ``image/jpeg``."""
     return "image/jpeg" if file.startswith(_JPEG_START) else "image/png"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An encoded picture."""
+
+    media_type: str  # ``image/jpeg`` or ``image/png``
+    base64: str  # The file
+
+    @property
+    def data_url(self) -> str:
+        """The picture as a data URL."""
+        return f"data:{self.media_type};base64,{self.base64}"
+
+
+def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
+    """Encode (H, W, 3) uint8 sRGB as JPEG, scaled down to a longest side of `size_px`."""
+    scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
+    return _picture(encode_jpeg(scaled, ASKED_JPEG))
+
+
+def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:
+    """Encode planar depth (H, W) in metres as grey PNG, `max_depth_m` white; scaling takes the nearest sample."""
+    scaled = _at_most(depth_m, size_px, cv2.INTER_NEAREST)
+    seen = np.isfinite(scaled) & (scaled > 0.0)
+    grey = np.where(seen, np.clip(np.where(seen, scaled, 0.0) / max_depth_m, 0.0, 1.0), 1.0)
+    return _picture(encode_png(np.rint(grey * 255.0).astype(np.uint8)))
+
+
+def _at_most(image: NDArray[Any], size_px: int, interpolation: int) -> NDArray[Any]:
+    height, width = image.shape[:2]
+    scale = size_px / max(height, width)
+    if scale >= 1.0:
+        return image
+    shape = (max(1, round(width * scale)), max(1, round(height * scale)))
+    return np.asarray(cv2.resize(image, shape, interpolation=interpolation))
+
+
+def _picture(file: bytes) -> Picture:
+    return Picture(media_type(file), base64.b64encode(file).decode("ascii"))
+
+
+def image_size(file: bytes | memoryview) -> tuple[int, int] | None:
+    """Read an image's width and height, pixels, without decoding it; None where it is of no kind that is read."""
+    if file[:8] == b"\x89PNG\r\n\x1a\n" and len(file) >= 24:
+        width, height = struct.unpack(">II", file[16:24])
+        return int(width), int(height)
+    if file[:3] == b"\xff\xd8\xff":
+        return _jpeg_size(file)
+    if file[:2] == b"BM" and len(file) >= 26:
+        width, height = struct.unpack("<ii", file[18:26])
+        return abs(width), abs(height)
+    if file[:4] == b"RIFF" and file[8:12] == b"WEBP" and len(file) >= 30:
+        return _webp_size(file)
+    return None
+
+
+def _webp_size(file: bytes | memoryview) -> tuple[int, int] | None:
+    kind = file[12:16]
+    if kind == b"VP8X":
+        return 1 + int.from_bytes(file[24:27], "little"), 1 + int.from_bytes(file[27:30], "little")
+    if kind == b"VP8L":
+        bits = int.from_bytes(file[21:25], "little")
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack("<HH", file[26:30])
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _jpeg_size(file: bytes | memoryview) -> tuple[int, int] | None:
+    at = 2
+    while at + 9 < len(file) and file[at] == 0xFF:
+        kind = file[at + 1]
+        if kind == 0xFF:
+            at += 1
+            continue
+        if 0xC0 <= kind <= 0xCF and kind not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack(">HH", file[at + 5 : at + 9])
+            return int(width), int(height)
+        at += 2 if 0xD0 <= kind <= 0xD9 else 2 + struct.unpack(">H", file[at + 2 : at + 4])[0]
+    return None

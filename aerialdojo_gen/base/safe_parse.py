@@ -16,8 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.disk import check_regular
-from aerialdojo_gen.base.errors import AerialDojoError, BeyondBounds, Malformed, StoreError
+from aerialdojo_gen.base.errors import AerialDojoError, BeyondBounds, Malformed, StoreError, check_regular
 
 JsonPath = tuple[str | int, ...]
 

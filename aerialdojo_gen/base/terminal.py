@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
-from aerialdojo_gen.base.disk import DISK_ERRORS
-from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError
 
 # As a shell reports a program that SIGPIPE ended: nobody reads what it prints.
 CLOSED_PIPE = 141

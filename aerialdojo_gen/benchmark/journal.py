@@ -8,8 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import Malformed, StoreError
+from aerialdojo_gen.base.errors import Malformed, StoreError, disk_error
 from aerialdojo_gen.base.safe_parse import loads_json
 
 

@@ -15,19 +15,15 @@ from typer.core import TyperGroup
 from aerialdojo_gen.base import cli_context, environment_errors, terminal
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.cli import (
-    annotate,
     config,
     evaluate,
     exchange,
-    hub,
     places,
     release,
     render,
     report,
-    show,
     sources,
     stages,
-    train,
     validate,
 )
 
@@ -95,7 +91,7 @@ def _program(
 
 
 _GROUPS = (
-    stages, render, sources, places, annotate, evaluate, release, show, validate, exchange, hub, report, train
+    stages, render, sources, places, evaluate, release, validate, exchange, report
 )  # fmt: skip
 for _group in _GROUPS:
     app.add_typer(_group.app)

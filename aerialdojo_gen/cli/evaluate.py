@@ -1,18 +1,22 @@
-"""Fly an agent through released tasks."""
+"""Commands that evaluate and train agents."""
 
 from __future__ import annotations
 
+import os
+import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.cli import completion
-from aerialdojo_gen.cli.again import rerun_command
 from aerialdojo_gen.cli.common import (
     Address,
     Data,
@@ -262,3 +266,62 @@ def _sensors(
         width=width or sensors.width,
         height=height or sensors.height,
     )
+
+
+def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
+    """Return this process's command with all its options, so that a shell takes it as it stands."""
+    kept = [argument for argument in sys.argv[1:] if argument not in without]
+    if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
+        kept += ["--data", data]
+    kept += [argument for argument in more if argument not in kept]
+    called = cli_context.program(sys.argv[0])
+    program = [called] if called else [sys.executable, "-m", "aerialdojo_gen.cli"]
+    return Secrets().text(shlex.join([*program, *kept]))
+
+
+def _names(arguments: Sequence[str], option: str) -> bool:
+    return any(argument == option or argument.startswith(f"{option}=") for argument in arguments)
+
+
+@app.command("train")
+def train(
+    recipe: Annotated[
+        Path, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one: imitation, blind, …")
+    ],
+    data: Data = "data",
+    small: Annotated[
+        bool,
+        typer.Option("--small", help="Use the recipe's section [small], with few scenes and epochs, as a first try."),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for weights and checkpoints.  (default: policies/NAME in --data)"
+        ),
+    ] = None,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            "--cache", metavar="DIR", help="Cache for rendered images.  (default: policies/cache in --data)"
+        ),
+    ] = None,
+    device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
+    renderer: RendererName = "auto",
+    restart: Annotated[bool, typer.Option("--restart", help="Delete an earlier training of this name.")] = False,
+    workers: Workers = None,
+    quiet: Quiet = False,
+) -> None:
+    """Train a policy by imitation and DAgger; after an interruption the same command continues."""
+    from aerialdojo_gen.learning.recipe import load_recipe
+    from aerialdojo_gen.learning.training import train as learn
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    chosen = load_recipe(recipe)
+    try:
+        learn(
+            data, chosen.made_small() if small else chosen, out=out, cache=cache, device=device, workers=workers,
+            renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        print("interrupted: the same command continues from the last checkpoint", file=sys.stderr)
+        raise SystemExit(130) from None

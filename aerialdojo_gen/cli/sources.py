@@ -1,14 +1,17 @@
-"""Commands that make and picture sources: scenes of one's own, drafts of annotations, the gallery."""
+"""Commands for your own scenes: importing, drafting annotations, annotating, the gallery."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
 from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli.common import (
     Data,
@@ -157,7 +160,7 @@ def annotate_draft(
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotations.draft import Choice
-    from aerialdojo_gen.cli.picking import given_scene, pick_scene
+    from aerialdojo_gen.cli.sources import given_scene, pick_scene
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.studio.annotate.drafting import draft_scene
@@ -232,3 +235,74 @@ def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str
     for name in scenes:
         for k, sheet in enumerate(reference_sheets(pictured_objects(root, name))):
             print(write_picture(sheet, out, f"references-{name}-{k + 1}.{suffix}"))
+
+
+def given_scene(position: str | None, option: str | None) -> str | None:
+    """Return the scene that is named by position or by ``--scene``."""
+    if position and option and position != option:
+        raise UsageError(f"two scenes, {position} and --scene {option}: name one")
+    return position or option
+
+
+def pick_scene(given: str | None, known: Sequence[str], ask: TextIO | None = None, tell: TextIO | None = None) -> str:
+    """Choose one of the scenes there are."""
+    ask, tell = ask or sys.stdin, tell or sys.stderr
+    fitting = choose_scenes([given] if given else None, known)
+    if len(fitting) == 1:
+        return fitting[0]
+    if not (ask.isatty() and tell.isatty()):
+        shown = ", ".join(fitting[:5]) + (" …" if len(fitting) > 5 else "")
+        raise UsageError(f"{len(fitting)} scenes fit{f' {given!r}' if given else ''}: name one: {shown}")
+    print("\n".join(_listed(fitting)), file=tell)
+    while True:
+        print(f"scene (1 to {len(fitting)}, or a name): ", end="", file=tell, flush=True)
+        answer = ask.readline()
+        if not answer:
+            raise UsageError("no scene was picked")
+        word = answer.strip()
+        if word.isascii() and word.isdigit() and 1 <= int(word[:6]) <= len(fitting):
+            return fitting[int(word) - 1]
+        if near := [name for name in fitting if name == word] or closest(word, fitting):
+            return near[0]
+
+
+def _listed(names: Sequence[str], columns: int = 3) -> list[str]:
+    """Number names in columns that are read downwards."""
+    rows = -(-len(names) // columns)
+    width = max(map(len, names)) + 1
+    cells = [f"{k + 1:3} {name:{width}}" for k, name in enumerate(names)]
+    return ["".join(cells[row::rows]).rstrip() for row in range(rows)]
+
+
+@app.command("annotate")
+def annotate(
+    name: OneScene = None,
+    data: Data = "data",
+    scene: SceneOption = None,
+    pipeline: PipelineFile = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
+    host: Annotated[
+        str, typer.Option(help="IPv4 address to listen on; except on loopback, visitors need a token.")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    coco: Annotated[
+        Path | None, typer.Option("--coco", help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
+    ] = None,
+) -> None:
+    """Annotate a scene in the browser: landmarks, objects and their anchors."""
+    from aerialdojo_gen.cli.sources import given_scene, pick_scene
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
+    from aerialdojo_gen.studio.annotate.serve import serve_session, write_coco
+    from aerialdojo_gen.studio.annotate.session import open_session
+    from aerialdojo_gen.studio.web.serving import require_web
+
+    if coco is None:
+        require_web()
+    config, roots = open_pipeline(pipeline, data)
+    given = given_scene(name, scene)
+    scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
+    desk = open_session(scene, config, roots)
+    if coco is not None:
+        print(write_coco(desk, coco))
+    else:
+        serve_session(desk, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))

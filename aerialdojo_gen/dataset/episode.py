@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.geometry.frames import wrap_one_rad
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.planning.flight_space import FlightSpace, Point
 from aerialdojo_gen.store.schemas import APPROACH, STOP

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import UsageError, disk_error
 from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 from aerialdojo_gen.store.staging import sweep

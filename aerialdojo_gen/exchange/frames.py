@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
-from aerialdojo_gen.geometry.frames import quaternion_xyzw_to_yaw, yaw_to_quaternion_xyzw
+from aerialdojo_gen.geometry.frames import quaternion_xyzw_to_yaw, wrap_angle_rad, yaw_to_quaternion_xyzw
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.base.disk import check_regular
-from aerialdojo_gen.base.errors import ImportRefused, brief
+from aerialdojo_gen.base.errors import ImportRefused, brief, check_regular
 from aerialdojo_gen.base.safe_parse import MAX_DEPTH, exceeds_depth, loads_json
 from aerialdojo_gen.exchange.fields import shown
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import FilterConfig
 from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
-from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import route_length_m
 from aerialdojo_gen.store.schemas import TOLD_OF_SPLITS
 

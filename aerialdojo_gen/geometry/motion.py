@@ -1,4 +1,4 @@
-"""The action set as motion primitives, and its motion model.
+"""The action set as motion primitives, its motion model, and polylines.
 
 Body frame: x forward, y left, z up. Headings are 15° apart and counted from the start's yaw, so that a replay of the
 actions from the start pose meets the stored poses exactly.
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import ACTION_NAMES, APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.geometry.frames import wrap_one_rad
 
 N_HEADINGS = 24
 TURN_RAD = 2 * math.pi / N_HEADINGS
@@ -79,3 +79,14 @@ def route_length_m(points: NDArray[np.float64]) -> float:
 def nearest_heading(start_yaw: float, yaw: float) -> int:
     """Number of the heading, of those that `start_yaw` fixes, nearest to `yaw` (radians): at most 7.5° off."""
     return round((yaw - start_yaw) / TURN_RAD) % N_HEADINGS
+
+
+def sampled(points: NDArray[np.float64], step_m: float = 0.5) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points along a polyline, at most `step_m` metres apart, corners included, and the segment of each."""
+    pieces, owners = [], []
+    for k in range(len(points) - 1):
+        n = max(1, int(np.ceil(np.linalg.norm(points[k + 1] - points[k]) / step_m - 1e-9)))
+        share = np.arange(n)[:, None] / n
+        pieces.append(points[k] + share * (points[k + 1] - points[k]))
+        owners += [k] * n
+    return np.concatenate([*pieces, points[-1:]]), np.array([*owners, max(0, len(points) - 2)], dtype=np.int64)

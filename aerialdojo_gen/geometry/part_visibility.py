@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.base.disk import check_regular
-from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief
+from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief, check_regular
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.import_mesh import Place, Repairs, check_options, import_mesh, region_of
 from aerialdojo_gen.imports.listing import contents

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.disk import check_regular
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, lacks
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
 
 Floats = NDArray[np.float64]

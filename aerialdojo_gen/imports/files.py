@@ -17,9 +17,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from aerialdojo_gen.base.disk import check_regular
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
-from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError, check_regular
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.gltf import read_gltf
 from aerialdojo_gen.imports.mesh_materials import mesh_materials

@@ -11,8 +11,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from aerialdojo_gen.annotations.grammatical_number import group_of
-from aerialdojo_gen.base.disk import check_regular
-from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.errors import AssetError, check_regular
 
 # Said by exporters and by people who name nothing, of whatever the thing is.
 _NOISE = frozenset({

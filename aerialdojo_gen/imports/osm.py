@@ -16,9 +16,8 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from aerialdojo_gen.base.disk import check_regular
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, lacks
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
 from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.image_size import image_size
+from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.imports.raw import GREY, RawSurface
 
 # Of one texture, pixels a side; of all textures of a file together, pixels.

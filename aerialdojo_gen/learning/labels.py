@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.learning.geodesic import geodesic
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.store.root import DataRoot

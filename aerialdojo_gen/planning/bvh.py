@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.morton import morton_codes
-from aerialdojo_gen.geometry.triangles import point_triangle_d2, segment_triangle_d2
+from aerialdojo_gen.geometry.triangles import morton_codes, point_triangle_d2, segment_triangle_d2
 
 LEAF = 4
 _STACK = 64

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.geometry.morton import morton_codes
+from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.scenes.model import Material, Part, Scene

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, moved
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.image_size import image_size
 from aerialdojo_gen.base.pictures import (
     TEXTURE_PNG,
     decode_as_stored,
@@ -17,6 +16,7 @@ from aerialdojo_gen.base.pictures import (
     decode_rgb,
     encode_masked,
     encode_png,
+    image_size,
 )
 from aerialdojo_gen.scenes.model import Material
 

@@ -13,8 +13,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import StoreError, first_line
+from aerialdojo_gen.base.errors import StoreError, disk_error, first_line
 from aerialdojo_gen.store.staging import replace_folder, staged
 
 # Beyond so many files one sync of the file system is quicker than one of each.

@@ -16,8 +16,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import ConfigError
+from aerialdojo_gen.base.errors import ConfigError, disk_error
 from aerialdojo_gen.store.staging import remove, staged
 
 _DEFAULT_GB = 20.0

@@ -22,9 +22,11 @@ from __future__ import annotations
 
 import hashlib
 import io
+import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from fnmatch import translate
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
@@ -32,7 +34,6 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store.bucket import Bucket, Entry
 from aerialdojo_gen.store.cloud_errors import Changed
 from aerialdojo_gen.store.files import sha256_of
-from aerialdojo_gen.store.globbing import matching
 from aerialdojo_gen.store.lease import lease_s, leased, lost, token_of
 from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders
 from aerialdojo_gen.store.object_state import state_of
@@ -320,3 +321,18 @@ class _Ranges(io.RawIOBase):
         buffer[: len(data)] = data
         self._at += len(data)
         return len(data)
+
+
+def matching(names: Iterable[str], pattern: str) -> set[str]:
+    """Return the names, and the folders that they lie in, that match a glob as `Path.glob` does."""
+    words = [re.compile(translate(part)) if part != "**" else None for part in pattern.split("/")]
+    every = {"/".join(parts[:n]) for name in names for parts in [name.split("/")] for n in range(1, len(parts) + 1)}
+    return {name for name in every if _matches(name.split("/"), words)}
+
+
+def _matches(parts: list[str], words: list[re.Pattern[str] | None]) -> bool:
+    if not words:
+        return not parts
+    if words[0] is None:
+        return any(_matches(parts[n:], words[1:]) for n in range(len(parts) + (len(words) > 1)))
+    return bool(parts) and words[0].fullmatch(parts[0]) is not None and _matches(parts[1:], words[1:])

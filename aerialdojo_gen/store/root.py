@@ -17,8 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, TextIO, TypeAlias
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError, disk_error
 from aerialdojo_gen.store import files
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.store.staging import remove, staged, sweep, sweep_unstaged

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerialdojo_gen.base.llm_client.images import Picture, colour_picture, depth_picture
+from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, eight

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from aerialdojo_gen.cli.again import rerun_command
+from aerialdojo_gen.cli.evaluate import rerun_command
 
 GIVEN = ["evaluate", "--agent", "openai", "--data", "my data", "--option", 'extra_body={"a": "it\'s"}', "--restart"]
 

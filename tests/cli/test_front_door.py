@@ -13,7 +13,7 @@ from support.command_line import said
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.cli import app as cli
-from aerialdojo_gen.cli.picking import given_scene, pick_scene
+from aerialdojo_gen.cli.sources import given_scene, pick_scene
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.store import shards
 

@@ -13,7 +13,7 @@ from support.authors_files import document, put
 
 from aerialdojo_gen.base.errors import ImportRefused
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 
 
 @pytest.mark.parametrize("split", ["IID_TRAINS", "ID_TRAINS"])

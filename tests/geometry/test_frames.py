@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry import frames
-from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 angles = st.floats(-1e4, 1e4)

@@ -13,8 +13,8 @@ from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.geometry.start_view import seen_from, view_of
 from aerialdojo_gen.geometry.surface import Surface
+from aerialdojo_gen.geometry.viewpoints import seen_from, view_of
 
 coordinates = st.floats(-50, 50)
 BALL = instance("ball", trimesh.creation.icosphere(3, radius=0.5).apply_translation([10.0, 0.0, 2.0]))

@@ -13,7 +13,7 @@ from support import textured
 
 from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
 from aerialdojo_gen.base.errors import AssetError, UsageError
-from aerialdojo_gen.base.image_size import image_size
+from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
 from aerialdojo_gen.imports.import_mesh import import_mesh

@@ -9,7 +9,7 @@ from support.handmade import box, instance, mesh_of, scene
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, StoreError
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import anchor_sample

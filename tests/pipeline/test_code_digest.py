@@ -131,11 +131,11 @@ def test_plumbing_is_what_it_is_said_to_be():
                      ".pipeline.progress", ".pipeline.registry", ".pipeline.runner", ".pipeline.stage",
                      ".pipeline.summary", ".pipeline.task", ".stages",
                      ".stages.work", ".store", ".store.atomic", ".store.bucket", ".store.cache",
-                     ".store.cloud_errors", ".store.files", ".store.footers", ".store.globbing",
+                     ".store.cloud_errors", ".store.files", ".store.footers",
                      ".store.known_footers", ".store.layout",
                      ".store.lease", ".store.object_folders", ".store.object_root", ".store.object_state",
                      ".store.parquet_files", ".store.root", ".store.schemas", ".store.schemas.benchmark",
-                     ".store.schemas.columns", ".store.schemas.recordings", ".store.schemas.release",
+                     ".store.schemas.columns", ".store.schemas.release",
                      ".store.schemas.staged", ".store.shards", ".store.staging")
     }  # fmt: skip
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
@@ -146,9 +146,8 @@ def test_plumbing_is_what_it_is_said_to_be():
         "aerialdojo_gen.store.schemas": ("*",),
         "aerialdojo_gen.store.schemas.benchmark": ("*",),
         "aerialdojo_gen.store.schemas.columns": ("*",),
-        "aerialdojo_gen.store.schemas.recordings": ("*",),
-        "aerialdojo_gen.store.schemas.release": ("*",),
         "aerialdojo_gen.store.schemas.staged": ("*",),
+        "aerialdojo_gen.store.schemas.release": ("*",),
     }
     for name, counted in PLUMBING.items():
         known = code_digest._running().facts(name)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import (
     DISPLACEMENTS,
     N_HEADINGS,

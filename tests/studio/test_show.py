@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.dataset.lookup import ReleasedScene, find_task
-from aerialdojo_gen.geometry.polyline import sampled
+from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.scenes.context import release_scenes
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.studio.show.figure import write_png

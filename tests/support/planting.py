@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 from aerialdojo_gen.dataset.validate.parts import part_path
-from aerialdojo_gen.geometry.angles import wrap_turned_rad
+from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import decode, encode

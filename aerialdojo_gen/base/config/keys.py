@@ -14,6 +14,7 @@ from pydantic.fields import FieldInfo
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
 from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.explain import model_in
 from aerialdojo_gen.base.names import unknown
 
 # Longest first: a name's end says its unit.
@@ -138,13 +139,13 @@ def _sections() -> dict[str, str]:
     return {
         field.alias or name: name
         for name, field in Pipeline.model_fields.items()
-        if _model_in(field.annotation) is not None
+        if model_in(field.annotation) is not None
     }
 
 
 def _own(pipeline: Pipeline) -> Iterator[Key]:
     for name, field in Pipeline.model_fields.items():
-        if _model_in(field.annotation) is None:
+        if model_in(field.annotation) is None:
             yield _key("", name, field, getattr(pipeline, name), _default(field))
 
 
@@ -154,7 +155,7 @@ def _keys(
     for name, field in model.model_fields.items():
         value, default = getattr(values, name, None), getattr(defaults, name, _default(field))
         yield _key(section, name, field, value, default)
-        inner = _model_in(field.annotation)
+        inner = model_in(field.annotation)
         if inner is not None:
             many = typing.get_origin(field.annotation) is tuple
             one, other = (v if isinstance(v, BaseModel) else None for v in (value, default))
@@ -173,7 +174,7 @@ def _key(section: str, name: str, field: FieldInfo, value: object, default: obje
         if getattr(limit, key, None) is not None
     ]
     ends = (unit for end, unit in _UNITS.items() if name.endswith(end))
-    inner = _model_in(field.annotation)
+    inner = model_in(field.annotation)
     said = field.description or (inner.__doc__ or "" if inner else "").partition("\n")[0]
     return Key(
         section, field.alias or name, value, default, field.is_required(), _kind(field.annotation),
@@ -196,10 +197,3 @@ def _kind(annotation: Any) -> str:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return "table"
     return {bool: "true or false", int: "integer", float: "number", str: "text", Path: "path"}[annotation]
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """Find the model of a field, also where it may be absent or stands in a list."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(_model_in, typing.get_args(annotation))), None)

@@ -21,8 +21,7 @@ from aerialdojo_gen.base.errors import (
     UsageError,
     lacks,
 )
-from aerialdojo_gen.base.llm_client.faults import refusal
-from aerialdojo_gen.base.llm_client.http import BodyBoundError, Meter, bounded_client, retry_after_s
+from aerialdojo_gen.base.llm_client.http import BodyBoundError, Meter, bounded_client, refusal, retry_after_s
 from aerialdojo_gen.base.secrets import Secrets
 
 # A service may say when to come back; beyond this the runner's own schedule is the better one.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from aerialdojo_gen.base.llm_client.images import Picture
+from aerialdojo_gen.base.pictures import Picture
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Reply, token_count
 
 

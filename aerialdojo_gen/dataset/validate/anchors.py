@@ -10,7 +10,7 @@ from aerialdojo_gen.dataset.validate.foreign_keys import sound
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
-from aerialdojo_gen.geometry.angles import wrap_angle_rad, yaw_towards
+from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS

@@ -11,7 +11,7 @@ from aerialdojo_gen.base.config.agreement import NEAR_GOAL_M
 from aerialdojo_gen.dataset.validate.foreign_keys import sound
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, pose_text
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.motion import TURN_RAD, replay
 from aerialdojo_gen.store.schemas import APPROACH
 

@@ -18,7 +18,6 @@ from aerialdojo_gen.base.constants import (
 )
 from aerialdojo_gen.store.schemas.benchmark import EPISODES, FAILURES, STEPS, TIMINGS
 from aerialdojo_gen.store.schemas.columns import TableSpec
-from aerialdojo_gen.store.schemas.recordings import FRAMES, RECORDINGS
 from aerialdojo_gen.store.schemas.release import (
     RELEASE_ANCHORS,
     RELEASE_OBJECTS,
@@ -30,10 +29,12 @@ from aerialdojo_gen.store.schemas.release import (
 from aerialdojo_gen.store.schemas.staged import (
     ANCHORS,
     CHOSEN_ANCHORS,
+    FRAMES,
     LANDMARKS,
     OBJECTS,
     PAIRS,
     PLANS,
+    RECORDINGS,
     REFERENCES,
     SCENES,
     STAGED,

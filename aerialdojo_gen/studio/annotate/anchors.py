@@ -17,8 +17,8 @@ from aerialdojo_gen.annotations.format import Object
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
-from aerialdojo_gen.geometry.angles import yaw_towards
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.scenes.model import Scene

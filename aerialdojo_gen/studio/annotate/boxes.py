@@ -14,8 +14,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.errors import AerialDojoError, disk_error
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.recipe import Cut, load_imported
 from aerialdojo_gen.store.atomic import atomic_file

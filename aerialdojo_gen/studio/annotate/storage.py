@@ -17,8 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
-from aerialdojo_gen.base.disk import disk_error
-from aerialdojo_gen.base.errors import AnnotationError, brief
+from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.studio.annotate.document import (
     ConflictError,

@@ -12,7 +12,7 @@ from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import Goal, Rules
 from aerialdojo_gen.benchmark.llm.prompt import goal_text
 from aerialdojo_gen.dataset.lookup import FoundTask
-from aerialdojo_gen.geometry.polyline import sampled
+from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.studio.show.frames import Frame, frames_along

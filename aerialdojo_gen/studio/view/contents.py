@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.dataset.lookup import ReleasedScene
-from aerialdojo_gen.geometry.polyline import sampled
+from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.store import schemas
 
 _OBJECT = ("object_id", "name", "category", "description", "mesh_node", "direction", "landmark_id")

@@ -13,7 +13,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.geometry.angles import wrap_angle_rad
+from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS

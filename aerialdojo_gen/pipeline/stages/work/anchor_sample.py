@@ -14,7 +14,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.geometry.angles import yaw_towards
+from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, off_front_rad
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import ring, shortlist

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import PlanConfig, ReleasedPlanConfig
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory
-from aerialdojo_gen.geometry.angles import wrap_one_rad
+from aerialdojo_gen.geometry.frames import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
 from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
