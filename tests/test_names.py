@@ -83,7 +83,7 @@ def test_faults_of_a_model_in_words(value, lines):
 
 def test_faults_have_their_place():
     faults = faults_of(refused({"several": [{"weight": "a"}]}), Outer)
-    assert [(fault.path, fault.said) for fault in faults] == [
+    assert [(fault.path, fault.message) for fault in faults] == [
         (("name",), "the key is missing"),
         (("several", 0, "weight"), "Input should be a valid number, unable to parse string as a number"),
     ]

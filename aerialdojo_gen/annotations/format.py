@@ -134,5 +134,5 @@ def _entries(document: Document, key: str, raw: Any, kind: type[_E], faults: lis
         try:
             entries[i] = kind.model_validate(item)
         except ValidationError as error:
-            faults += [document.fault((key, i, *fault.path), fault.said) for fault in faults_of(error, kind)]
+            faults += [document.fault((key, i, *fault.path), fault.message) for fault in faults_of(error, kind)]
     return entries

@@ -54,14 +54,14 @@ def program(called_as: str) -> str:
     if Path(called_as).name != PROGRAM:
         return ""
     found = shutil.which(PROGRAM)
-    return PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _from_here(called_as)
+    return PROGRAM if found and Path(found).resolve() == Path(called_as).resolve() else _relative_path(called_as)
 
 
 @contextmanager
-def use_context(what: CliContext) -> Iterator[None]:
+def use_context(context: CliContext) -> Iterator[None]:
     """Give advice for what somebody else was given, for the length of the block: a worker process."""
     before = _NOW[0]
-    _NOW[0] = what
+    _NOW[0] = context
     try:
         yield
     finally:
@@ -70,11 +70,11 @@ def use_context(what: CliContext) -> Iterator[None]:
 
 def command(verb: str, *words: object, **options: object) -> str:
     """Say a command so that it can be pasted into a shell."""
-    kept = given()
-    for key, own in (("pipeline", kept.pipeline), ("data", kept.data)):
+    context = given()
+    for key, own in (("pipeline", context.pipeline), ("data", context.data)):
         if own and key in _TAKES.get(verb, ("pipeline", "data")):
             options.setdefault(key, own)
-    parts = [kept.program, verb, *map(str, words)]
+    parts = [context.program, verb, *map(str, words)]
     for key, value in options.items():
         if value is None or value is False:
             continue
@@ -84,7 +84,7 @@ def command(verb: str, *words: object, **options: object) -> str:
     return " ".join(shlex.quote(part) for part in parts)
 
 
-def _from_here(path: str) -> str:
+def _relative_path(path: str) -> str:
     """Write a path as one would type it in the working directory."""
     relative = os.path.relpath(path)
     return path if relative.startswith("..") or not Path(path).is_absolute() else relative

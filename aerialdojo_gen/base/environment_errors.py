@@ -64,10 +64,10 @@ def check_limits(arguments: Sequence[str]) -> None:
     if arguments and not arguments[0].startswith("-") and not {"-h", "--help"} & set(arguments):
         check_memory(arguments[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = 4096 if hard == resource.RLIM_INFINITY else min(4096, hard)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-        soft = wanted
+    target = 4096 if hard == resource.RLIM_INFINITY else min(4096, hard)
+    if soft != resource.RLIM_INFINITY and soft < target:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))
+        soft = target
     if soft != resource.RLIM_INFINITY and soft < _LEAST_FILES:
         raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_LEAST_FILES} are needed")
 
@@ -92,18 +92,18 @@ def is_out_of_memory(text: str) -> bool:
 
 def environment_error(error: BaseException) -> str | None:
     """Return the line to print for an error that the machine's limits or its disk caused; None for any other."""
-    for cause in _chain(error):
-        said = str(cause).lower()
+    for cause in _causes(error):
+        text = str(cause).lower()
         number = cause.errno if isinstance(cause, OSError) else None
-        if number in (errno.EMFILE, errno.ENFILE) or any(words in said for words in _NO_FILES):
+        if number in (errno.EMFILE, errno.ENFILE) or any(words in text for words in _NO_FILES):
             soft = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
             return f"too few file descriptors: ulimit -n is {soft}; raise it, or use fewer --workers"
         if (
             isinstance(cause, MemoryError)
             or number == errno.ENOMEM
             # An extension that got no memory while it was imported, and forgot to say so.
-            or (isinstance(cause, SystemError) and "without setting an exception" in said and _address_space())
-            or (isinstance(cause, OSError | ImportError | RuntimeError) and is_out_of_memory(said))
+            or (isinstance(cause, SystemError) and "without setting an exception" in text and _address_space())
+            or (isinstance(cause, OSError | ImportError | RuntimeError) and is_out_of_memory(text))
         ):
             return f"not enough memory{_address_space()}: give it more, or use fewer --workers"
         if number in DISK_ERRORS and isinstance(cause, OSError) and cause.filename is not None:
@@ -116,7 +116,7 @@ def _address_space() -> str:
     return "" if soft == resource.RLIM_INFINITY else f" (ulimit -v is {soft >> 10} kB, {soft >> 20} MB)"
 
 
-def _chain(error: BaseException) -> Iterator[BaseException]:
+def _causes(error: BaseException) -> Iterator[BaseException]:
     seen: set[int] = set()
     cause: BaseException | None = error
     while cause is not None and id(cause) not in seen:

@@ -21,7 +21,7 @@ class ModelFault:
     """One thing that is wrong."""
 
     path: tuple[str | int, ...]  # Where: keys, and indices of lists; empty for the whole
-    said: str
+    message: str
     line: str  # What, with the last key of the path
 
 
@@ -38,21 +38,21 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
             continue
         key = ".".join(map(str, path[_owner(path) :]))
         if raw["type"] == "extra_forbidden":
-            said = line = unknown("unknown key", key, _keys_at(model, path[:-1]))
+            message = line = unknown("unknown key", key, _keys_at(model, path[:-1]))
         elif raw["type"] == "missing":
-            said, line = "the key is missing", f"key {brief(key, 60)!r} is missing"
+            message, line = "the key is missing", f"key {brief(key, 60)!r} is missing"
         else:
-            said = raw["msg"].removeprefix("Value error, ")
-            line = f"{brief(key, 60)} = {brief(repr(raw.get('input')), 60)}: {said}"
-        faults.append(ModelFault(path, said, line))
+            message = raw["msg"].removeprefix("Value error, ")
+            line = f"{brief(key, 60)} = {brief(repr(raw.get('input')), 60)}: {message}"
+        faults.append(ModelFault(path, message, line))
     return faults
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """Turn a validation error into one line a fault."""
     faults = faults_of(error, model)
-    told = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
-    return [*told, f"and {len(faults) - _MOST_FAULTS} more faults"] if len(faults) > _MOST_FAULTS else told
+    lines = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
+    return [*lines, f"and {len(faults) - _MOST_FAULTS} more faults"] if len(faults) > _MOST_FAULTS else lines
 
 
 def _owner(path: Sequence[str | int]) -> int:

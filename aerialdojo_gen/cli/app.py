@@ -73,8 +73,8 @@ def _new() -> typer.Typer:
 app = _new()
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(value: bool) -> None:
+    if value:
         from aerialdojo_gen.base.version import __version__
 
         print(f"aerialdojo-gen {__version__}")
@@ -98,7 +98,7 @@ for _group in _GROUPS:
 app.add_typer(config.app, name="config", cls=_Commands)
 
 
-def _for(named: list[str]) -> typer.Typer:
+def _app_for(named: list[str]) -> typer.Typer:
     """Return a command line of one command where that is named, else of all: of each one Typer makes parameters."""
     for info in [info for group in _GROUPS for info in group.app.registered_commands]:
         if [info.name] == named:
@@ -118,23 +118,23 @@ def main() -> None:
     environment_errors.use_utf8()
     with terminal.standard_streams():
         try:
-            code, line = _ended()
+            code, message = _run()
         except Exception:  # a defect: what its traceback quotes is cleaned too
             traceback.print_exc()
-            code, line = 1, ""
-        if line:
-            print(f"error: {line}", file=sys.stderr)
+            code, message = 1, ""
+        if message:
+            print(f"error: {message}", file=sys.stderr)
     raise SystemExit(code)
 
 
-def _ended() -> tuple[int, str]:
+def _run() -> tuple[int, str]:
     """Run the command; return its exit code, and its error in one line where it is an expected one."""
     try:
         environment_errors.check_arguments(sys.argv[1:])
         environment_errors.check_limits(sys.argv[1:])
         try:
             called = cli_context.program(sys.argv[0]) or cli_context.PROGRAM
-            return _for(sys.argv[1:2])(prog_name=called, standalone_mode=False) or 0, ""
+            return _app_for(sys.argv[1:2])(prog_name=called, standalone_mode=False) or 0, ""
         finally:
             sys.stdout.flush()
     except _BadOption as error:
@@ -143,14 +143,14 @@ def _ended() -> tuple[int, str]:
     except AerialDojoError as error:
         return error.exit_code, _with_notes(str(error), error)
     except Exception as error:
-        line = environment_errors.environment_error(error)
-        if line is None:
+        message = environment_errors.environment_error(error)
+        if message is None:
             raise
-        return 1, _with_notes(line, error)
+        return 1, _with_notes(message, error)
 
 
-def _with_notes(line: str, error: Exception) -> str:
-    return "\n".join([line, *getattr(error, "__notes__", ())])
+def _with_notes(message: str, error: Exception) -> str:
+    return "\n".join([message, *getattr(error, "__notes__", ())])
 
 
 if __name__ == "__main__":

@@ -162,7 +162,7 @@ def evaluate(
     """Evaluate an agent on released tasks, closed loop; finished episodes are kept."""
     from aerialdojo_gen.benchmark.limits import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
-    from aerialdojo_gen.benchmark.runner import evaluate as fly
+    from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
     from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.benchmark.worker import Conditions
     from aerialdojo_gen.pipeline.progress import Reporter
@@ -186,14 +186,14 @@ def evaluate(
             tell=tuple(tell or ()),
         )
     if estimate:
-        from aerialdojo_gen.benchmark.estimate import estimate as reckon
+        from aerialdojo_gen.benchmark.estimate import estimate as estimate_cost
 
-        print("\n".join(reckon(data, evaluation).lines(workers or default_workers())))
+        print("\n".join(estimate_cost(data, evaluation).lines(workers or default_workers())))
         return
     reporter = Reporter(quiet=quiet)
     try:
         with _tracebacks(traceback):
-            outcome = fly(
+            outcome = run_evaluation(
                 data, evaluation, out=out, workers=workers, executor=executor, address=address,
                 rerun_failed=rerun_failed, restart=restart,
                 limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
@@ -212,12 +212,12 @@ def evaluate(
 
 
 @contextmanager
-def _tracebacks(wanted: bool) -> Iterator[None]:
+def _tracebacks(enabled: bool) -> Iterator[None]:
     """Print an agent's traceback, if it raises in the block."""
     try:
         yield
     except AerialDojoError as error:
-        if wanted and error.traceback:
+        if enabled and error.traceback:
             print(error.traceback, file=sys.stderr)
         raise
 
@@ -258,8 +258,8 @@ def _sensors(
     from aerialdojo_gen.benchmark.agents import load_agent
     from aerialdojo_gen.benchmark.agents.goal import Sensors
 
-    wanted = getattr(load_agent(agent, **options), "sensors", None)
-    sensors = wanted if isinstance(wanted, Sensors) else Sensors()
+    own = getattr(load_agent(agent, **options), "sensors", None)
+    sensors = own if isinstance(own, Sensors) else Sensors()
     return replace(
         sensors,
         views=sensors.views if view is None else tuple(view),
@@ -313,12 +313,12 @@ def train(
 ) -> None:
     """Train a policy by imitation and DAgger; after an interruption the same command continues."""
     from aerialdojo_gen.learning.recipe import load_recipe
-    from aerialdojo_gen.learning.training import train as learn
+    from aerialdojo_gen.learning.training import train as run_training
     from aerialdojo_gen.pipeline.progress import Reporter
 
     chosen = load_recipe(recipe)
     try:
-        learn(
+        run_training(
             data, chosen.made_small() if small else chosen, out=out, cache=cache, device=device, workers=workers,
             renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
         )  # fmt: skip

@@ -133,7 +133,7 @@ def _for_training(
     form: str,
     root: DataRoot,
     target: Path,
-    asked: dict[str, Any],
+    options: dict[str, Any],
     force: bool,
     workers: int | None,
     estimate: bool,
@@ -146,17 +146,17 @@ def _for_training(
     from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, wanted_from
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    wanted = wanted_from(**asked)
+    request = wanted_from(**options)
     if estimate:
-        told = estimate_for_learning(form, root, wanted, workers)
+        estimated = estimate_for_learning(form, root, request, workers)
         if as_json:
-            print_json(asdict(told))
+            print_json(asdict(estimated))
         else:
-            print(told)
+            print(estimated)
         return
     try:
         made = export_for_learning(
-            form, root, target, wanted, force=force, workers=workers, reporter=Reporter(quiet=quiet)
+            form, root, target, request, force=force, workers=workers, reporter=Reporter(quiet=quiet)
         )
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.

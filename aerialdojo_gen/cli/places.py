@@ -50,7 +50,7 @@ def add_map(
         name, extract, project, bbox=[_box(text) for text in bbox], tile_m=tiles, dem=dem, cell_m=cell,
         attribution=attribution, seed=seed, ceiling_m=ceiling, drive_on=drive_on, force=force,
     )  # fmt: skip
-    _say(added, project)
+    _print_scenes(added, project)
 
 
 @app.command("add-terrain")
@@ -83,7 +83,7 @@ def add_terrain(
         name, dem, project, bbox=None if bbox is None else _box(bbox), size_m=size, cell_m=cell, water_m=water,
         snow_m=snow, sand_m=sand, bare=bare, attribution=attribution, seed=seed, ceiling_m=ceiling, force=force,
     )  # fmt: skip
-    _say([added], project)
+    _print_scenes([added], project)
 
 
 def _box(text: str) -> tuple[float, float, float, float]:
@@ -96,7 +96,7 @@ def _box(text: str) -> tuple[float, float, float, float]:
     return west, south, east, north
 
 
-def _say(added: list[Place], project: Path) -> None:
+def _print_scenes(added: list[Place], project: Path) -> None:
     for place in added:
         size = place.scene.bounds[1] - place.scene.bounds[0]
         print(

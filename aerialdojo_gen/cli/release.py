@@ -92,10 +92,10 @@ def stats(
         from aerialdojo_gen.dataset.provenance import made_of_scenes
         from aerialdojo_gen.dataset.stats.figures import draw_figures
 
-        told = sys.stderr if as_json else sys.stdout
-        print(file=told)
+        stream = sys.stderr if as_json else sys.stdout
+        print(file=stream)
         for path in draw_figures(root, [m.scene for m in made_of_scenes(root, names or released)], figures):
-            print(path, file=told)
+            print(path, file=stream)
 
 
 def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Listing]:
@@ -136,13 +136,13 @@ def show(
         if out is None and html is None:
             return
     pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
-    told = sys.stderr if as_json else sys.stdout
+    stream = sys.stderr if as_json else sys.stdout
     if not as_json:
         print("\n".join([pictured.title, pictured.told, *facts(pictured.facts, terminal_width())]))
     if out is not None or html is None:
-        print(write_png(pictured, out or Path(f"{task_id}.png")), file=told)
+        print(write_png(pictured, out or Path(f"{task_id}.png")), file=stream)
     if html is not None:
-        print(write_page(pictured, html), file=told)
+        print(write_page(pictured, html), file=stream)
 
 
 @app.command("view")

@@ -116,8 +116,8 @@ def profile_keys(profile: str | None) -> dict[str, object]:
     if profile is None:
         return {}
     keys = {key for values in PROFILES.values() for key in values}
-    usual = {key: RenderConfig.model_fields[key].default for key in keys}
-    return usual | PROFILES.get(profile, {}) | {"profile": profile}
+    defaults = {key: RenderConfig.model_fields[key].default for key in keys}
+    return defaults | PROFILES.get(profile, {}) | {"profile": profile}
 
 
 def _scenes_of(split: str | None, scene: list[str] | None, pipeline: Path | None, data: Where) -> list[str] | None:
@@ -153,11 +153,11 @@ def _estimate(
     release_scenes(roots.data)
     config = with_overrides(config, "render", **overrides)
     scenes = runner.chosen_scenes(config, roots, scene)
-    told = estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1])
+    estimated = estimate(roots.data, scenes, config.render, config.seed, workers or default_workers(), share[1])
     if as_json:
-        print_json(asdict(told))
+        print_json(asdict(estimated))
     else:
-        print(told)
+        print(estimated)
 
 
 def share_of(text: str) -> tuple[int, int]:

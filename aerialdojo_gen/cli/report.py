@@ -105,27 +105,27 @@ def report(
     if as_json:
         style = "json"
     groups = _groups(group or [])
-    asked = [*(table or contents.DEFAULT), *(["scene"] if by_scene else [])]
-    names = contents.check_names(asked + (["radius"] if radius and not table else []))
+    requested = [*(table or contents.DEFAULT), *(["scene"] if by_scene else [])]
+    names = contents.check_names(requested + (["radius"] if radius and not table else []))
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
         release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
     loaded = arranged(with_floors(written, named) if floors else named, groups)
-    wanted = contents.ReportRequest(
+    request = contents.ReportRequest(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
     if style in ("csv", "json"):
-        further = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
+        extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
         write = score_rows.as_csv if style == "csv" else score_rows.as_json
-        print(write(loaded, [*rules, *further], wanted.beside, wanted.partings), end="")
+        print(write(loaded, [*rules, *extra_rules], request.beside, request.partings), end="")
     elif paired and table is None:
         _show(paired_tables(named, rules), style)
     else:
-        chosen = contents.report_tables(wanted, names)
+        chosen = contents.report_tables(request, names)
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
-        if lacking := contents.left_out(wanted, names):
+        if lacking := contents.left_out(request, names):
             typer.echo(lacking, err=True)
         if table is None and style == "terminal":
             others = ", ".join(name for name in (*contents.NAMES, "all") if name not in names)
@@ -135,7 +135,7 @@ def report(
         from aerialdojo_gen.benchmark.report import write_report
 
         shown = list(replay.replays(root, written, loaded, replay.choose_tasks(loaded, replays), frames))
-        made = write_report(out, wanted, shown)
+        made = write_report(out, request, shown)
         typer.echo(f"{made[0]} and {len(made) - 1} more files", err=True)
 
 

@@ -244,19 +244,21 @@ def given_scene(position: str | None, option: str | None) -> str | None:
     return position or option
 
 
-def pick_scene(given: str | None, known: Sequence[str], ask: TextIO | None = None, tell: TextIO | None = None) -> str:
+def pick_scene(
+    given: str | None, known: Sequence[str], stdin: TextIO | None = None, stderr: TextIO | None = None
+) -> str:
     """Choose one of the scenes there are."""
-    ask, tell = ask or sys.stdin, tell or sys.stderr
+    stdin, stderr = stdin or sys.stdin, stderr or sys.stderr
     fitting = choose_scenes([given] if given else None, known)
     if len(fitting) == 1:
         return fitting[0]
-    if not (ask.isatty() and tell.isatty()):
+    if not (stdin.isatty() and stderr.isatty()):
         shown = ", ".join(fitting[:5]) + (" …" if len(fitting) > 5 else "")
         raise UsageError(f"{len(fitting)} scenes fit{f' {given!r}' if given else ''}: name one: {shown}")
-    print("\n".join(_listed(fitting)), file=tell)
+    print("\n".join(_listed(fitting)), file=stderr)
     while True:
-        print(f"scene (1 to {len(fitting)}, or a name): ", end="", file=tell, flush=True)
-        answer = ask.readline()
+        print(f"scene (1 to {len(fitting)}, or a name): ", end="", file=stderr, flush=True)
+        answer = stdin.readline()
         if not answer:
             raise UsageError("no scene was picked")
         word = answer.strip()
@@ -301,8 +303,8 @@ def annotate(
     config, roots = open_pipeline(pipeline, data)
     given = given_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
-    desk = open_session(scene, config, roots)
+    session = open_session(scene, config, roots)
     if coco is not None:
-        print(write_coco(desk, coco))
+        print(write_coco(session, coco))
     else:
-        serve_session(desk, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))
+        serve_session(session, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))

@@ -102,7 +102,7 @@ def validate(
     definitions = load_pipeline(pipeline_file(file))
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
-    asked = validation.ValidationOptions(
+    options = validation.ValidationOptions(
         release=release,
         scenes=tuple(together(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,
@@ -118,7 +118,7 @@ def validate(
             f"not the pipeline of the release, which is --pipeline {' or '.join(names)}: {definitions.name}"
         )
     _name_orphans(release, reporter)
-    found = validation.validate(asked, workers=workers, executor=executor, address=address, reporter=reporter)
+    found = validation.validate(options, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)
     if as_json:
@@ -139,7 +139,7 @@ def _name_orphans(release: Release, reporter: Reporter) -> None:
     # Of a release that stands alone nobody knows the recordings; a damaged part is a fault that the checks name.
     with contextlib.suppress(StoreError):
         if release.folder and (gone := orphans(release.root)):
-            mend = command("render", "--prune", data=release.root.url)
+            hint = command("render", "--prune", data=release.root.url)
             reporter.line(
-                f"media/ has {len(gone):,} recordings of trajectories that the release does not have: {mend}"
+                f"media/ has {len(gone):,} recordings of trajectories that the release does not have: {hint}"
             )

@@ -241,7 +241,7 @@ def run_stages(
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.pipeline.freshness import keep_footers
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.store.known_footers import footers_known
+    from aerialdojo_gen.store.footer_cache import cached_footers
 
     reporter = reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
@@ -259,7 +259,7 @@ def run_stages(
         if releases:
             _finish_release(config, roots.data, names, ready, not scenes, reporter)
 
-    with footers_known(roots.data):
+    with cached_footers(roots.data):
         summaries = runner.run(
             stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
             reporter=reporter, limits=limits, prepare=prepare, finish=finish,

@@ -31,14 +31,14 @@ from aerialdojo_gen.exchange.frames import NED
 from aerialdojo_gen.exchange.rerendered import Redrawn
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
 
 Floats = NDArray[np.float64]
 
 # What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
-    "tasks": list(TOLD_OF_SPLITS),
-    "routes": ["goal_yaw_rad", "min_clearance_m", *TOLD_OF_DIFFICULTY],
+    "tasks": list(SPLIT_COLUMNS),
+    "routes": ["goal_yaw_rad", "min_clearance_m", *DIFFICULTY_COLUMNS],
     "objects": [
         "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",
         "box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "image_fraction",

@@ -19,7 +19,7 @@ import pyarrow as pa
 from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import ACTION_NAMES, SUBSETS, TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import ACTION_NAMES, DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
 
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [
@@ -28,9 +28,9 @@ LOST: Mapping[str, Sequence[str]] = {
         "reference_image_id",
         "landmark",
         "direction",
-        *TOLD_OF_SPLITS,
+        *SPLIT_COLUMNS,
     ],
-    "routes": ["min_clearance_m", "goal_yaw_rad", *TOLD_OF_DIFFICULTY],
+    "routes": ["min_clearance_m", "goal_yaw_rad", *DIFFICULTY_COLUMNS],
     "objects": [
         "description",
         "mesh_node",

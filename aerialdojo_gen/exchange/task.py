@@ -16,7 +16,7 @@ from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
 from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import route_length_m
-from aerialdojo_gen.store.schemas import TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
 
 Floats = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def task_rows(task: Task, nav_id: str, source: dict[str, Any], pictures: list[st
     known = task.known
     setting = known.get("setting")
     shared = {
-        **dict.fromkeys(TOLD_OF_SPLITS),
+        **dict.fromkeys(SPLIT_COLUMNS),
         "nav_id": nav_id,
         "scene": task.scene,
         **{n: known.get(n) for n in ("family", "scene_type", "partition", "subset", "target_name", "landmark")},

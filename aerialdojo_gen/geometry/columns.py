@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 # Where in its cell a column stands: not on the edges and diagonals that meshes on round coordinates have.
-_AT = (0.4371, 0.5573)
+_CELL_OFFSET = (0.4371, 0.5573)
 _SAME_HEIGHT_M = 1e-3
 _SAME_LAYER_M = 0.01
 _OWN_LAYER_M = 0.05
@@ -38,7 +38,7 @@ class Plan:
 
     def places(self, chosen: NDArray[np.bool_]) -> Floats:
         """Places in plan of columns that are marked in a (nx, ny) array, (n, 2) float64, metres."""
-        return self.low + (np.argwhere(chosen) + np.array(_AT)) * self.step_m
+        return self.low + (np.argwhere(chosen) + np.array(_CELL_OFFSET)) * self.step_m
 
 
 def lowest_of(triangles: Floats, plan: Plan) -> Floats:
@@ -98,7 +98,7 @@ class ColumnIndex:
         """
         n = len(points)
         below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)
-        _look(
+        _find_layers(
             np.ascontiguousarray(points), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
             self.shape[1], self.first, self.member, below, next_m, away_m,
         )  # fmt: skip
@@ -132,11 +132,11 @@ def _span(a: float, b: float, c: float, low: float, step: float, at: float, n: i
 def _lower(t: Floats, x0: float, y0: float, step: float, found: Floats) -> None:
     nx, ny = found.shape
     for k in range(t.shape[0]):
-        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _AT[0], nx)
-        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _AT[1], ny)
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _CELL_OFFSET[0], nx)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _CELL_OFFSET[1], ny)
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                z = _height(x0 + (i + _AT[0]) * step, y0 + (j + _AT[1]) * step, t, k)
+                z = _height(x0 + (i + _CELL_OFFSET[0]) * step, y0 + (j + _CELL_OFFSET[1]) * step, t, k)
                 if z < found[i, j]:
                     found[i, j] = z
 
@@ -147,11 +147,11 @@ def _count(t: Floats, body: Ints, x0: float, y0: float, step: float, lowest: Flo
     seen, twice, low = np.full((nx, ny), -1), np.full((nx, ny), -1), np.full((nx, ny), -1)
     for k in range(t.shape[0]):
         own = body[k]
-        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _AT[0], nx)
-        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _AT[1], ny)
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _CELL_OFFSET[0], nx)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _CELL_OFFSET[1], ny)
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                z = _height(x0 + (i + _AT[0]) * step, y0 + (j + _AT[1]) * step, t, k)
+                z = _height(x0 + (i + _CELL_OFFSET[0]) * step, y0 + (j + _CELL_OFFSET[1]) * step, t, k)
                 if math.isnan(z):
                     continue
                 if seen[i, j] != own:
@@ -206,7 +206,7 @@ def _lowest_at(
 
 
 @njit(cache=True)
-def _look(
+def _find_layers(
     points: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints,
     below: Ints, next_m: Floats, away_m: Floats,
 ) -> None:  # fmt: skip

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.geometry.columns import ColumnIndex, Plan, lowest_of, shares_of
-from aerialdojo_gen.geometry.soup import Things
+from aerialdojo_gen.geometry.soup import SceneLike
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,7 +51,7 @@ class Ground:
     nodes: frozenset[str] = frozenset()  # The things that triangles of it belong to
 
     @classmethod
-    def of(cls, scene: Things, radius_m: float | None = None) -> Ground | None:
+    def of(cls, scene: SceneLike, radius_m: float | None = None) -> Ground | None:
         """Find a scene's ground by form alone: open, level, mostly single-layered, lowest bodies.
 
         None where it is a solid.
@@ -61,8 +61,8 @@ class Ground:
         inside = [i for i in scene.instances if _reaches(i.bounds, low, high)]
         if not inside:
             return None
-        told = any(i.surface for i in inside)
-        if told and not any(i.surface == "ground" for i in inside):
+        labelled = any(i.surface for i in inside)
+        if labelled and not any(i.surface == "ground" for i in inside):
             return None
         own = [i.vertices[i.faces] for i in inside]
         lowest = lowest_of(np.concatenate(own).reshape(-1, 9), plan)
@@ -87,7 +87,7 @@ class Ground:
         n = int(body[-1]) + 1 if len(body) else 0
         covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
         up, area = _areas(triangles)
-        if told:
+        if labelled:
             known = _has_rim(faces, body, n)[body]
             names = frozenset(inside[k].node for k in np.unique(owner[known]))
             return cls(triangles[known], _rim(faces[known], corners), bare, names) if known.any() else None
@@ -137,13 +137,13 @@ class Ground:
         below, floor, _ = self._columns.layers(middle)
         # The floor of the flight volume is gone through, so that no edge of the curtain lies in it.
         floor = np.where(below > 0, floor, low[2] - radius_m)
-        beside = middle.copy()
-        beside[:, :2] -= _BESIDE_M * inwards
-        _, _, away = self._columns.layers(beside)
-        lowest = self.lowest_m(beside[:, :2])
+        outside = middle.copy()
+        outside[:, :2] -= _BESIDE_M * inwards
+        _, _, away = self._columns.layers(outside)
+        lowest = self.lowest_m(outside[:, :2])
         # What lies higher beyond the rim has a rim of its own.
-        goes_on = (np.abs(away) <= 2 * radius_m) | (lowest > middle[:, 2])
-        hangs = (below % 2 == 0) & ~goes_on
+        continues = (np.abs(away) <= 2 * radius_m) | (lowest > middle[:, 2])
+        hangs = (below % 2 == 0) & ~continues
         a, b, floor = a[hangs], b[hangs], floor[hangs]
         c, d = a.copy(), b.copy()
         c[:, 2], d[:, 2] = np.minimum(a[:, 2], floor), np.minimum(b[:, 2], floor)
@@ -235,5 +235,5 @@ def _pieces(rim: Floats, longest_m: float) -> tuple[Floats, Floats, Floats]:
     k = np.arange(len(which)) - np.repeat(np.cumsum(n) - n, n)
     at = (k / n[which])[:, None]
     to = ((k + 1) / n[which])[:, None]
-    way = (b - a)[which]
-    return a[which] + at * way, a[which] + to * way, towards[which]
+    vector = (b - a)[which]
+    return a[which] + at * vector, a[which] + to * vector, towards[which]

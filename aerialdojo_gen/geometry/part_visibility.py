@@ -60,7 +60,7 @@ class Patch:
         return cls(points, normals, lit, float(surface.areas_m2.sum()))
 
 
-def seen_share(
+def visible_shares(
     positions: Floats, yaw_rad: Floats, patches: Sequence[Patch], scene: RayCaster, fov_deg: float
 ) -> Floats:
     """Share (n, parts), 0 to 1, of each part that viewpoints see.
@@ -69,14 +69,14 @@ def seen_share(
     """
     out = np.zeros((len(positions), len(patches)))
     for k, patch in enumerate(patches):
-        who, what = np.nonzero(in_picture(positions, yaw_rad, patch.points, fov_deg))
-        if not len(who):
+        pose, point = np.nonzero(in_picture(positions, yaw_rad, patch.points, fov_deg))
+        if not len(pose):
             continue
-        seen = scene.visible(positions[who], patch.points[what])
-        who, what = who[seen], what[seen]
-        ray = positions[who] - patch.points[what]
-        cosine = (ray * patch.normals[what]).sum(axis=1) / np.linalg.norm(ray, axis=1)
-        lit = np.where(cosine > 0.0, patch.lit[what, 0], patch.lit[what, 1])
-        worth = np.abs(cosine) * np.where(lit, 1.0, _SHADE)
-        out[:, k] = np.bincount(who, worth, minlength=len(positions)) / len(patch.points)
+        seen = scene.visible(positions[pose], patch.points[point])
+        pose, point = pose[seen], point[seen]
+        ray = positions[pose] - patch.points[point]
+        cosine = (ray * patch.normals[point]).sum(axis=1) / np.linalg.norm(ray, axis=1)
+        lit = np.where(cosine > 0.0, patch.lit[point, 0], patch.lit[point, 1])
+        weight = np.abs(cosine) * np.where(lit, 1.0, _SHADE)
+        out[:, k] = np.bincount(pose, weight, minlength=len(positions)) / len(patch.points)
     return out

@@ -8,7 +8,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.soup import Body, Things, soup
+from aerialdojo_gen.geometry.soup import Body, SceneLike, soup
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -150,7 +150,7 @@ def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats]:
 class RayCaster:
     """First hits of rays on the instances of a scene."""
 
-    def __init__(self, scene: Things, triangles: TriangleRayCaster | None = None) -> None:
+    def __init__(self, scene: SceneLike, triangles: TriangleRayCaster | None = None) -> None:
         self.nodes = tuple(i.node for i in scene.instances)
         self._owner = np.repeat(np.arange(len(self.nodes), dtype=np.int32), [len(i.faces) for i in scene.instances])
         self._triangles = triangles or TriangleRayCaster(*soup(scene.instances))

@@ -21,7 +21,7 @@ class Body(Protocol):
         """(m, 3) integers, indices into `vertices`."""
 
 
-class Thing(Body, Protocol):
+class InstanceLike(Body, Protocol):
     """A named body that stands in the world, as `aerialdojo_gen.scenes.model.Instance` is."""
 
     @property
@@ -37,11 +37,11 @@ class Thing(Body, Protocol):
         """What its surface is known to be, ``"ground"`` for one; empty where that is not known."""
 
 
-class Things(Protocol):
+class SceneLike(Protocol):
     """Things and the volume that a drone may fly in among them, as `aerialdojo_gen.scenes.model.Scene` is."""
 
     @property
-    def instances(self) -> Sequence[Thing]:
+    def instances(self) -> Sequence[InstanceLike]:
         """In a stable order."""
 
     @property

@@ -74,7 +74,7 @@ class Views:
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class PointVisibility:
     """Which of an object's m sample points n viewpoints see, and where in their pictures.
 
     The camera is the front one: square picture, at the body's centre, level, looking along the yaw.
@@ -90,7 +90,7 @@ class Sight:
     def of(
         cls, positions: Floats, yaw_rad: Floats, points: Floats, alone: TriangleRayCaster, scene: RayCaster,
         own_instance: int, fov_deg: float,
-    ) -> Sight:  # fmt: skip
+    ) -> PointVisibility:  # fmt: skip
         """Ray casts from viewpoints (n, 3) with yaws to an object's points (m, 3).
 
         The camera is level, square, at the body's centre.
@@ -102,24 +102,26 @@ class Sight:
         with np.errstate(divide="ignore", invalid="ignore"):
             u = (ray[..., 0] * sin - ray[..., 1] * cos) / (ahead * half)
             v = -ray[..., 2] / (ahead * half)
-        before = np.asarray(ahead > 0.0)
-        facing = before & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
-        who, what = np.nonzero(facing)
-        facing[who, what] = alone.unobstructed(positions[who], points[what])
-        who, what = np.nonzero(facing)
+        in_front = np.asarray(ahead > 0.0)
+        facing = in_front & (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0)
+        pose, point = np.nonzero(facing)
+        facing[pose, point] = alone.unobstructed(positions[pose], points[point])
+        pose, point = np.nonzero(facing)
         seen = np.zeros_like(facing)
-        seen[who, what] = scene.visible(positions[who], points[what], own_instance)
-        return cls(u, v, before & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
+        seen[pose, point] = scene.visible(positions[pose], points[point], own_instance)
+        return cls(u, v, in_front & (np.abs(u) <= _ROOM) & (np.abs(v) <= _ROOM), facing, seen)
 
-    def with_rows(self, rows: NDArray[np.int64], where: NDArray[np.int64], others: Sight) -> Sight:
+    def with_rows(
+        self, rows: NDArray[np.int64], where: NDArray[np.int64], others: PointVisibility
+    ) -> PointVisibility:
         """Take some viewpoints, (k,), and put others in the place of those of them that `where` says."""
 
-        def mixed(mine: NDArray[_T], theirs: NDArray[_T]) -> NDArray[_T]:
-            taken = mine[rows]
-            taken[where] = theirs
+        def mixed(own: NDArray[_T], other: NDArray[_T]) -> NDArray[_T]:
+            taken = own[rows]
+            taken[where] = other
             return taken
 
-        return Sight(
+        return PointVisibility(
             mixed(self.u, others.u),
             mixed(self.v, others.v),
             mixed(self.roomy, others.roomy),
@@ -129,10 +131,10 @@ class Sight:
 
     def views(self) -> Views:
         """Sum up what each of the viewpoints sees, and compare them."""
-        could, does = self.facing.sum(axis=1), self.seen.sum(axis=1)
-        enough = (could >= _LEAST_POINTS) & (does > 0)
+        facing_count, seen_count = self.facing.sum(axis=1), self.seen.sum(axis=1)
+        enough = (facing_count >= _LEAST_POINTS) & (seen_count > 0)
         ever = int(self.facing.any(axis=0).sum())
-        n = len(could)
+        n = len(facing_count)
         box, off = np.zeros(n), np.ones(n)
         rows = np.flatnonzero(enough)
         if len(rows):
@@ -143,9 +145,9 @@ class Sight:
             box[rows] = wide * high / 4.0
             off[rows] = np.hypot(np.nanmean(us, axis=1), np.nanmean(vs, axis=1))
         return Views(
-            visible_fraction=np.where(enough, does / np.maximum(could, 1), 0.0),
+            visible_fraction=np.where(enough, seen_count / np.maximum(facing_count, 1), 0.0),
             framed=np.asarray(self.roomy.mean(axis=1)),
-            shown=np.where(enough, does / max(ever, 1), 0.0),
+            shown=np.where(enough, seen_count / max(ever, 1), 0.0),
             box_fraction=box,
             off_centre=off,
         )
@@ -161,7 +163,7 @@ def look(
     fov_deg: float,
 ) -> Views:
     """Look at an object from viewpoints: the `Views` of their `Sight`, whose parameters these are."""
-    return Sight.of(positions, yaw_rad, points, alone, scene, own_instance, fov_deg).views()
+    return PointVisibility.of(positions, yaw_rad, points, alone, scene, own_instance, fov_deg).views()
 
 
 def informativeness(
@@ -191,26 +193,26 @@ def level_marks(elevation_deg: Floats | float) -> Floats:
 
 
 def shortlist(
-    score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, wanted: NDArray[np.bool_] | None = None
+    score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, required: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int64]:
     """Greedy choice of the best scores at least `separation_rad` apart in azimuth.
 
     Indices, the highest score first.
     """
     chosen: list[int] = []
-    apart = np.full(len(score), math.inf)
+    separation = np.full(len(score), math.inf)
     for _ in range(min(count, len(score))):
-        worth = score - np.clip(1.0 - apart / separation_rad, 0.0, 1.0)
+        value = score - np.clip(1.0 - separation / separation_rad, 0.0, 1.0)
         # A multiple of the azimuth step must count as being that far apart, whatever the last bit says.
-        far = apart >= separation_rad - 1e-6
+        far = separation >= separation_rad - 1e-6
         far[chosen] = False
         if far.any():
-            worth = np.where(far, worth, -math.inf)
-        worth[chosen] = -math.inf
-        chosen.append(int(np.argmax(worth)))
-        apart = np.minimum(apart, np.abs(wrap_angle_rad(azimuth_rad - azimuth_rad[chosen[-1]])))
-    if wanted is not None and wanted.any() and not wanted[chosen].any():
-        chosen[-1] = int(np.argmax(np.where(wanted, score, -math.inf)))
+            value = np.where(far, value, -math.inf)
+        value[chosen] = -math.inf
+        chosen.append(int(np.argmax(value)))
+        separation = np.minimum(separation, np.abs(wrap_angle_rad(azimuth_rad - azimuth_rad[chosen[-1]])))
+    if required is not None and required.any() and not required[chosen].any():
+        chosen[-1] = int(np.argmax(np.where(required, score, -math.inf)))
     return np.array(sorted(chosen, key=lambda k: (-score[k], k)), dtype=np.int64)
 
 
@@ -229,7 +231,7 @@ def view_of(points: Floats, poses: Floats) -> NDArray[np.int64]:
     return np.asarray(np.select([inside[view] for view in VIEWS], range(len(VIEWS)), -1), dtype=np.int64)
 
 
-def seen_from(
+def start_visibility(
     scene: TriangleRayCaster, own: TriangleRayCaster, points: ArrayLike, poses: ArrayLike
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Share of an object's points (m, 3) seen from each pose (n, 4).
@@ -239,15 +241,15 @@ def seen_from(
     p, q = np.asarray(points, dtype=np.float64), np.asarray(poses, dtype=np.float64)
     m = len(p)
     view = view_of(np.tile(p, (len(q), 1)), np.repeat(q, m, axis=0)).reshape(-1, m)
-    who, what = np.nonzero(view >= 0)
+    pose, point = np.nonzero(view >= 0)
     seen = np.zeros((len(q), m), dtype=np.bool_)
-    seen[who, what] = scene.unobstructed(q[who, :3], p[what])
+    seen[pose, point] = scene.unobstructed(q[pose, :3], p[point])
     votes = np.stack([(seen & (view == k)).sum(axis=1) for k in range(len(VIEWS))], axis=1)
     some = np.flatnonzero(votes.any(axis=1))
     share = np.zeros(len(q))
     # What hides the rest matters only where something is seen.
-    who, what = np.nonzero(~seen[some])
+    pose, point = np.nonzero(~seen[some])
     facing = seen[some]
-    facing[who, what] = own.unobstructed(q[some[who], :3], p[what])
+    facing[pose, point] = own.unobstructed(q[some[pose], :3], p[point])
     share[some] = seen[some].sum(axis=1) / facing.sum(axis=1)
     return share, np.where(votes.any(axis=1), votes.argmax(axis=1), -1)

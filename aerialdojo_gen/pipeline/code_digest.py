@@ -72,7 +72,7 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.files": (),
     "aerialdojo_gen.store.footers": (),
     "aerialdojo_gen.store.object_root": (),
-    "aerialdojo_gen.store.known_footers": (),
+    "aerialdojo_gen.store.footer_cache": (),
     "aerialdojo_gen.store.layout": ("partition", "check_scene_name"),
     "aerialdojo_gen.store.lease": (),
     "aerialdojo_gen.store.object_folders": (),

@@ -117,7 +117,7 @@ def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectP
     for stage in stages:
         for scene in scenes:
             for table in stage.writes:
-                store.keep_infos(roots.data, store.shards(roots.data, table, scene))
+                store.cache_footers(roots.data, store.shards(roots.data, table, scene))
 
 
 def _fresh(
@@ -159,7 +159,7 @@ def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Rep
         return False
     for relative, digest in zip(*(rows.column(name).to_pylist() for name in columns), strict=True):
         try:
-            same = data.digest(relative, anew=True) == digest
+            same = data.digest(relative, reread=True) == digest
         except OSError:
             same = False
         if not same:

@@ -48,7 +48,7 @@ def find(data: DataRoot, folder: str, fingerprint: str, *, verify: bool = False)
     if not isinstance(rows, list) or not _are_recordings(rows, folder):
         return None
     files = {(row["path"], row["bytes"], row["sha256"] if verify else "") for row in rows}
-    return rows if all(data.is_whole(*file, anew=True) for file in files) else None
+    return rows if all(data.is_whole(*file, reread=True) for file in files) else None
 
 
 def _are_recordings(rows: list[Any], folder: str) -> bool:

@@ -9,13 +9,13 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.root import DataRoot, Where, leads_out, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, is_outside, open_root
 
 
 def mesh_copy(where: Where, told: str) -> Path:
     """Return the mesh that a row of `scenes` names, on this machine."""
     root = open_root(where)
-    if leads_out(root, told):
+    if is_outside(root, told):
         raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
     path = root.local_copy(told)
     if not path.is_file():

@@ -99,24 +99,24 @@ class Bucket:
             answer = self._client.head_object(Bucket=self.name, Key=key)
         return Entry(answer["ContentLength"], answer["ETag"]), answer.get("Metadata", {})
 
-    def put(self, key: str, path: Path, said: Mapping[str, str]) -> Entry:
+    def put(self, key: str, path: Path, metadata: Mapping[str, str]) -> Entry:
         """Put a file as an object: it is there whole or not at all, also where this process is killed."""
         size = path.stat().st_size
         with self._location(key):
             if size <= _SINGLE:
                 with path.open("rb") as file:
-                    answer = self._client.put_object(Bucket=self.name, Key=key, Body=file, Metadata=dict(said))
+                    answer = self._client.put_object(Bucket=self.name, Key=key, Body=file, Metadata=dict(metadata))
                 return Entry(size, answer["ETag"])
             for _ in range(2):
                 # A run that holds another part of the bucket may take our upload for one that was left.
                 with suppress(_UploadGone):
-                    return Entry(size, self._put_parts(key, path, size, said))
-            return Entry(size, self._put_parts(key, path, size, said))
+                    return Entry(size, self._put_parts(key, path, size, metadata))
+            return Entry(size, self._put_parts(key, path, size, metadata))
 
-    def _put_parts(self, key: str, path: Path, size: int, said: Mapping[str, str]) -> str:
+    def _put_parts(self, key: str, path: Path, size: int, metadata: Mapping[str, str]) -> str:
         length = max(_PART, -(-size // _MOST_PARTS))
         where = {"Bucket": self.name, "Key": key}
-        upload = self._client.create_multipart_upload(**where, Metadata=dict(said))["UploadId"]
+        upload = self._client.create_multipart_upload(**where, Metadata=dict(metadata))["UploadId"]
 
         def put_part(number: int) -> dict[str, Any]:
             with path.open("rb") as file:
@@ -169,12 +169,12 @@ class Bucket:
     def delete(self, keys: Sequence[str]) -> None:
         """Remove objects; those that are not there are no error."""
         for begin in range(0, len(keys), 1000):
-            lot = keys[begin : begin + 1000]
-            with self._location(lot[0]):
-                if len(lot) == 1:
-                    self._client.delete_object(Bucket=self.name, Key=lot[0])
+            batch = keys[begin : begin + 1000]
+            with self._location(batch[0]):
+                if len(batch) == 1:
+                    self._client.delete_object(Bucket=self.name, Key=batch[0])
                     continue
-                objects = [{"Key": key} for key in lot]
+                objects = [{"Key": key} for key in batch]
                 answer = self._client.delete_objects(Bucket=self.name, Delete={"Objects": objects, "Quiet": True})
             for failed in answer.get("Errors", []):
                 raise StoreError(f"cannot delete s3://{self.name}/{failed.get('Key')}: {failed.get('Message')}")
@@ -191,9 +191,9 @@ class Bucket:
                 count += 1
         return count
 
-    def _pages(self, request: str, prefix: str, **asked: Any) -> Iterator[dict[str, Any]]:
+    def _pages(self, request: str, prefix: str, **parameters: Any) -> Iterator[dict[str, Any]]:
         with self._location(prefix):
-            yield from self._client.get_paginator(request).paginate(Bucket=self.name, **asked)
+            yield from self._client.get_paginator(request).paginate(Bucket=self.name, **parameters)
 
     def _location(self, key: str) -> _Location:
         return _Location(f"s3://{self.name}/{key}", self.endpoint)
@@ -214,16 +214,16 @@ class _Location:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: Any) -> None:
         if isinstance(error, Exception) and not isinstance(error, StoreError | FileNotFoundError | Changed):
-            told = cloud_error(error, self._url, self._endpoint)
-            if told is not None:
-                raise told from error
+            translated = cloud_error(error, self._url, self._endpoint)
+            if translated is not None:
+                raise translated from error
 
 
 def _age_s(answer: Mapping[str, Any]) -> float:
     from email.utils import parsedate_to_datetime
 
-    said = answer["ResponseMetadata"]["HTTPHeaders"].get("date")
-    now = parsedate_to_datetime(said).timestamp() if said else time.time()
+    metadata = answer["ResponseMetadata"]["HTTPHeaders"].get("date")
+    now = parsedate_to_datetime(metadata).timestamp() if metadata else time.time()
     return now - float(answer["LastModified"].timestamp())
 
 
@@ -268,7 +268,7 @@ def _made_client(_process: int) -> Any:
     try:
         return botocore.session.Session().create_client("s3", config=config)
     except Exception as error:
-        told = cloud_error(
+        translated = cloud_error(
             error, "s3://", os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL")
         )
-        raise told or error from error
+        raise translated or error from error

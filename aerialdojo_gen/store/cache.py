@@ -135,21 +135,21 @@ class Cache:
 
 def cache_folder() -> Path:
     """Return where copies are kept: ``$AERIALDOJO_CACHE``, or the user's cache folder."""
-    said = os.environ.get("AERIALDOJO_CACHE")
-    if said:
-        return Path(said).expanduser().absolute()
+    value = os.environ.get("AERIALDOJO_CACHE")
+    if value:
+        return Path(value).expanduser().absolute()
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "aerialdojo-gen"
 
 
 def _bound_bytes() -> int:
-    said = os.environ.get("AERIALDOJO_CACHE_GB", str(_DEFAULT_GB))
+    value = os.environ.get("AERIALDOJO_CACHE_GB", str(_DEFAULT_GB))
     try:
-        bound = float(said)
+        bound = float(value)
     except ValueError:
         bound = -1.0
     if not 0.0 <= bound < 1e9:
-        raise ConfigError(f"AERIALDOJO_CACHE_GB={said!r}: write a number of gigabytes, e.g. 20")
+        raise ConfigError(f"AERIALDOJO_CACHE_GB={value!r}: write a number of gigabytes, e.g. 20")
     return int(bound * 1e9)
 
 

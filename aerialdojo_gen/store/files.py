@@ -54,22 +54,22 @@ def file_digest(path: Path) -> str:
     A file is read once in a process, and again when it is another one or has been written to.
     """
     version = _version(path)
-    begun = _ahead.pop(version, None)
+    started = _ahead.pop(version, None)
     # What the thread has not come to yet is read here, while it goes on with the next.
-    return _digest(*version) if begun is None or begun.cancel() else begun.result()
+    return _digest(*version) if started is None or started.cancel() else started.result()
 
 
 def prefetch_files(paths: Iterable[Path]) -> None:
     """Read files in a thread whose digests `file_digest` will be asked for; those that are not there are left out."""
-    asked = []
+    pending = []
     for path in paths:
         with contextlib.suppress(OSError):
             version = _version(path)
             if version not in _ahead:
-                asked.append((version, _ahead.setdefault(version, Future())))
+                pending.append((version, _ahead.setdefault(version, Future())))
 
     def read() -> None:
-        for version, digest in asked:
+        for version, digest in pending:
             if digest.set_running_or_notify_cancel():
                 try:
                     digest.set_result(_digest(*version))

@@ -45,7 +45,7 @@ class ShardInfo:
 
 def encode(info: ShardInfo) -> bytes:
     """Write it as JSON; the same says the same bytes."""
-    facts = {
+    fields = {
         "fingerprint": info.fingerprint,
         "content": info.content,
         "columns": info.columns,
@@ -54,43 +54,43 @@ def encode(info: ShardInfo) -> bytes:
         "summary": info.summary,
         "files": {name: [file.size, file.sha256] for name, file in info.files.items()},
     }
-    return json.dumps(facts | {"checksum": _checksum(facts)}, sort_keys=True).encode()
+    return json.dumps(fields | {"checksum": _checksum(fields)}, sort_keys=True).encode()
 
 
 def decode(raw: bytes) -> ShardInfo:
     """Read what `encode` wrote, or an earlier version, whose footers have no checksums."""
     try:
-        facts = loads_json(raw)
+        fields = loads_json(raw)
     except Malformed:
         raise ValueError("its footer is no JSON") from None
-    if not isinstance(facts, dict):
+    if not isinstance(fields, dict):
         raise ValueError("its footer is no JSON object")
-    if facts.keys() == _EARLIER_KEYS and isinstance(facts["files"], dict):
-        facts = facts | {"columns": {}, "files": {name: [size, ""] for name, size in facts["files"].items()}}
-    elif facts.keys() != _KEYS or facts.pop("checksum") != _checksum(facts):
+    if fields.keys() == _EARLIER_KEYS and isinstance(fields["files"], dict):
+        fields = fields | {"columns": {}, "files": {name: [size, ""] for name, size in fields["files"].items()}}
+    elif fields.keys() != _KEYS or fields.pop("checksum") != _checksum(fields):
         raise ValueError("its footer's checksum is wrong")
-    if not _well_formed(facts):
+    if not _well_formed(fields):
         raise ValueError("its footer has values that none can have")
-    files = {name: ShardFile(*pair) for name, pair in facts.pop("files").items()}
-    return ShardInfo(**facts, files=files)
+    files = {name: ShardFile(*pair) for name, pair in fields.pop("files").items()}
+    return ShardInfo(**fields, files=files)
 
 
-def _checksum(facts: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+def _checksum(fields: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()
 
 
-def _well_formed(facts: Mapping[str, Any]) -> bool:
+def _well_formed(fields: Mapping[str, Any]) -> bool:
     """Whether all values are of their types: a right checksum says only that some program wrote them."""
     return (
-        isinstance(facts["fingerprint"], str)
-        and _is_digest(facts["content"])
-        and isinstance(facts["columns"], dict)
-        and all(_is_digest(value, _HALF_DIGEST) for value in facts["columns"].values())
-        and _is_count(facts["rows"])
-        and _is_count(facts["parts"])
-        and _is_summary(facts["summary"])
-        and isinstance(facts["files"], dict)
-        and all(_is_file(value) for value in facts["files"].values())
+        isinstance(fields["fingerprint"], str)
+        and _is_digest(fields["content"])
+        and isinstance(fields["columns"], dict)
+        and all(_is_digest(value, _HALF_DIGEST) for value in fields["columns"].values())
+        and _is_count(fields["rows"])
+        and _is_count(fields["parts"])
+        and _is_summary(fields["summary"])
+        and isinstance(fields["files"], dict)
+        and all(_is_file(value) for value in fields["files"].values())
     )
 
 

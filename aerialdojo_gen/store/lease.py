@@ -29,12 +29,12 @@ from aerialdojo_gen.store.bucket import Bucket, Content
 from aerialdojo_gen.store.cloud_errors import Changed
 
 _DEFAULT_S = 60.0
-_TIMES = 4
+_RENEWALS = 4
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class _Note:
+class _LeaseRecord:
     """What the object says: who holds it, in words and by a token; released when the lease is 0."""
 
     token: str
@@ -44,13 +44,13 @@ class _Note:
 
 def lease_s() -> float:
     """Seconds that a lock is held without being renewed: ``$AERIALDOJO_LEASE_S``, or a minute."""
-    said = os.environ.get("AERIALDOJO_LEASE_S", str(_DEFAULT_S))
+    value = os.environ.get("AERIALDOJO_LEASE_S", str(_DEFAULT_S))
     try:
-        seconds = float(said)
+        seconds = float(value)
     except ValueError:
         seconds = 0.0
     if not 1.0 <= seconds <= 86400.0:
-        raise ConfigError(f"AERIALDOJO_LEASE_S={said!r}: write a number of seconds, 1 or more")
+        raise ConfigError(f"AERIALDOJO_LEASE_S={value!r}: write a number of seconds, 1 or more")
     return seconds
 
 
@@ -73,7 +73,7 @@ class Lease:
         if not self._lost and time.monotonic() - self._renewed > self._lease_s:
             self._lost = "it could not be renewed in time"
         if self._lost:
-            raise lost(self._url, self._lost)
+            raise lease_lost(self._url, self._lost)
 
     def release(self) -> None:
         """Give the lock back, where it is still held."""
@@ -81,56 +81,58 @@ class Lease:
         self._thread.join()
         if not self._lost:
             with suppress(Changed, StoreError, FileNotFoundError):
-                self._bucket.put_bytes(self._key, _said(_Note(self.token, "", 0.0)), etag=self._etag)
+                self._bucket.put_bytes(self._key, _encode(_LeaseRecord(self.token, "", 0.0)), etag=self._etag)
 
-    def _mine(self) -> bytes:
-        return _said(_Note(self.token, _here(), self._lease_s))
+    def _record(self) -> bytes:
+        return _encode(_LeaseRecord(self.token, _holder_name(), self._lease_s))
 
     def _take(self) -> str:
         with suppress(Changed):
-            return self._bucket.put_bytes(self._key, self._mine(), new=True).etag
-        told = False
+            return self._bucket.put_bytes(self._key, self._record(), new=True).etag
+        warned = False
         first: Content | None = None
         while True:
             try:
                 found = self._bucket.read_small(self._key)
             except FileNotFoundError:
                 with suppress(Changed):
-                    return self._bucket.put_bytes(self._key, self._mine(), new=True).etag
+                    return self._bucket.put_bytes(self._key, self._record(), new=True).etag
                 continue
-            note = _read(found.data)
+            note = _decode(found.data)
             left = (note.lease_s if note else self._lease_s) - found.age_s
             if left <= 0.0:
                 with suppress(Changed):
-                    return self._bucket.put_bytes(self._key, self._mine(), etag=found.etag).etag
+                    return self._bucket.put_bytes(self._key, self._record(), etag=found.etag).etag
                 continue
             if first is not None and found.etag != first.etag:
-                raise StoreError(_held(self._url, note, left))
+                raise StoreError(_held_message(self._url, note, left))
             first = first or found
-            if not told and left > 1.0:
-                log.warning("%s; waiting whether it is renewed", _held(self._url, note, left).partition(": wait")[0])
-            told = True
-            time.sleep(min(left + 0.05, self._lease_s / _TIMES / 2, 2.0))
+            if not warned and left > 1.0:
+                log.warning(
+                    "%s; waiting whether it is renewed", _held_message(self._url, note, left).partition(": wait")[0]
+                )
+            warned = True
+            time.sleep(min(left + 0.05, self._lease_s / _RENEWALS / 2, 2.0))
 
     def _renew(self) -> None:
-        while not self._ended.wait(self._lease_s / _TIMES):
+        while not self._ended.wait(self._lease_s / _RENEWALS):
             begun = time.monotonic()
             try:
-                self._etag = self._bucket.put_bytes(self._key, self._mine(), etag=self._etag).etag
+                self._etag = self._bucket.put_bytes(self._key, self._record(), etag=self._etag).etag
                 self._renewed = begun
             except (Changed, FileNotFoundError):
-                if not self._still_mine():
+                if not self._is_still_held():
                     return
                 self._renewed = begun
             except StoreError as error:
                 # It may answer again before the lease is over: `check` says when it is too late.
                 log.warning("the lock of %s is not renewed: %s", self._url, error)
 
-    def _still_mine(self) -> bool:
+    def _is_still_held(self) -> bool:
         """Whether the put that renewed it was done after all, its answer being lost on the way."""
         try:
             found = self._bucket.read_small(self._key)
-            note = _read(found.data)
+            note = _decode(found.data)
         except FileNotFoundError:
             self._lost = "somebody removed it"
             return False
@@ -146,13 +148,13 @@ class Lease:
 def token_of(bucket: Bucket, key: str) -> str:
     """Return the token of who holds a lock; empty where nobody does."""
     try:
-        note = _read(bucket.read_small(key).data)
+        note = _decode(bucket.read_small(key).data)
     except FileNotFoundError:
         return ""
     return note.token if note and note.lease_s else ""
 
 
-def lost(url: str, why: str) -> StoreError:
+def lease_lost(url: str, why: str) -> StoreError:
     """Make the error of a run that holds its lock no longer."""
     return StoreError(
         f"this run has lost the lock of {url} ({why}): nothing more is written; what was finished is kept"
@@ -169,7 +171,7 @@ def leased(bucket: Bucket, key: str, url: str) -> Iterator[Lease]:
         lease.release()
 
 
-def _held(url: str, note: _Note | None, left_s: float) -> str:
+def _held_message(url: str, note: _LeaseRecord | None, left_s: float) -> str:
     until = (datetime.now(UTC) + timedelta(seconds=left_s)).strftime("%H:%M:%S UTC")
     holder = note.holder if note else "somebody"
     return (
@@ -178,7 +180,7 @@ def _held(url: str, note: _Note | None, left_s: float) -> str:
     )
 
 
-def _here() -> str:
+def _holder_name() -> str:
     try:
         user = getpass.getuser()
     except (OSError, KeyError):
@@ -186,19 +188,21 @@ def _here() -> str:
     return f"{user} on {platform.node() or 'a machine'} (process {os.getpid()})"
 
 
-def _said(note: _Note) -> bytes:
+def _encode(note: _LeaseRecord) -> bytes:
     # The time makes each one another object: a tag is of the bytes.
-    facts = {"token": note.token, "holder": note.holder, "lease_s": note.lease_s, "put": secrets.token_hex(4)}
-    return json.dumps(facts).encode()
+    fields = {"token": note.token, "holder": note.holder, "lease_s": note.lease_s, "put": secrets.token_hex(4)}
+    return json.dumps(fields).encode()
 
 
-def _read(data: bytes) -> _Note | None:
+def _decode(data: bytes) -> _LeaseRecord | None:
     """Read what a holder put; None for what nobody here put."""
     try:
-        facts = loads_json(data)
+        fields = loads_json(data)
     except Malformed:
         return None
     try:
-        return _Note(str(facts["token"]), str(facts["holder"])[:200], min(max(float(facts["lease_s"]), 0.0), 86400.0))
+        return _LeaseRecord(
+            str(fields["token"]), str(fields["holder"])[:200], min(max(float(fields["lease_s"]), 0.0), 86400.0)
+        )
     except (KeyError, TypeError, ValueError):
         return None

@@ -16,9 +16,9 @@ from aerialdojo_gen.store.root import DataRoot
 _TEXT = "text"
 
 
-def key_of(root: DataRoot, files: Iterable[str], *asked: object) -> str:
+def key_of(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
     """Tell what is asked of which files by which code from everything else."""
-    digest = hashlib.sha256(f"{_sources()}\n{root}\n{asked!r}".encode())
+    digest = hashlib.sha256(f"{_sources()}\n{root}\n{parameters!r}".encode())
     for name in sorted(files):
         try:
             version = root.version(name)

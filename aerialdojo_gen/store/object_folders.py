@@ -31,27 +31,27 @@ class ObjectFolders:
         paths = {p.relative_to(folder).as_posix(): p for p in sorted(folder.rglob("*")) if p.is_file()}
         before = self._bucket.list(f"{key}/")
         own = before.get(f"{key}/{MANIFEST}")
-        there = self._manifest(f"{key}/{MANIFEST}", own) is not None if own else bool(before)
-        if there:
+        exists = self._manifest(f"{key}/{MANIFEST}", own) is not None if own else bool(before)
+        if exists:
             base = f"{key}/{_NEW}{secrets.token_hex(8)}"
             new = self._put_all(base, paths)
             may_write()
-            self._say(key, new)
+            self._write_manifest(key, new)
             with ThreadPoolExecutor(_AT_ONCE) as pool:
                 copied = pool.map(lambda name: (name, self._copied(new[name][0], f"{key}/{name}")), paths)
                 new_plain = dict(copied)
-            self._say(key, new_plain)
+            self._write_manifest(key, new_plain)
         else:
-            self._say(key, None)
+            self._write_manifest(key, None)
             new_plain = self._put_all(key, paths)
             may_write()
-            self._say(key, new_plain)
+            self._write_manifest(key, new_plain)
         kept = {name for name, _ in new_plain.values()} | {f"{key}/{MANIFEST}"}
         self._remove([name for name in self._bucket.list(f"{key}/") if name not in kept])
 
     def delete(self, key: str) -> None:
         """Remove a folder that has a manifest."""
-        self._say(key, None)
+        self._write_manifest(key, None)
         names = list(self._bucket.list(f"{key}/"))
         self._remove([name for name in names if name != f"{key}/{MANIFEST}"])
         self._remove([f"{key}/{MANIFEST}"])
@@ -98,19 +98,19 @@ class ObjectFolders:
         files: Files | None = known[key, entry.etag]
         return files
 
-    def _say(self, key: str, files: Files | None) -> None:
+    def _write_manifest(self, key: str, files: Files | None) -> None:
         # Relative to the folder: a whole prefix may be copied elsewhere.
-        said = {name: [at.removeprefix(f"{key}/"), e.size, e.etag] for name, (at, e) in (files or {}).items()}
-        facts = {"state": "writing" if files is None else "whole", "files": said, "put": secrets.token_hex(4)}
-        text = json.dumps(facts, sort_keys=True)
+        entries = {name: [at.removeprefix(f"{key}/"), e.size, e.etag] for name, (at, e) in (files or {}).items()}
+        fields = {"state": "writing" if files is None else "whole", "files": entries, "put": secrets.token_hex(4)}
+        text = json.dumps(fields, sort_keys=True)
         entry = self._bucket.put_bytes(f"{key}/{MANIFEST}", text.encode())
         self._state.manifests[f"{key}/{MANIFEST}", entry.etag] = files
-        self._state.wrote(f"{key}/{MANIFEST}", entry)
+        self._state.record_write(f"{key}/{MANIFEST}", entry)
 
     def _put_all(self, base: str, paths: dict[str, Path]) -> Files:
         def put(name: str) -> tuple[str, tuple[str, Entry]]:
             entry = self._bucket.put(f"{base}/{name}", paths[name], {"sha256": sha256_of(paths[name])})
-            self._state.wrote(f"{base}/{name}", entry)
+            self._state.record_write(f"{base}/{name}", entry)
             return name, (f"{base}/{name}", entry)
 
         with ThreadPoolExecutor(_AT_ONCE) as pool:
@@ -118,24 +118,24 @@ class ObjectFolders:
 
     def _copied(self, key: str, to: str) -> tuple[str, Entry]:
         entry = self._bucket.copy(key, to)
-        self._state.wrote(to, entry)
+        self._state.record_write(to, entry)
         return to, entry
 
     def _remove(self, names: list[str]) -> None:
         self._bucket.delete(names)
         for name in names:
-            self._state.wrote(name, None)
+            self._state.record_write(name, None)
 
 
 def _parsed(data: bytes, key: str) -> Files | None:
     try:
-        facts = loads_json(data)
-        if facts["state"] != "whole":
+        fields = loads_json(data)
+        if fields["state"] != "whole":
             return None
         folder = key.rpartition("/")[0]
         return {
             str(name): (f"{folder}/{at}", Entry(int(size), str(etag)))
-            for name, (at, size, etag) in facts["files"].items()
+            for name, (at, size, etag) in fields["files"].items()
         }
     except (Malformed, KeyError, TypeError, ValueError, AttributeError):
         raise StoreError(

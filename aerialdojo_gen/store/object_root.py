@@ -34,7 +34,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store.bucket import Bucket, Entry
 from aerialdojo_gen.store.cloud_errors import Changed
 from aerialdojo_gen.store.files import sha256_of
-from aerialdojo_gen.store.lease import lease_s, leased, lost, token_of
+from aerialdojo_gen.store.lease import lease_lost, lease_s, leased, token_of
 from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders
 from aerialdojo_gen.store.object_state import state_of
 from aerialdojo_gen.store.root import DataRoot, inside
@@ -119,25 +119,25 @@ class ObjectRoot(DataRoot):
         """Bytes of an object, or of those under a prefix."""
         return sum(entry.size for _, entry in self._files(relative).values())
 
-    def digest(self, relative: str, *, anew: bool = False) -> str:
+    def digest(self, relative: str, *, reread: bool = False) -> str:
         """SHA-256 of a file's bytes: what was said when it was put, or read from the store."""
         for _ in range(_TRIES):
             try:
-                return self._digest(relative, anew)
+                return self._digest(relative, reread)
             except Changed:
                 self._state.forget()
         raise StoreError(f"{self.at(relative)} is replaced again and again: run the command again")
 
-    def _digest(self, relative: str, anew: bool) -> str:
+    def _digest(self, relative: str, reread: bool) -> str:
         files, state = self._files(relative), self._state
-        if not anew and files.keys() == {""}:
+        if not reread and files.keys() == {""}:
             key, entry = files[""]
             if (known := state.digests.get((key, entry.etag))) is not None:
                 return known
-            found, said = state.bucket.head(key)
-            if found.etag == entry.etag and len(said.get(_DIGEST, "")) == 64:
-                state.digests[key, entry.etag] = said[_DIGEST]
-                return said[_DIGEST]
+            found, metadata = state.bucket.head(key)
+            if found.etag == entry.etag and len(metadata.get(_DIGEST, "")) == 64:
+                state.digests[key, entry.etag] = metadata[_DIGEST]
+                return metadata[_DIGEST]
         digest = hashlib.sha256()
         for _, (key, entry) in sorted(files.items()):
             state.bucket.download(key, _Hashed(digest), entry)
@@ -186,7 +186,7 @@ class ObjectRoot(DataRoot):
             self._may_write()
             digest = sha256_of(folder / name)
             entry = state.bucket.put(key, folder / name, {_DIGEST: digest})
-            state.wrote(key, entry)
+            state.record_write(key, entry)
             state.digests[key, entry.etag] = digest
             state.cache.add(self._item({"": (key, entry)}), folder)
 
@@ -211,7 +211,7 @@ class ObjectRoot(DataRoot):
         if gone:
             state.bucket.delete(gone)
         for name in gone:
-            state.wrote(name, None)
+            state.record_write(name, None)
 
     @contextmanager
     def lock(self) -> Iterator[None]:
@@ -238,16 +238,16 @@ class ObjectRoot(DataRoot):
         if (lease := state.leases.get(self.url)) is not None:
             lease.check()
             return
-        if time.monotonic() - state.looked.get(self._token, -1e9) < lease_s() / 4:
+        if time.monotonic() - state.checked_at.get(self._token, -1e9) < lease_s() / 4:
             return
         if token_of(state.bucket, self._key(LOCK)) != self._token:
-            raise lost(self.url, "another run has it now, or none")
-        state.looked[self._token] = time.monotonic()
+            raise lease_lost(self.url, "another run has it now, or none")
+        state.checked_at[self._token] = time.monotonic()
 
     @property
     def _state(self) -> Any:
         state = state_of(self._name)
-        state.seen(self._epoch)
+        state.invalidate_before(self._epoch)
         return state
 
     def _key(self, relative: str) -> str:
@@ -269,8 +269,8 @@ class ObjectRoot(DataRoot):
             group, parts = self._group(relative), PurePosixPath(relative).parts
             first = self._key("/".join(parts[:3])) if parts[0] == "media" and len(parts) > 2 else ""
             files = ObjectFolders(state).find(key, state.listing(group), first)
-            if not files and state.is_old(group):
-                files = ObjectFolders(state).find(key, state.listing(group, anew=True), first)
+            if not files and state.is_stale(group):
+                files = ObjectFolders(state).find(key, state.listing(group, reread=True), first)
         if not files:
             raise FileNotFoundError(2, "there is no such file or folder", self.at(relative))
         return files

@@ -13,7 +13,7 @@ from aerialdojo_gen.store.bucket import Bucket, Entry
 from aerialdojo_gen.store.cache import Cache
 
 # A reader that holds no lock believes a listing for so long.
-_BELIEVED_S = 60.0
+_LISTING_TTL_S = 60.0
 # What is not in a listing is looked for once more if the listing is older.
 _FRESH_S = 2.0
 
@@ -33,12 +33,12 @@ class State:
     digests: dict[tuple[str, str], str] = field(default_factory=dict)  # SHA-256 by key and tag
     manifests: dict[tuple[str, str], Any] = field(default_factory=dict)
     leases: dict[str, Any] = field(default_factory=dict)  # Locks that this process holds, by the root's URL
-    looked: dict[str, float] = field(default_factory=dict)
+    checked_at: dict[str, float] = field(default_factory=dict)
     _listings: dict[str, _Listing] = field(default_factory=dict)
     _epoch: int = 0
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
-    def seen(self, epoch: int) -> None:
+    def invalidate_before(self, epoch: int) -> None:
         """Forget what was listed before a run last began to look anew."""
         if epoch > self._epoch:
             with self._lock:
@@ -50,21 +50,21 @@ class State:
         with self._lock:
             self._listings.clear()
 
-    def listing(self, group: str, *, anew: bool = False) -> dict[str, Entry]:
+    def listing(self, group: str, *, reread: bool = False) -> dict[str, Entry]:
         """Return the objects under a prefix by key, as they were listed before unless `anew`; not to be changed."""
         with self._lock:
             kept = self._listings.get(group)
-            old = kept is not None and not self._epoch and time.monotonic() - kept.made > _BELIEVED_S
-            if kept is None or old or anew:
+            old = kept is not None and not self._epoch and time.monotonic() - kept.made > _LISTING_TTL_S
+            if kept is None or old or reread:
                 kept = self._listings[group] = _Listing(self.bucket.list(group), time.monotonic())
             return kept.objects
 
-    def is_old(self, group: str) -> bool:
+    def is_stale(self, group: str) -> bool:
         """Whether to look again may find more."""
         kept = self._listings.get(group)
         return kept is None or time.monotonic() - kept.made > _FRESH_S
 
-    def wrote(self, key: str, entry: Entry | None) -> None:
+    def record_write(self, key: str, entry: Entry | None) -> None:
         """Take note of what this process put, or deleted."""
         with self._lock:
             for group, kept in self._listings.items():

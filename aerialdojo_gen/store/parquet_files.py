@@ -24,29 +24,29 @@ _PLAIN_LEVEL = 12
 _DAMAGE = (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError)
 
 
-def read_file(path: Path, columns: Sequence[str] | None = None, called: str = "") -> pa.Table:
+def read_file(path: Path, columns: Sequence[str] | None = None, label: str = "") -> pa.Table:
     """Read one Parquet file as it is, its page checksums verified."""
-    wanted = None if columns is None else [*columns]
+    names = None if columns is None else [*columns]
     try:
         # In this thread: where memory is short Arrow's pool gets no thread, and waits for one for ever. The processes
         # beside this one read meanwhile.
         with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
             # Names are decoded when they are asked for; a column that is not there is left out unasked.
-            missing = set(wanted or ()) - set(file.schema_arrow.names)
+            missing = set(names or ()) - set(file.schema_arrow.names)
             if missing:
                 raise pa.ArrowInvalid(f"no column {min(missing)}")
-            table = file.read(wanted, use_threads=False)
-            return table if wanted is None else table.select(wanted)
+            table = file.read(names, use_threads=False)
+            return table if names is None else table.select(names)
     except _DAMAGE as error:
-        raise _unreadable(error, called or path) from None
+        raise _unreadable(error, label or path) from None
 
 
-def read_footer(file: Path | BinaryIO, called: str = "") -> tuple[int, dict[bytes, bytes]]:
+def read_footer(file: Path | BinaryIO, label: str = "") -> tuple[int, dict[bytes, bytes]]:
     """Return how many rows a Parquet file says it has, and its metadata."""
     try:
         footer = pq.read_metadata(file)
     except _DAMAGE as error:
-        raise _unreadable(error, called or file) from None
+        raise _unreadable(error, label or file) from None
     return footer.num_rows, dict(footer.metadata or {})
 
 

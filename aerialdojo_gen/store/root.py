@@ -54,7 +54,7 @@ class DataRoot(ABC):
         """Bytes of a file, or of a folder's files together; FileNotFoundError where there is none."""
 
     @abstractmethod
-    def digest(self, relative: str, *, anew: bool = False) -> str:
+    def digest(self, relative: str, *, reread: bool = False) -> str:
         """SHA-256 of a file's bytes, or of a folder's files one after the other by name; hexadecimal.
 
         Parameters
@@ -124,10 +124,10 @@ class DataRoot(ABC):
     def refresh(self) -> None:  # noqa: B027 - a directory remembers nothing
         """Forget what was found where; a root that is pickled afterwards makes other processes forget it too."""
 
-    def is_whole(self, relative: str, size: int, sha256: str = "", *, anew: bool = False) -> bool:
+    def is_whole(self, relative: str, size: int, sha256: str = "", *, reread: bool = False) -> bool:
         """Whether a file or folder is there, of a size, and of a digest where one is given (see `digest`)."""
         try:
-            return self.size(relative) == size and (not sha256 or self.digest(relative, anew=anew) == sha256)
+            return self.size(relative) == size and (not sha256 or self.digest(relative, reread=reread) == sha256)
         except OSError:
             return False
 
@@ -166,12 +166,12 @@ class LocalRoot(DataRoot):
 
     def size(self, relative: str) -> int:
         """Bytes of a file, or of a folder's files together."""
-        return files.size_of(self._named(relative))
+        return files.size_of(self._path_text(relative))
 
-    def digest(self, relative: str, *, anew: bool = False) -> str:
+    def digest(self, relative: str, *, reread: bool = False) -> str:
         """SHA-256 of a file's bytes, read once in a process as long as it is not written to."""
         path = self._at(relative)
-        return files.sha256_of(path) if anew or path.is_dir() else files.file_digest(path)
+        return files.sha256_of(path) if reread or path.is_dir() else files.file_digest(path)
 
     def prefetch_digests(self, names: Iterable[str]) -> None:
         """Read files in a thread, for `digest` to find."""
@@ -179,7 +179,7 @@ class LocalRoot(DataRoot):
 
     def version(self, relative: str) -> str:
         """Inode, size and times of the file: one that is replaced or written to is another."""
-        stat = os.stat(self._named(relative))
+        stat = os.stat(self._path_text(relative))
         return f"{stat.st_ino}-{stat.st_size}-{stat.st_mtime_ns}-{stat.st_ctime_ns}"
 
     def open(self, relative: str) -> BinaryIO:
@@ -202,7 +202,7 @@ class LocalRoot(DataRoot):
             place = folder if plain else PurePosixPath(folder).as_posix()
             prefix = "" if place == "." else f"{place}/"
             try:
-                names = os.listdir(self._named(folder))
+                names = os.listdir(self._path_text(folder))
             except (FileNotFoundError, NotADirectoryError, PermissionError):
                 return []
             return sorted(prefix + name for name in fnmatch.filter(names, pattern))
@@ -263,7 +263,7 @@ class LocalRoot(DataRoot):
     def _at(self, relative: str) -> Path:
         return self.path / inside(relative)
 
-    def _named(self, relative: str) -> str:
+    def _path_text(self, relative: str) -> str:
         # What a run asks of thousands of files is asked by their names: making a Path takes longer than the answer.
         return f"{self.path}/{inside(relative)}"
 
@@ -273,12 +273,12 @@ def changed_ns(version: str) -> int:
     return int(version.rpartition("-")[2])
 
 
-def leads_out(root: DataRoot, told: str) -> bool:
+def is_outside(root: DataRoot, path_text: str) -> bool:
     """Whether a path that a table names leads out of the data root, by dots or by a symbolic link."""
-    path = PurePosixPath(told)
+    path = PurePosixPath(path_text)
     if path.is_absolute() or ".." in path.parts:
         return True
-    return isinstance(root, LocalRoot) and not (root.path / told).resolve().is_relative_to(root.path.resolve())
+    return isinstance(root, LocalRoot) and not (root.path / path_text).resolve().is_relative_to(root.path.resolve())
 
 
 def inside(relative: str) -> str:

@@ -20,8 +20,8 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
+from aerialdojo_gen.store.footer_cache import footer_cache
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
-from aerialdojo_gen.store.known_footers import known_footers
 from aerialdojo_gen.store.layout import (
     LAYOUT,
     Place,
@@ -34,9 +34,24 @@ from aerialdojo_gen.store.layout import (
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 __all__ = [
-    "LAYOUT", "META", "Place", "check_run_name", "check_scene_name", "content", "count_rows", "keep_infos",
-    "partition", "prune", "read_info", "read_scene", "read_stored", "shard_folder", "shard_name", "shard_path",
-    "shards", "write_shard",
+    "LAYOUT",
+    "META",
+    "Place",
+    "cache_footers",
+    "check_run_name",
+    "check_scene_name",
+    "content",
+    "count_rows",
+    "partition",
+    "prune",
+    "read_info",
+    "read_scene",
+    "read_stored",
+    "shard_folder",
+    "shard_name",
+    "shard_path",
+    "shards",
+    "write_shard",
 ]  # fmt: skip
 
 META = b"aerialdojo"
@@ -110,35 +125,35 @@ def read_info(data: Where, name: str = "") -> ShardInfo:
 @lru_cache(maxsize=8192)
 def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
     # A shard is never written to, only replaced; a run asks for the same footer half a dozen times.
-    known, begun_ns = known_footers(), time.time_ns()
-    if known is not None and (said := known.find(root, name, version)) is not None:
-        return said
+    known, begun_ns = footer_cache(), time.time_ns()
+    if known is not None and (cached := known.find(root, name, version)) is not None:
+        return cached
     from aerialdojo_gen.store.parquet_files import read_footer
 
-    where, mend = root.at(name), "delete it and run the command again"
+    where, hint = root.at(name), "delete it and run the command again"
     try:
         with root.open(name) as file:
             rows, metadata = read_footer(file, where)
     except FileNotFoundError:
         raise StoreError(f"cannot read {where}: No such file or directory") from None
     except DamagedFile as error:
-        raise DamagedFile(f"{error}: {mend}") from None
+        raise DamagedFile(f"{error}: {hint}") from None
     if META not in metadata:
-        raise DamagedFile(f"{where} is damaged (not written by aerialdojo-gen): {mend}")
+        raise DamagedFile(f"{where} is damaged (not written by aerialdojo-gen): {hint}")
     try:
         info = decode(metadata[META])
     except ValueError as error:
-        raise DamagedFile(f"{where} is damaged ({error}): {mend}") from None
+        raise DamagedFile(f"{where} is damaged ({error}): {hint}") from None
     if info.rows != rows:
-        raise DamagedFile(f"{where} has {rows:,} rows where {info.rows:,} were written: {mend}")
+        raise DamagedFile(f"{where} has {rows:,} rows where {info.rows:,} were written: {hint}")
     if known is not None:
-        known.note(root, name, version, begun_ns, info)
+        known.record(root, name, version, begun_ns, info)
     return info
 
 
-def keep_infos(root: DataRoot, names: Sequence[str]) -> None:
-    """Let `aerialdojo_gen.store.known_footers` keep what shards' footers say; those that are damaged are left out."""
-    if known_footers() is None:
+def cache_footers(root: DataRoot, names: Sequence[str]) -> None:
+    """Let `aerialdojo_gen.store.footer_cache` keep what shards' footers say; those that are damaged are left out."""
+    if footer_cache() is None:
         return
     for name in names:
         with contextlib.suppress(StoreError, OSError):
@@ -176,40 +191,40 @@ def read_scene(
 
     root = open_root(data)
     spec = LAYOUT[table].spec
-    wanted = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
-    mend = f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
+    schema = spec.schema if columns is None else pa.schema([spec.schema.field(name) for name in columns])
+    hint = f"delete it and run {command(LAYOUT[table].command, scene=scene)}"
     tables = []
     for name, info in _parts(root, table, scene, run).items():
         where = root.at(name)
         try:
             if columns is None:
                 shard = read_file(root.local_copy(name), None, where)
-                stored = _stored(wanted, shard.column_names)
+                stored = _stored(schema, shard.column_names)
             else:
-                stored = _stored(wanted, info.columns or columns)
+                stored = _stored(schema, info.columns or columns)
                 shard = read_file(root.local_copy(name), stored, where)
         except FileNotFoundError:
             raise StoreError(f"{where} was removed while it was read: run the command again") from None
         except DamagedFile as error:
-            raise DamagedFile(f"{error}: {mend}") from None
-        if not shard.schema.equals(pa.schema([wanted.field(name) for name in stored])):
-            raise StoreError(f"{where} has other columns than this version's {spec.name}: {mend}")
+            raise DamagedFile(f"{error}: {hint}") from None
+        if not shard.schema.equals(pa.schema([schema.field(name) for name in stored])):
+            raise StoreError(f"{where} has other columns than this version's {spec.name}: {hint}")
         # The checksums of Parquet's pages do not say which column a page is of, nor what its values mean.
         if info.columns and any(info.columns.get(name) != own for name, own in column_digests(shard).items()):
-            raise DamagedFile(f"{where} is damaged (other rows than were written): {mend}")
-        tables.append(pa.Table.from_arrays(_with_nulls(shard, wanted), schema=wanted.remove_metadata()))
+            raise DamagedFile(f"{where} is damaged (other rows than were written): {hint}")
+        tables.append(pa.Table.from_arrays(_with_nulls(shard, schema), schema=schema.remove_metadata()))
     return pa.concat_tables(tables)
 
 
-def _stored(wanted: pa.Schema, there: Collection[str]) -> list[str]:
+def _stored(schema: pa.Schema, stored_names: Collection[str]) -> list[str]:
     """Name the columns to be found in a shard: all but those that may be null and are not there."""
-    return [field.name for field in wanted if field.name in there or not field.nullable]
+    return [field.name for field in schema if field.name in stored_names or not field.nullable]
 
 
-def _with_nulls(shard: pa.Table, wanted: pa.Schema) -> list[pa.ChunkedArray | pa.Array]:
+def _with_nulls(shard: pa.Table, schema: pa.Schema) -> list[pa.ChunkedArray | pa.Array]:
     """Return a shard's columns in the schema's order, nulls for those that it lacks."""
-    there = set(shard.column_names)
-    return [shard[f.name] if f.name in there else pa.nulls(shard.num_rows, f.type) for f in wanted]
+    stored_names = set(shard.column_names)
+    return [shard[f.name] if f.name in stored_names else pa.nulls(shard.num_rows, f.type) for f in schema]
 
 
 def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> pa.Table:
@@ -219,10 +234,10 @@ def read_stored(data: Where, table: str, scene: str, columns: Sequence[str]) -> 
 
     root = open_root(data)
     parts = _parts(root, table, scene)
-    there = [name for name in columns if all(name in info.columns for info in parts.values())]
+    stored_names = [name for name in columns if all(name in info.columns for info in parts.values())]
     tables = []
     for name, info in parts.items():
-        shard = read_file(root.local_copy(name), there, root.at(name)).replace_schema_metadata(None)
+        shard = read_file(root.local_copy(name), stored_names, root.at(name)).replace_schema_metadata(None)
         if any(info.columns[column] != own for column, own in column_digests(shard).items()):
             raise DamagedFile(f"{root.at(name)} is damaged (other rows than were written): delete it")
         tables.append(shard)

@@ -14,7 +14,7 @@ from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import seen_from, view_of
+from aerialdojo_gen.geometry.viewpoints import start_visibility, view_of
 
 coordinates = st.floats(-50, 50)
 BALL = instance("ball", trimesh.creation.icosphere(3, radius=0.5).apply_translation([10.0, 0.0, 2.0]))
@@ -24,7 +24,7 @@ AT = {"x": 0.0, "y": 0.0, "z": 2.0}
 
 def seen(*others, x=0.0, y=0.0, z=2.0, yaw=0.0):
     world = scene(BALL, *others)
-    share, view = seen_from(
+    share, view = start_visibility(
         TriangleRayCaster(*soup(world.instances)), instance_caster(BALL), POINTS, [[x, y, z, yaw]]
     )
     return float(share[0]), VIEWS[view[0]] if view[0] >= 0 else None
@@ -80,9 +80,9 @@ def test_poses_are_judged_each_by_itself():
     caster, own = TriangleRayCaster(*soup(world.instances)), instance_caster(BALL)
     rng = np.random.default_rng(4)
     poses = np.column_stack([rng.uniform(-14, 14, (40, 2)), rng.uniform(1, 9, 40), rng.uniform(-3, 3, 40)])
-    share, view = seen_from(caster, own, POINTS, poses)
+    share, view = start_visibility(caster, own, POINTS, poses)
     assert 0 < np.count_nonzero(share) < 40
     assert ((view >= 0) == (share > 0)).all()
     for k, pose in enumerate(poses):
-        one, which = seen_from(caster, own, POINTS, pose[None])
+        one, which = start_visibility(caster, own, POINTS, pose[None])
         assert (one[0], which[0]) == (share[k], view[k])

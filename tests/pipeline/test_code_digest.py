@@ -132,7 +132,7 @@ def test_plumbing_is_what_it_is_said_to_be():
                      ".pipeline.summary", ".pipeline.task", ".stages",
                      ".stages.work", ".store", ".store.atomic", ".store.bucket", ".store.cache",
                      ".store.cloud_errors", ".store.files", ".store.footers",
-                     ".store.known_footers", ".store.layout",
+                     ".store.footer_cache", ".store.layout",
                      ".store.lease", ".store.object_folders", ".store.object_root", ".store.object_state",
                      ".store.parquet_files", ".store.root", ".store.schemas", ".store.schemas.benchmark",
                      ".store.schemas.columns", ".store.schemas.release",

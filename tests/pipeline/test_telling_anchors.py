@@ -10,7 +10,7 @@ from support.handmade import box, instance, scene
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
-from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, in_picture, off_front_rad, seen_share
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, in_picture, off_front_rad, visible_shares
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
@@ -163,12 +163,12 @@ def test_seen_share_counts_what_faces_the_camera_in_the_picture_and_unhidden():
     rays = RayCaster(scene(panel, wall))
     patch = Patch.of(north, 200, np.random.default_rng(0), rays, (0.0, 1.0, 0.0))
     assert patch.lit[:, 0].all() or patch.lit[:, 1].all()
-    front, behind, edge, turned = seen_share(eyes, yaws, [patch], rays, 90.0)[:, 0]
+    front, behind, edge, turned = visible_shares(eyes, yaws, [patch], rays, 90.0)[:, 0]
     assert front > 0.9
     assert behind == turned == 0.0
     assert 0.0 < edge < 0.5
     dark = Patch.of(north, 200, np.random.default_rng(0), rays, (0.0, -1.0, 0.0))
-    assert seen_share(eyes[:1], yaws[:1], [dark], rays, 90.0)[0, 0] == pytest.approx(0.8 * front)
+    assert visible_shares(eyes[:1], yaws[:1], [dark], rays, 90.0)[0, 0] == pytest.approx(0.8 * front)
 
 
 @settings(max_examples=100, deadline=None)

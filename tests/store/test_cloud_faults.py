@@ -29,7 +29,7 @@ def test_a_fault_that_passes_is_not_seen(cloud: str, proxy: Proxy, how: int | st
     proxy.fail("^GET", how)
     again = open_root(cloud)
     again.refresh()
-    assert again.digest("t/a/x", anew=True) == root.digest("t/a/x")
+    assert again.digest("t/a/x", reread=True) == root.digest("t/a/x")
     assert proxy.left() == 0
 
 
@@ -39,7 +39,7 @@ def test_a_part_of_an_upload_is_put_again(cloud: str, proxy: Proxy, how: int | s
     proxy.fail("^PUT .*partNumber=2", how)
     write(root, "t/a/x", BIG)
     assert proxy.left() == 0
-    assert root.below("t").digest("a/x", anew=True) == root.digest("t/a/x")
+    assert root.below("t").digest("a/x", reread=True) == root.digest("t/a/x")
 
 
 def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, monkeypatch):

@@ -36,9 +36,9 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke
         for scene in scenes if place.command != "evaluate" else []:
             assert store.content(root, table, scene) == store.content(local, table, scene), (table, scene)
     for scene in scenes:
-        assert root.digest(f"meshes/{scene}.glb", anew=True) == local.digest(f"meshes/{scene}.glb")
+        assert root.digest(f"meshes/{scene}.glb", reread=True) == local.digest(f"meshes/{scene}.glb")
         for row in store.read_scene(root, "recordings", scene, ["path", "bytes", "sha256"]).to_pylist():
-            assert root.is_whole(row["path"], row["bytes"], row["sha256"], anew=True)
+            assert root.is_whole(row["path"], row["bytes"], row["sha256"], reread=True)
     again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert again.returncode == 0, again.stderr
     assert "nothing to do: all 9 stages are up to date" in again.stderr, again.stderr

@@ -29,8 +29,8 @@ def test_a_file_is_what_was_committed(root):
         write(root, "meshes/a.glb", data)
         assert root.local_copy("meshes/a.glb").read_bytes() == data
         assert root.size("meshes/a.glb") == len(data)
-        for anew in (False, True):
-            assert root.digest("meshes/a.glb", anew=anew) == hashlib.sha256(data).hexdigest()
+        for reread in (False, True):
+            assert root.digest("meshes/a.glb", reread=reread) == hashlib.sha256(data).hexdigest()
         with root.open("meshes/a.glb") as file:
             file.seek(1)
             assert file.read() == data[1:]
@@ -167,4 +167,4 @@ def test_a_large_file_goes_up_in_parts(cloud):
     root, data = open_root(cloud), os.urandom(20 << 20)
     write(root, "meshes/a.glb", data)
     assert root.version("meshes/a.glb").rstrip('"').endswith("-3")
-    assert hashlib.sha256(data).hexdigest() == root.digest("meshes/a.glb", anew=True)
+    assert hashlib.sha256(data).hexdigest() == root.digest("meshes/a.glb", reread=True)

@@ -7,7 +7,7 @@ import trimesh
 
 from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.store.schemas import TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
 
 # Columns of anchors that do not matter to what reads them.
 OPINIONS = {
@@ -17,9 +17,9 @@ OPINIONS = {
     "thumbnail": b"",
 }  # fmt: skip
 # What a table tells of difficulty, of the start's view and of splits, where that does not matter.
-UNTOLD = dict.fromkeys(TOLD_OF_DIFFICULTY)
+UNTOLD = dict.fromkeys(DIFFICULTY_COLUMNS)
 UNSEEN = {"target_visible_at_start": None, "visible_view_at_start": None}
-UNSPLIT = dict.fromkeys(TOLD_OF_SPLITS)
+UNSPLIT = dict.fromkeys(SPLIT_COLUMNS)
 
 
 def instance(node: str, *meshes: trimesh.Trimesh, category: str = "thing") -> Instance:

@@ -175,10 +175,10 @@ def _key(section: str, name: str, field: FieldInfo, value: object, default: obje
     ]
     ends = (unit for end, unit in _UNITS.items() if name.endswith(end))
     inner = model_in(field.annotation)
-    said = field.description or (inner.__doc__ or "" if inner else "").partition("\n")[0]
+    text = field.description or (inner.__doc__ or "" if inner else "").partition("\n")[0]
     return Key(
         section, field.alias or name, value, default, field.is_required(), _kind(field.annotation),
-        _NAMED.get(name) or next(ends, ""), ", ".join(bounds), said.rstrip("."),
+        _NAMED.get(name) or next(ends, ""), ", ".join(bounds), text.rstrip("."),
     )  # fmt: skip
 
 

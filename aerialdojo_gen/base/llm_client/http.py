@@ -76,8 +76,8 @@ def _check_json(body: bytes) -> None:
     try:
         json.loads(body)
     except (ValueError, RecursionError):
-        said = body[:200].decode("utf-8", "replace").split("\n", 1)[0].strip()
-        raise BodyBoundError(f"its answer is no JSON: is base_url right? It begins with {said[:80]!r}") from None
+        message = body[:200].decode("utf-8", "replace").split("\n", 1)[0].strip()
+        raise BodyBoundError(f"its answer is no JSON: is base_url right? It begins with {message[:80]!r}") from None
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
@@ -95,7 +95,7 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
     return max(0.0, seconds) if seconds < float("inf") else None
 
 
-_WORTH_ANOTHER_TRY = {408: "time-out", 409: "conflict", 425: "too early", 429: "rate limit"}
+_RETRYABLE = {408: "time-out", 409: "conflict", 425: "too early", 429: "rate limit"}
 # A wrong or missing key, no money, no permission, and redirects: the key must not go elsewhere.
 _ALL_REQUESTS = (401, 402, 403, 407)
 _NO_MONEY = ("insufficient_quota", "billing_", "credit balance", "insufficient credits", "insufficient balance")
@@ -103,19 +103,19 @@ _NO_KEY = ("api key not valid", "api_key_invalid", "invalid api key", "incorrect
 _FILTERED = ("content_filter", "content filter", "content_policy", "content policy", "responsibleai", "safety")
 _TOO_LONG = ("context_length", "context length", "context window", "maximum context", "prompt is too long",
              "too many tokens", "max_model_len", "input is too long")  # fmt: skip
-_OF_A_PICTURE = ("image", "picture", "media", "file")
+_PICTURE_WORDS = ("image", "picture", "media", "file")
 
 
-def refusal(status: int, body: Any, said: str, name: str, model: str, retry_after_s: float | None) -> AerialDojoError:
+def refusal(status: int, body: Any, text: str, name: str, model: str, retry_after_s: float | None) -> AerialDojoError:
     """Make the error for an HTTP status that is none of success."""
-    message = f"{name}: HTTP {status}: {said}"
-    words = f"{_codes(body)} {said}".lower()
+    message = f"{name}: HTTP {status}: {text}"
+    words = f"{_codes(body)} {text}".lower()
     if status in _ALL_REQUESTS or 300 <= status < 400 or _has(words, _NO_MONEY) or _has(words, _NO_KEY):
         return UsageError(message)
-    if status in _WORTH_ANOTHER_TRY or status >= 500:
-        kind = _WORTH_ANOTHER_TRY.get(status, "server error")
+    if status in _RETRYABLE or status >= 500:
+        kind = _RETRYABLE.get(status, "server error")
         return AgentUnavailable(message, retry_after_s, kind=kind)
-    if status == 404 and _is_of_all(words, model):
+    if status == 404 and _concerns_all_requests(words, model):
         return UsageError(message)
     if _has(words, _FILTERED):
         kind = "content filter"
@@ -126,11 +126,11 @@ def refusal(status: int, body: Any, said: str, name: str, model: str, retry_afte
     return AgentUnavailable(message, retry_after_s, kind=kind, again=False)
 
 
-def _is_of_all(words: str, model: str) -> bool:
+def _concerns_all_requests(words: str, model: str) -> bool:
     """Whether a 404 is the model's or the address's, rather than that of something in the request."""
     if "model_not_found" in words or (model and re.search(rf"(?<!\w){re.escape(model.lower())}(?!\w)", words)):
         return True
-    return not _has(words, _OF_A_PICTURE)
+    return not _has(words, _PICTURE_WORDS)
 
 
 def _has(words: str, any_of: tuple[str, ...]) -> bool:

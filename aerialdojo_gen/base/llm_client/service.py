@@ -104,14 +104,14 @@ class Connection:
 
     def call(self, ask: Callable[[Any], Awaitable[Result]], retries: int | None = None) -> Result:
         """Send a request; send it again where that may help."""
-        again = Retrying(
+        retrying = Retrying(
             stop=stop_after_attempt(1 + (self._retries if retries is None else retries)),
             wait=_wait_s,
-            retry=retry_if_exception(_worth_another_try),
+            retry=retry_if_exception(_is_retryable),
             sleep=lambda seconds: time.sleep(seconds),
             reraise=True,
         )
-        return again(self._once, ask)
+        return retrying(self._once, ask)
 
     def _once(self, ask: Callable[[Any], Awaitable[Result]]) -> Result:
         if self.meter.pace is not None:
@@ -123,8 +123,8 @@ class Connection:
         except self._package.APIError as error:
             failure = self._failure(error)
         except TimeoutError:
-            said = f"{self.name}: no complete answer within {self._timeout_s:g} s"
-            failure = AgentUnavailable(said, kind="time-out")
+            message = f"{self.name}: no complete answer within {self._timeout_s:g} s"
+            failure = AgentUnavailable(message, kind="time-out")
         except BodyBoundError as error:
             # One of the packages wraps what its client raises, the other lets it through.
             failure = self._bound(error)
@@ -169,17 +169,17 @@ class Connection:
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):
             body = getattr(error, "body", None)
-            said = self._line(body or error.message)
+            message = self._line(body or error.message)
             after_s = retry_after_s(error.response.headers)
-            return refusal(error.status_code, body, said, self.name, self._model, after_s)
+            return refusal(error.status_code, body, message, self.name, self._model, after_s)
         cause = error.__cause__ or error
         if isinstance(cause, BodyBoundError):
             return self._bound(cause)
-        said = self._line(str(cause) or type(cause).__name__)
+        message = self._line(str(cause) or type(cause).__name__)
         if type(cause).__name__ in _NO_ROUTE:
-            said = _system_error(cause) or said
-            return ServiceDown(f"{self.name}: {said}: is the service there, and is base_url right?")
-        return AgentUnavailable(f"{self.name}: {said}", kind="connection lost")
+            message = _system_error(cause) or message
+            return ServiceDown(f"{self.name}: {message}: is the service there, and is base_url right?")
+        return AgentUnavailable(f"{self.name}: {message}", kind="connection lost")
 
     def _line(self, value: Any) -> str:
         if isinstance(value, dict):
@@ -205,7 +205,7 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
     loop.close()
 
 
-def _worth_another_try(error: BaseException) -> bool:
+def _is_retryable(error: BaseException) -> bool:
     if isinstance(error, AgentUnavailable):
         # An answer cut on its way may come whole the next time; a refusal is one for good.
         worth = error.again or error.kind == "malformed answer"
@@ -215,5 +215,5 @@ def _worth_another_try(error: BaseException) -> bool:
 
 def _wait_s(state: RetryCallState) -> float:
     error = state.outcome.exception() if state.outcome is not None else None
-    asked = error.retry_after_s if isinstance(error, AgentUnavailable) else None
-    return asked if asked is not None else min(2.0 ** (state.attempt_number - 1), MAX_WAIT_S)
+    retry_after = error.retry_after_s if isinstance(error, AgentUnavailable) else None
+    return retry_after if retry_after is not None else min(2.0 ** (state.attempt_number - 1), MAX_WAIT_S)

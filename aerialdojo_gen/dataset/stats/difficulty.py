@@ -15,7 +15,7 @@ from aerialdojo_gen.base.constants import DETOUR
 from aerialdojo_gen.dataset.stats.comparison import Column, Comparison, Figure, own_table, quantile
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
-from aerialdojo_gen.store.schemas import SETTINGS, TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import SETTINGS, SPLIT_COLUMNS
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def read_tasks(data: Where, scenes: Sequence[str]) -> Tasks:
     for scene in scenes:
         for subset in ("train", "test"):
             routes = store.read_scene(root, f"routes/{subset}", scene, ["nav_id", "setting", *_ROUTE])
-            tasks = store.read_scene(root, f"tasks/{subset}", scene, ["nav_id", *TOLD_OF_SPLITS])
+            tasks = store.read_scene(root, f"tasks/{subset}", scene, ["nav_id", *SPLIT_COLUMNS])
             own = tasks.take(pc.index_in(routes["nav_id"], value_set=tasks["nav_id"].combine_chunks()))
             n = routes.num_rows
             found["scene"] += [scene] * n
@@ -72,7 +72,7 @@ def read_tasks(data: Where, scenes: Sequence[str]) -> Tasks:
             found["target_split"] += [split or "" for split in own["target_split"].to_pylist()]
             for name in _ROUTE:
                 found[name].append(_numbers(routes[name]))
-            for name in TOLD_OF_SPLITS:
+            for name in SPLIT_COLUMNS:
                 if name != "target_split":
                     found[name].append(_numbers(own[name]))
     words = {name: np.array(found[name], dtype=np.str_) for name in _WORDS}

@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
-from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, STOP, TOLD_OF_DIFFICULTY, TOLD_OF_SPLITS, VIEWS
+from aerialdojo_gen.store.schemas import APPROACH, DIFFICULTY_COLUMNS, SETTINGS, SPLIT_COLUMNS, STOP, VIEWS
 
 _LENGTH_M = 1e-6
 # What FCL says of a body this much thinner or thicker counts: rounding does not.
@@ -51,7 +51,7 @@ def _known(rows: Rows, name: str) -> Mask:
 @check("routes", after=_OF_ROUTE)
 def difficulty_known(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every route says how hard it is, unless an older version wrote the release and none does."""
-    names = [name for name in TOLD_OF_DIFFICULTY if name != "visible_view_at_start"]
+    names = [name for name in DIFFICULTY_COLUMNS if name != "visible_view_at_start"]
     known = np.column_stack([_known(rows, name) for name in names])
     for row in np.flatnonzero(known.any() & ~known.all(axis=1)):
         yield Finding(int(row), f"no {names[int(known[row].argmin())]}", "a value, as other routes of the scene have")
@@ -203,7 +203,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     ids = data["objects"].ints("object_id").tolist()
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
     out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
-    told = _all_known(rows, *TOLD_OF_SPLITS)
+    told = _all_known(rows, *SPLIT_COLUMNS)
     split, said = rows.texts("target_split"), {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
     ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in said}
     known: dict[int, bool] = {}
@@ -231,8 +231,8 @@ def _has_salt(data: SceneData, key: bytes) -> bool:
 @check("tasks")
 def splits_known(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
-    known = np.column_stack([_known(rows, name) for name in TOLD_OF_SPLITS])
+    known = np.column_stack([_known(rows, name) for name in SPLIT_COLUMNS])
     if not known.any():
         raise UncheckedError("the release does not say: an older version wrote it")
     for row in np.flatnonzero(~known.all(axis=1)):
-        yield Finding(int(row), f"no {TOLD_OF_SPLITS[int(known[row].argmin())]}", "a value, as other tasks have")
+        yield Finding(int(row), f"no {SPLIT_COLUMNS[int(known[row].argmin())]}", "a value, as other tasks have")

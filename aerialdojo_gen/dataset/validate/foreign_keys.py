@@ -13,12 +13,12 @@ from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, Unch
 from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
-from aerialdojo_gen.store.schemas import SETTINGS, TOLD_OF_SPLITS
+from aerialdojo_gen.store.schemas import SETTINGS, SPLIT_COLUMNS
 
 _SAME_PLACE_M = 1e-6
 _SHARED = (
     "family", "scene_type", "partition", "subset", "setting", "action_budget", "start_x_m", "start_y_m", "start_z_m",
-    "start_yaw_rad", "target_name", "landmark", "direction", *TOLD_OF_SPLITS,
+    "start_yaw_rad", "target_name", "landmark", "direction", *SPLIT_COLUMNS,
 )  # fmt: skip
 _SAID_OF_ROUTE = (
     "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_scene", "task_setting",

@@ -19,12 +19,12 @@ from aerialdojo_gen.base.constants import (
 from aerialdojo_gen.store.schemas.benchmark import EPISODES, FAILURES, STEPS, TIMINGS
 from aerialdojo_gen.store.schemas.columns import TableSpec
 from aerialdojo_gen.store.schemas.release import (
+    DIFFICULTY_COLUMNS,
     RELEASE_ANCHORS,
     RELEASE_OBJECTS,
     ROUTES,
+    SPLIT_COLUMNS,
     TASKS,
-    TOLD_OF_DIFFICULTY,
-    TOLD_OF_SPLITS,
 )
 from aerialdojo_gen.store.schemas.staged import (
     ANCHORS,
@@ -50,6 +50,7 @@ __all__ = [
     "ANCHORS",
     "APPROACH",
     "CHOSEN_ANCHORS",
+    "DIFFICULTY_COLUMNS",
     "DIRECTIONS",
     "EPISODES",
     "FAILURES",
@@ -69,6 +70,7 @@ __all__ = [
     "ROUTES",
     "SCENES",
     "SETTINGS",
+    "SPLIT_COLUMNS",
     "STEPS",
     "STOP",
     "SUBSETS",
@@ -76,8 +78,6 @@ __all__ = [
     "TASKS",
     "TERMINATIONS",
     "TIMINGS",
-    "TOLD_OF_DIFFICULTY",
-    "TOLD_OF_SPLITS",
     "TURN_LEFT",
     "TURN_RIGHT",
     "VERDICTS",

@@ -93,5 +93,5 @@ RELEASE_OBJECTS = table(
 )  # fmt: skip
 
 # Columns that a task is not flown by: other formats have no field for them.
-TOLD_OF_SPLITS = tuple(field.name for field in SPLITS)
-TOLD_OF_DIFFICULTY = tuple(field.name for field in (*DIFFICULTY, *START_VIEW, AGENT_ACTION))
+SPLIT_COLUMNS = tuple(field.name for field in SPLITS)
+DIFFICULTY_COLUMNS = tuple(field.name for field in (*DIFFICULTY, *START_VIEW, AGENT_ACTION))

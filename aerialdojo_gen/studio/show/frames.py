@@ -16,7 +16,7 @@ from aerialdojo_gen.dataset.lookup import FoundTask
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import DataRoot, leads_out
+from aerialdojo_gen.store.root import DataRoot, is_outside
 
 SIZE_PX = 320
 
@@ -83,7 +83,7 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
 
 
 def _copy(root: DataRoot, told: str) -> Path:
-    if leads_out(root, told):
+    if is_outside(root, told):
         raise StoreError(f"recordings: path {told!r} leads out of {root}")
     try:
         return root.local_copy(told)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, off_front_rad, seen_share
+from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, off_front_rad, visible_shares
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import Sight, Views, informativeness
+from aerialdojo_gen.geometry.viewpoints import PointVisibility, Views, informativeness
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
@@ -70,11 +70,11 @@ class Candidates:
     yaw_rad: Floats  # (n,) float64; yaw; elevation seen from the object's centroid; distance to the nearest surface
     elevation_deg: Floats
     clearance_m: Floats
-    sight: Sight  # Which points of the object's surface they see
+    sight: PointVisibility  # Which points of the object's surface they see
     views: Views  # What they see of the object
     points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
-    patches: tuple[Patch, ...]  # Points of each of the object's telling parts
-    seen: Floats  # Share that they see of each of those parts (`aerialdojo_gen.geometry.part_visibility.seen_share`)
+    patches: tuple[Patch, ...]  # Points of each of the object's identifying parts
+    seen: Floats  # Share that they see of each of those parts (`part_visibility.visible_shares`)
     told: Floats  # (n, t) float64
     off_front_rad: Floats | None  # (n,) float64 or None
     rank: Floats  # (n,) float64; score of the ray casts alone, which decides what is pictured at all
@@ -86,10 +86,10 @@ class Candidates:
     ) -> Candidates:  # fmt: skip
         """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
         alone = instance_caster(world.scene.instances[instance])
-        sight = Sight.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
+        sight = PointVisibility.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
         clearance = np.array([world.clearance_m(p) for p in positions_m])
         patches = patches_of(world, instance, points)
-        seen = seen_share(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
+        seen = visible_shares(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
         return cls._judged(
             world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m, config
         )
@@ -97,8 +97,8 @@ class Candidates:
     @classmethod
     def _judged(
         cls, world: World, instance: int, alone: TriangleRayCaster, positions_m: Floats, yaw_rad: Floats,
-        clearance: Floats, sight: Sight, points: Floats, patches: tuple[Patch, ...], seen: Floats, radius_m: float,
-        config: AnchorSampleConfig,
+        clearance: Floats, sight: PointVisibility, points: Floats, patches: tuple[Patch, ...], seen: Floats,
+        radius_m: float, config: AnchorSampleConfig,
     ) -> Candidates:  # fmt: skip
         thing = world.scene.instances[instance]
         views = sight.views()
@@ -122,10 +122,10 @@ class Candidates:
         world, yaws = self.world, self.yaw_rad[which]
         new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
         places, turned = positions_m[new], yaws[new]
-        sight = Sight.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
+        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
         clearance, seen = self.clearance_m[which], self.seen[which]
         clearance[new] = [world.clearance_m(p) for p in places]
-        seen[new] = seen_share(places, turned, self.patches, world.rays, config.fov_deg)
+        seen[new] = visible_shares(places, turned, self.patches, world.rays, config.fov_deg)
         return self._judged(
             world, self.instance, self.alone, positions_m, yaws, clearance, self.sight.with_rows(which, new, sight),
             self.points, self.patches, seen, radius_m, config,

@@ -61,7 +61,7 @@ def routes_table(
 def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
     """What training has seen of the ends of routes, and their side of the split by objects.
 
-    (n,) columns of `TOLD_OF_SPLITS`.
+    (n,) columns of `SPLIT_COLUMNS`.
     """
     target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
     # A scene has few anchors an object: one number is both.

@@ -25,10 +25,10 @@ from aerialdojo_gen.store.footers import ShardFile, ShardInfo
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, changed_ns
 
 # No file system tells times less closely.
-_TOLD_APART_NS = 2 * 10**9
+_TIME_RESOLUTION_NS = 2 * 10**9
 
 
-class KnownFooters:
+class FooterCache:
     """The footers of a data directory, in a file; one that is damaged, or cannot be written, is none."""
 
     def __init__(self, root: LocalRoot) -> None:
@@ -38,7 +38,7 @@ class KnownFooters:
         # What another reader of footers made of them would be something else.
         self._reader = hashlib.sha256(Path(footers.__file__).read_bytes()).digest()
         self._entries: dict[str, Any] = {}
-        self._asked: set[str] = set()
+        self._used: set[str] = set()
         self._changed = False
         with contextlib.suppress(OSError, ValueError):
             checksum, text = self._path.read_bytes().split(b"\n", 1)
@@ -50,14 +50,16 @@ class KnownFooters:
         entry = self._entries.get(name) if root == self._root else None
         if entry is None or entry["version"] != version:
             return None
-        self._asked.add(name)
-        facts = entry["facts"]
-        return ShardInfo(**facts | {"files": {file: ShardFile(**told) for file, told in facts["files"].items()}})
+        self._used.add(name)
+        fields = entry["facts"]
+        return ShardInfo(
+            **fields | {"files": {file: ShardFile(**file_fields) for file, file_fields in fields["files"].items()}}
+        )
 
-    def note(self, root: DataRoot, name: str, version: str, asked_ns: int, info: ShardInfo) -> None:
+    def record(self, root: DataRoot, name: str, version: str, read_ns: int, info: ShardInfo) -> None:
         """Keep what the footer of a shard says; `asked_ns` is when its version was read."""
-        if root == self._root and asked_ns - changed_ns(version) > _TOLD_APART_NS:
-            self._asked.add(name)
+        if root == self._root and read_ns - changed_ns(version) > _TIME_RESOLUTION_NS:
+            self._used.add(name)
             self._entries[name] = {"version": version, "facts": asdict(info)}
             self._changed = True
 
@@ -66,7 +68,7 @@ class KnownFooters:
         if not self._changed:
             return
         self._changed = False
-        kept = {name: e for name, e in self._entries.items() if name in self._asked or self._root.exists(name)}
+        kept = {name: e for name, e in self._entries.items() if name in self._used or self._root.exists(name)}
         text = json.dumps(kept).encode()
         temporary = self._path.with_name(f".{self._path.name}.{os.getpid()}.tmp")
         with contextlib.suppress(OSError):
@@ -78,11 +80,11 @@ class KnownFooters:
         return hashlib.sha256(self._reader + text).hexdigest().encode()
 
 
-_known: ContextVar[KnownFooters | None] = ContextVar("known footers", default=None)
+_current: ContextVar[FooterCache | None] = ContextVar("known footers", default=None)
 
 
 @contextlib.contextmanager
-def footers_known(root: DataRoot) -> Iterator[None]:
+def cached_footers(root: DataRoot) -> Iterator[None]:
     """Read footers of a data directory no more than once while they stay as they are, here and in later processes.
 
     On any other data root nothing is kept.
@@ -90,15 +92,15 @@ def footers_known(root: DataRoot) -> Iterator[None]:
     if not isinstance(root, LocalRoot):
         yield
         return
-    known = KnownFooters(root)
-    token = _known.set(known)
+    known = FooterCache(root)
+    token = _current.set(known)
     try:
         yield
     finally:
-        _known.reset(token)
+        _current.reset(token)
         known.save()
 
 
-def known_footers() -> KnownFooters | None:
-    """Return what `footers_known` keeps footers in; None outside of it."""
-    return _known.get()
+def footer_cache() -> FooterCache | None:
+    """Return what `cached_footers` keeps footers in; None outside of it."""
+    return _current.get()

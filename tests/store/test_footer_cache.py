@@ -6,9 +6,9 @@ import shutil
 import pytest
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.store import known_footers, schemas
+from aerialdojo_gen.store import footer_cache, schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.known_footers import footers_known
+from aerialdojo_gen.store.footer_cache import cached_footers
 from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.tables import from_rows
 
@@ -34,7 +34,7 @@ def cache(tmp_path, monkeypatch):
 @pytest.fixture
 def at_once(monkeypatch):
     """What has just been written is kept too, so that no test waits for it to come of age."""
-    monkeypatch.setattr(known_footers, "_TOLD_APART_NS", -1)
+    monkeypatch.setattr(footer_cache, "_TOLD_APART_NS", -1)
 
 
 def shard(folder, fingerprint="f" * 64, rows=3):
@@ -58,7 +58,7 @@ def asked(folder):
     store._read_info.cache_clear()
     Counted.opened.clear()
     root = Counted(folder)
-    with footers_known(root):
+    with cached_footers(root):
         info = store.read_info(root, store.shard_name("landmarks", SCENE))
     return info, bool(Counted.opened)
 
@@ -128,8 +128,8 @@ def test_shards_that_are_gone_are_forgotten(tmp_path, cache, at_once):
     assert SCENE.encode() in memory.read_bytes()
     path.rename(path.with_name("part-00001.parquet"))
     root = Counted(tmp_path / "data")
-    with footers_known(root):
-        store.keep_infos(root, store.shards(root, "landmarks", SCENE))
+    with cached_footers(root):
+        store.cache_footers(root, store.shards(root, "landmarks", SCENE))
     said = memory.read_bytes()
     assert b"part-00001.parquet" in said
     assert b"part-00000.parquet" not in said
