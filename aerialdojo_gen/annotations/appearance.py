@@ -1,15 +1,105 @@
-"""What a text says of how its thing looks, held against the mesh: the catalogue's phrases, and colours."""
+"""Check what a text says of its object's appearance against the mesh: the catalogue's phrases, and colours."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 
-from aerialdojo_gen.annotations.colours import uncoloured
-from aerialdojo_gen.annotations.hidden_parts import Surface
+import numpy as np
+from numpy.typing import NDArray
+
+from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.scenes.claims import untrue
+from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
+from aerialdojo_gen.scenes.sampling import shown_colours
+
+# What people call a colour, and what `colour_name` may call it: one word is a shade of several.
+SHADES: Mapping[str, frozenset[str]] = {
+    word: frozenset(names.split())
+    for word, names in {
+        "red": "red brown pink orange", "maroon": "red brown purple", "russet": "red brown orange",
+        "reddish": "red brown pink orange", "terracotta": "red orange brown beige", "rusty": "red orange brown",
+        "pink": "pink red purple beige", "purple": "purple pink blue", "violet": "purple pink blue",
+        "lilac": "purple pink blue", "blue": "blue turquoise purple", "navy": "blue black",
+        "teal": "turquoise green blue", "turquoise": "turquoise green blue", "green": "green turquoise yellow",
+        "olive": "green yellow brown", "yellow": "yellow orange beige brown", "ochre": "yellow orange brown beige",
+        "amber": "yellow orange brown", "orange": "orange red yellow brown", "gold": "yellow orange brown beige",
+        "golden": "yellow orange brown beige", "bronze": "brown orange yellow green grey",
+        "copper": "brown orange green red turquoise",
+        "brown": "brown orange beige red", "tan": "brown beige orange yellow",
+        "beige": "beige white orange yellow brown grey",
+        "sand": "beige yellow orange brown", "cream": "beige white yellow grey", "white": "white beige grey",
+        "silver": "grey white", "grey": "grey white black", "gray": "grey white black", "black": "black grey",
+    }.items()
+}  # fmt: skip
+_DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
+# Of the surface: of one colour that stands alone; of each of several, and of a part's.
+_ALONE, _AMONG = 0.1, 0.03
+
+
+def colour_shares(instance: Instance, materials: Mapping[str, Material]) -> dict[str, float]:
+    """Sum the surface of an instance by what a person may call its colours."""
+    shares: dict[str, float] = {}
+    whole = 0.0
+    if any(materials[part.material].atlas for part in instance.parts):
+        # A foreign texture's place counts, and not the whole of it, which may be a city's.
+        return _counted(*shown_colours(instance.parts, materials))
+    for part in instance.parts:
+        area = float(areas(part.vertices, part.faces).sum())
+        whole += area
+        for name, share in _called(materials[part.material]).items():
+            shares[name] = shares.get(name, 0.0) + area * share
+    return {name: area / whole for name, area in shares.items()} if whole > 0.0 else {}
+
+
+def _counted(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
+    found, index = np.unique(colours // 8 * 8 + 4, axis=0, return_inverse=True)
+    shares: dict[str, float] = {}
+    for rgb, weight in zip(found, np.bincount(index.reshape(-1), weights=weights, minlength=len(found)), strict=True):
+        for name in _names(rgb):
+            shares[name] = shares.get(name, 0.0) + float(weight)
+    return shares
+
+
+def _called(material: Material) -> dict[str, float]:
+    """Share of a material by colour: stripes are two colours, and not their mean alone."""
+    pixels = np.array([material.colour])
+    if material.texture is not None:
+        step = max(1, material.texture.shape[0] // 16)
+        pixels = np.concatenate([material.texture[::step, ::step].reshape(-1, 3), np.tile(pixels, (64, 1))])
+    found, counts = np.unique(pixels // 8 * 8 + 4 if len(pixels) > 1 else pixels, axis=0, return_counts=True)
+    shares: dict[str, float] = {}
+    for rgb, count in zip(found, counts, strict=True):
+        for name in _names(rgb):
+            shares[name] = shares.get(name, 0.0) + float(count) / len(pixels)
+    return shares
+
+
+def _names(rgb: NDArray[np.integer]) -> set[str]:
+    names = {colour_name(rgb)}
+    middle = (float(rgb.max()) + float(rgb.min())) / 2.0
+    if names == {"grey"} and float(np.ptp(rgb)) >= 0.2 * middle:
+        # A dark green is a grey to a formula and a green to whoever looks.
+        names.add(colour_name(np.clip(middle + 3.0 * (rgb - middle), 0, 255)))
+    return names
+
+
+def colour_words(text: str) -> list[str]:
+    """List the words of a text that are colours, in its order."""
+    return [word for word in re.findall(r"[a-z]+", text.lower()) if word in SHADES]
+
+
+def uncoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> list[str]:
+    """List the colours of a text that an instance's surface does not bear out."""
+    words = colour_words(text)
+    shares = colour_shares(instance, materials)
+    alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in _DEGREES] == words[:1]
+    least = _ALONE if alone else _AMONG
+    return [word for word in words if sum(shares.get(name, 0.0) for name in SHADES[word]) < least]
+
 
 Looks = Mapping[str, tuple[Look, ...]]
 # Attributes that name no part: a phrase that holds the colour's word speaks of that part.

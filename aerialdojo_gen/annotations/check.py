@@ -11,10 +11,9 @@ from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
 from aerialdojo_gen.annotations.appearance import Looks, discoloured, unlike
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
+from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.head_noun import Callings
-from aerialdojo_gen.annotations.hidden_parts import Surface
-from aerialdojo_gen.annotations.place_files import places_of
-from aerialdojo_gen.annotations.places import Places
+from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.names import nearest

@@ -6,17 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import discoloured, repeats, unlike
+from aerialdojo_gen.annotations.appearance import discoloured, repeats, uncoloured, unlike
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
-from aerialdojo_gen.annotations.colours import uncoloured
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.annotations.grammatical_number import group_of
+from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.head_noun import Callings
-from aerialdojo_gen.annotations.hidden_parts import Surface
-from aerialdojo_gen.annotations.phrases import Words, noun_of, place_of, words_of
+from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, place_of, words_of
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.catalogue_check import LEAST_TRUE

@@ -1,15 +1,14 @@
-"""Drafts of annotation files: what a person would otherwise write by hand, to be read and owned by one.
+"""Draft annotation files for a person to review, and redraft the descriptions of existing ones.
 
-Objects are chosen category by category in turn, and described by their attributes, their category's looks and as
-many of the facts about their place as it takes to tell them from their rivals. Every draft passes the checks of
-`annotate-import`.
+Objects are chosen category by category in turn. Each is described by its attributes, its category's looks and as
+many facts about its surroundings as tell it from its distractors. Every draft passes the checks of `annotate-import`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.landmarks import choose_landmarks, spread_m
+from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -213,3 +213,29 @@ class AnnotationDrafter:
         rivals = self._teller.ambiguity.rivals(i, f"Look for {noun.a()}.")
         self.confused.append((instance.node, [self._scene.instances[j].node for j in rivals]))
         return _ALIKE, ""
+
+
+def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
+    """Describe the objects of annotations anew; which they are, their ids and their names stay."""
+    for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
+        if node not in scene:
+            raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file anew")
+    vocabulary = Vocabulary(scene, catalogue)
+    teller = DescriptionWriter(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
+    index = teller.ambiguity.geometry.index
+    objects: list[Object] = []
+    for entry in annotations.objects:
+        i = index[entry.node]
+        own, kind = vocabulary.nouns[i].short, scene[entry.node].category
+        # A layout that has changed may have put the yellow one where the green one was.
+        others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
+        sound = entry.name not in others - {own} and teller.sound(i, entry.name)
+        name = entry.name if sound else own
+        text = teller.describe(i, {other.description for other in objects}, name)
+        if text is None:
+            raise AnnotationError(
+                f"{scene.name}: {entry.node} (object {entry.id}) cannot be told from others of its kind: "
+                f"take another object in its place ({command('annotate', scene=scene.name)})"
+            )
+        objects.append(entry.model_copy(update={"name": name, "category": kind, "description": text}))
+    return replace(annotations, objects=tuple(objects))

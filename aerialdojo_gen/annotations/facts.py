@@ -9,8 +9,8 @@ import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.claims import Claim
+from aerialdojo_gen.annotations.compose import RELATIONS
 from aerialdojo_gen.annotations.phrases import Noun, Words
-from aerialdojo_gen.annotations.templates import RELATIONS
 from aerialdojo_gen.geometry.frames import compass_direction
 
 # Well within what the check takes for true, so that a drafted text stays true when the scene is touched up.

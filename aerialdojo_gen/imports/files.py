@@ -24,9 +24,7 @@ from aerialdojo_gen.imports.gltf import read_gltf
 from aerialdojo_gen.imports.mesh_materials import mesh_materials
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
-from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
-from aerialdojo_gen.imports.sibling_files import SiblingFiles
-from aerialdojo_gen.imports.sniffing import mismatch
+from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, SiblingFiles, exit_status, mismatch, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply", ".3ds", ".dae", ".fbx")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.imports.pictures import Paint, surfaces_of
 from aerialdojo_gen.imports.raw import RawSurface, no_corners, plain
-from aerialdojo_gen.imports.sibling_files import SiblingFiles
+from aerialdojo_gen.imports.untrusted import SiblingFiles
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from aerialdojo_gen.annotations.grammatical_number import group_of
+from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.errors import AssetError, check_regular
 
 # Said by exporters and by people who name nothing, of whatever the thing is.

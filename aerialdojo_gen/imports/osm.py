@@ -19,7 +19,7 @@ from shapely.geometry import LineString, Polygon
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
 from aerialdojo_gen.imports.earth import Bbox, in_words
-from aerialdojo_gen.imports.sandbox import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
+from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"

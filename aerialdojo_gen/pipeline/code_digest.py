@@ -99,7 +99,7 @@ DYNAMIC = frozenset({"aerialdojo_gen.base.llm_client.service", "aerialdojo_gen.b
 # Files that modules read, relative to the package. Those outside of it are sources of the stages.
 DATA_FILES = {
     "aerialdojo_gen.annotations.phrases": "annotations/phrases/*.toml",
-    "aerialdojo_gen.annotations.place_files": "annotations/places/*.toml",
+    "aerialdojo_gen.annotations.places": "annotations/places/*.toml",
 }
 
 # Where the package that is installed is not called what is imported; several may provide it.

@@ -10,10 +10,9 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.draft import Choice, draft_annotations
+from aerialdojo_gen.annotations.draft import Choice, draft_annotations, redraft_annotations
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
-from aerialdojo_gen.annotations.redraft import redraft_annotations
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from support.annotation_scenes import NAMES, PAINTS, box, street, street_annotations
 
-from aerialdojo_gen.annotations.appearance import unlike
+from aerialdojo_gen.annotations.appearance import colour_shares, uncoloured, unlike
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import noun_of, words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry

@@ -10,7 +10,7 @@ from support.annotation_scenes import box
 
 from aerialdojo_gen.annotations.appearance import repeats, unlike
 from aerialdojo_gen.annotations.describing import Vocabulary
-from aerialdojo_gen.annotations.hidden_parts import Surface
+from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_check import LEAST_TRUE

@@ -11,8 +11,7 @@ from support.annotation_scenes import NAMES, PAINTS, box, street, street_annotat
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
-from aerialdojo_gen.annotations.place_files import check_conditions, places_of
-from aerialdojo_gen.annotations.places import Places
+from aerialdojo_gen.annotations.places import Places, check_conditions, places_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance, Scene

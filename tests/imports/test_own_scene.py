@@ -15,8 +15,8 @@ from support.command_line import said
 
 from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.draft import AnnotationDrafter, Choice
-from aerialdojo_gen.annotations.grammatical_number import group_of
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode, plain

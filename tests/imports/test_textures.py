@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from support import textured
 
-from aerialdojo_gen.annotations.colours import colour_shares, uncoloured
+from aerialdojo_gen.annotations.appearance import colour_shares, uncoloured
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose

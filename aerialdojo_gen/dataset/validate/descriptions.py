@@ -20,7 +20,7 @@ from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.appearance import discoloured, unlike
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import Lexicon
-from aerialdojo_gen.annotations.hidden_parts import Surface
+from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check

@@ -11,10 +11,9 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
-from aerialdojo_gen.annotations.draft import MOST, SCENERY, AnnotationDrafter, Choice
+from aerialdojo_gen.annotations.draft import MOST, SCENERY, AnnotationDrafter, Choice, redraft_annotations
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
-from aerialdojo_gen.annotations.redraft import redraft_annotations
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AnnotationError, UsageError

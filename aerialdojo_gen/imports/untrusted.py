@@ -1,0 +1,178 @@
+"""Read untrusted files: check the type by content, read in a child process with limits, resolve sibling files."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from aerialdojo_gen.base import environment_errors
+from aerialdojo_gen.base.errors import AssetError
+
+MAX_MEMORY_BYTES = 6 << 30
+MAX_SECONDS = 300
+_OUT_OF_MEMORY = 3
+
+
+def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, mend: str) -> None:
+    """Run a module that reads a file, and wait for it."""
+    # Not multiprocessing, which would run a caller's unguarded script a second time.
+    command = [sys.executable, "-m", module, str(max_memory_bytes), str(path.resolve()), *arguments]
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: {mend}") from None
+    if ended.returncode:
+        raise AssetError(f"{path}: {_cause(ended, max_memory_bytes, mend)}")
+
+
+def _cause(ended: subprocess.CompletedProcess[str], max_memory_bytes: int, mend: str) -> str:
+    """Say why a reading process ended with another code than 0."""
+    said, failed = (text.strip().splitlines() for text in (ended.stdout, ended.stderr))
+    if ended.returncode == _OUT_OF_MEMORY or environment_errors.is_out_of_memory(ended.stderr):
+        return f"needs more than {_memory(max_memory_bytes) >> 20:,} MB of memory to read: {mend}"
+    number = -ended.returncode
+    if number == signal.SIGXCPU:
+        return f"reading takes more than {MAX_SECONDS} s: {mend}"
+    if number == signal.SIGKILL:
+        return f"its reader was killed (signal 9), by the system if memory ran out: try again, or {mend}"
+    if number > 0:
+        return f"its reader crashed (signal {number}, {signal.strsignal(number)}): the file may be damaged"
+    return said[-1] if said else f"its reader failed ({failed[-1][:160] if failed else 'without a reason'})"
+
+
+def _memory(most: int) -> int:
+    """Return the bound on address space, where the caller's own limit may be lower."""
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    return most if hard == resource.RLIM_INFINITY else min(most, hard)
+
+
+def exit_status(read: Callable[[list[str]], str]) -> int:
+    """Bound this process as its command line says, read, and print what is wrong with the file."""
+    memory, *arguments = sys.argv[1:]
+    resource.setrlimit(resource.RLIMIT_AS, (_memory(int(memory)),) * 2)
+    # At the hard limit the kernel sends SIGKILL, which does not tell its cause.
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS + 5))
+    try:
+        fault = read(arguments)
+    except MemoryError:
+        return _OUT_OF_MEMORY
+    print(fault)
+    return 1 if fault else 0
+
+
+_MAX_BYTES = 256 << 20
+
+
+class SiblingFiles:
+    """Gives the files beside a mesh file."""
+
+    def __init__(self, path: Path) -> None:
+        self._folder = path.resolve().parent
+        self.given: dict[str, bytes] = {}
+        self.missing: list[str] = []
+
+    def get(self, name: str) -> bytes:
+        """Read a file; FileNotFoundError where there is none, or it is too large or elsewhere."""
+        wanted = self._found(name.strip())
+        if wanted is None or wanted.stat().st_size > _MAX_BYTES:
+            self.missing.append(name)
+            raise FileNotFoundError(name)
+        if name not in self.given:
+            self.given[name] = wanted.read_bytes()
+        return self.given[name]
+
+    def _found(self, name: str) -> Path | None:
+        """Look a name up; other machines' full paths by their last part, as exporters write them."""
+        plain = name.replace("\\", "/")
+        # map_Kd may have options before the name: "-s 1 1 1 wall.png".
+        for told in (plain, PurePosixPath(plain).name, plain.split(" ")[-1]):
+            try:
+                wanted = (self._folder / told).resolve()
+                if told and wanted.is_relative_to(self._folder) and wanted.is_file():
+                    return wanted
+            except (OSError, ValueError):
+                continue
+        return None
+
+    def keys(self) -> list[str]:
+        """Nothing: what is there is found by asking."""
+        return []
+
+    def namespaced(self, namespace: str) -> Any:
+        """Return itself: names are looked up in one folder."""
+        return self
+
+    def write(self, name: str, data: bytes) -> None:
+        """Refuse."""
+        raise PermissionError(name)
+
+
+_HEAD = 1024
+# What begins so is this, and what to do about it.
+_OTHERS = (
+    (b"\x1f\x8b", "is compressed by gzip: unpack it first"),
+    (b"7z\xbc\xaf\x27\x1c", "is a 7z archive: unpack it, and give the mesh in it"),
+    (b"Rar!", "is a RAR archive: unpack it, and give the mesh in it"),
+    (b"BZh", "is compressed by bzip2: unpack it first"),
+    (b"\xfd7zXZ", "is compressed by xz: unpack it first"),
+    (b"\x28\xb5\x2f\xfd", "is compressed by Zstandard: unpack it first"),
+    (b"BLENDER", "is a Blender file: export it as GLB (File, Export, glTF 2.0)"),
+    (b"%PDF", "is a PDF: export the mesh itself, as GLB"),
+    (b"\x89PNG", "is a PNG picture: give the mesh, and leave its textures beside it"),
+    (b"\xff\xd8\xff", "is a JPEG picture: give the mesh, and leave its textures beside it"),
+    (b"II*\0", "is a TIFF picture: give the mesh"),
+    (b"MM\0*", "is a TIFF picture: give the mesh"),
+    (b"LASF", "is a LAS point cloud: mesh it first (CloudCompare, Open3D, OpenDroneMap)"),
+    (b"version https://git-lfs", "is a Git LFS pointer: fetch the file itself (git lfs pull)"),
+    (b"-----BEGIN PGP", "is encrypted by PGP: decrypt it first"),
+    (b"Salted__", "is encrypted by OpenSSL: decrypt it first"),
+    (b"age-encryption.org", "is encrypted by age: decrypt it first"),
+    (b"SQLite format 3", "is an SQLite database: export the mesh itself, as GLB"),
+)
+# Formats that are read, by their first bytes.
+_MESHES = (
+    (b"glTF", ".glb"), (b"ply\n", ".ply"), (b"ply\r", ".ply"), (b"Kaydara FBX Binary", ".fbx"),
+)  # fmt: skip
+_ENCRYPTED = 1
+_PAGES = (b"<!doctype html", b"<html")
+
+
+def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
+    """Say what a file is, where it cannot be what its name says."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if not head:
+        return "is empty (0 bytes): it was not written or not downloaded whole"
+    if len(head) == _HEAD and not any(head):
+        return "begins with zeros alone: it was not written or not downloaded whole"
+    if head[:4] == b"PK\x03\x04":
+        locked = len(head) >= 8 and struct.unpack_from("<H", head, 6)[0] & _ENCRYPTED
+        how = "unpack it with its password" if locked else "unpack it"
+        return f"is {'an encrypted' if locked else 'a'} ZIP archive: {how}, and give the mesh in it"
+    for begin, said in _OTHERS:
+        if head.startswith(begin):
+            return said
+    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    if text.lower().startswith(_PAGES):
+        return "is a web page, not what it was to download: download the file itself"
+    suffix = path.suffix.lower()
+    for begin, own in _MESHES:
+        if head.startswith(begin) and suffix != own:
+            return _rename(path, own, suffixes)
+    point_cloud = (
+        suffix == ".ply" and b"element vertex" in head and b"end_header" in head and b"element face" not in head
+    )
+    return "holds points and no faces: mesh it first (CloudCompare, Open3D, MeshLab)" if point_cloud else ""
+
+
+def _rename(path: Path, own: str, suffixes: tuple[str, ...]) -> str:
+    kind = own[1:].upper()
+    if own not in suffixes:
+        return f"is a {kind} file, which is not read: export it as GLB"
+    return f"is a {kind} file by its content: rename it to {path.with_suffix(own).name}"
