@@ -3,7 +3,7 @@
 Two objects are told apart by the landmark nearest to them, the compass direction from it, and what the description
 asserts (`claims`). Rivals of an object are all instances of its category that share its landmark and direction,
 whether they are annotated or not: whoever searches the scene sees them all. A rival that every assertion fits, with
-the slack `claims.RIVAL_SLACK` on distances and angles, makes the description ambiguous.
+the slack `claims.DISTRACTOR_SLACK` on distances and angles, makes the description ambiguous.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.claims import RIVAL_SLACK, Claim, Lexicon, Reading
+from aerialdojo_gen.annotations.claims import DISTRACTOR_SLACK, Lexicon, Reading
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.geometry.frames import compass_direction
 
@@ -62,7 +62,7 @@ class Ambiguity:
         return [nearest_landmark(centre, places) for centre in self.geometry.centres]
 
     @cached_property
-    def _alike(self) -> dict[tuple[str, Bearing | None], list[int]]:
+    def _groups(self) -> dict[tuple[str, Bearing | None], list[int]]:
         groups: dict[tuple[str, Bearing | None], list[int]] = {}
         for i, instance in enumerate(self.geometry.scene.instances):
             groups.setdefault((instance.category, self._bearings[i]), []).append(i)
@@ -75,9 +75,9 @@ class Ambiguity:
     def candidates(self, i: int) -> list[int]:
         """Other instances of the same category, landmark and direction."""
         category = self.geometry.scene.instances[i].category
-        return [j for j in self._alike[category, self._bearings[i]] if j != i]
+        return [j for j in self._groups[category, self._bearings[i]] if j != i]
 
-    def rivals(self, i: int, description: str) -> list[int]:
+    def distractors(self, i: int, description: str) -> list[int]:
         """Instances that a description of `i` fits as well."""
         candidates = self.candidates(i)
         if not candidates:
@@ -88,23 +88,23 @@ class Ambiguity:
             j
             for j in candidates
             if self.lexicon.fits(j, own)
-            and not any(self._elsewhere(j, place, RIVAL_SLACK) for place in reading.places)
-            and all(claim.holds(self.geometry, j, RIVAL_SLACK) for claim in reading.claims)
+            and not any(self._place_fault(j, place, DISTRACTOR_SLACK) for place in reading.places)
+            and all(claim.holds(self.geometry, j, DISTRACTOR_SLACK) for claim in reading.claims)
         ]
 
-    def _elsewhere(self, i: int, place: str, slack: float = 1.0) -> str:
+    def _place_fault(self, i: int, place: str, slack: float = 1.0) -> str:
         """Say which condition of a place is not so of an instance; empty for what nothing is known of."""
         places = self.lexicon.places
         return places.fault(i, place, slack) if places is not None and place in places else ""
 
-    def twins(self, i: int, name: str, description: str) -> list[int]:
+    def first_sentence_distractors(self, i: int, name: str, description: str) -> list[int]:
         """Instances that the name and the first sentence of a description of `i` fit as well.
 
         Who looks for a thing may have read no farther.
         """
-        return self.rivals(i, f"The {name}: {first_sentence(description)}")
+        return self.distractors(i, f"The {name}: {first_sentence(description)}")
 
-    def untruths(self, i: int, text: str) -> list[str]:
+    def false_claims(self, i: int, text: str) -> list[str]:
         """What a name or description says that is not so of instance `i`, in words.
 
         Values are held against the instance only where they stand right before its name: "with a white roof" is
@@ -112,19 +112,18 @@ class Ambiguity:
         """
         reading: Reading = self.lexicon.read(text, i)
         instance = self.geometry.scene.instances[i]
-        wrong = [f"it is called {value!r}, and the mesh is not" for value in self._wrong(i, reading.named)]
+        wrong = [f"it is called {value!r}, and the mesh is not" for value in self._false_values(i, reading.named)]
         wrong += [
-            f"{claim.text!r} is not so of {instance.node}" for claim in reading.claims if not self._true(claim, i)
+            f"{claim.text!r} is not so of {instance.node}"
+            for claim in reading.claims
+            if not claim.holds(self.geometry, i)
         ]
         for place in reading.places:
             if self.lexicon.places is not None and place not in self.lexicon.places:
-                wrong.append(f"{place!r} cannot be checked: nothing says what it claims; leave it out")
-            elif why := self._elsewhere(i, place):
+                wrong.append(f"{place!r} cannot be checked: it is not bound to any condition; leave it out")
+            elif why := self._place_fault(i, place):
                 wrong.append(f"{place!r} is not so of {instance.node}: {why}")
         return wrong
 
-    def _wrong(self, i: int, values: Sequence[str]) -> list[str]:
+    def _false_values(self, i: int, values: Sequence[str]) -> list[str]:
         return [value for value in values if self.lexicon.denied(i, value)]
-
-    def _true(self, claim: Claim, i: int) -> bool:
-        return claim.holds(self.geometry, i)

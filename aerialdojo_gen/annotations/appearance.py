@@ -46,25 +46,25 @@ def colour_shares(instance: Instance, materials: Mapping[str, Material]) -> dict
     whole = 0.0
     if any(materials[part.material].atlas for part in instance.parts):
         # A foreign texture's place counts, and not the whole of it, which may be a city's.
-        return _counted(*shown_colours(instance.parts, materials))
+        return _pixel_shares(*shown_colours(instance.parts, materials))
     for part in instance.parts:
         area = float(areas(part.vertices, part.faces).sum())
         whole += area
-        for name, share in _called(materials[part.material]).items():
+        for name, share in _material_shares(materials[part.material]).items():
             shares[name] = shares.get(name, 0.0) + area * share
     return {name: area / whole for name, area in shares.items()} if whole > 0.0 else {}
 
 
-def _counted(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
+def _pixel_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
     found, index = np.unique(colours // 8 * 8 + 4, axis=0, return_inverse=True)
     shares: dict[str, float] = {}
     for rgb, weight in zip(found, np.bincount(index.reshape(-1), weights=weights, minlength=len(found)), strict=True):
-        for name in _names(rgb):
+        for name in _colour_names(rgb):
             shares[name] = shares.get(name, 0.0) + float(weight)
     return shares
 
 
-def _called(material: Material) -> dict[str, float]:
+def _material_shares(material: Material) -> dict[str, float]:
     """Share of a material by colour: stripes are two colours, and not their mean alone."""
     pixels = np.array([material.colour])
     if material.texture is not None:
@@ -73,12 +73,12 @@ def _called(material: Material) -> dict[str, float]:
     found, counts = np.unique(pixels // 8 * 8 + 4 if len(pixels) > 1 else pixels, axis=0, return_counts=True)
     shares: dict[str, float] = {}
     for rgb, count in zip(found, counts, strict=True):
-        for name in _names(rgb):
+        for name in _colour_names(rgb):
             shares[name] = shares.get(name, 0.0) + float(count) / len(pixels)
     return shares
 
 
-def _names(rgb: NDArray[np.integer]) -> set[str]:
+def _colour_names(rgb: NDArray[np.integer]) -> set[str]:
     names = {colour_name(rgb)}
     middle = (float(rgb.max()) + float(rgb.min())) / 2.0
     if names == {"grey"} and float(np.ptp(rgb)) >= 0.2 * middle:
@@ -92,7 +92,7 @@ def colour_words(text: str) -> list[str]:
     return [word for word in re.findall(r"[a-z]+", text.lower()) if word in SHADES]
 
 
-def uncoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> list[str]:
+def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> list[str]:
     """List the colours of a text that an instance's surface does not bear out."""
     words = colour_words(text)
     shares = colour_shares(instance, materials)
@@ -103,18 +103,18 @@ def uncoloured(text: str, instance: Instance, materials: Mapping[str, Material])
 
 Looks = Mapping[str, tuple[Look, ...]]
 # Attributes that name no part: a phrase that holds the colour's word speaks of that part.
-_ELSEWHERE = frozenset({"colour", "size", "material", "place"})
+_NOT_PARTS = frozenset({"colour", "size", "material", "place"})
 _STEM = 4
-_EMPTY = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
+_STOP_WORDS = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
 
 
-def unlike(
+def false_phrases(
     text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material], surface: Surface | None = None
 ) -> Iterator[str]:
     """Say which of the catalogue's phrases stand in a text and are not so of its instance, or not to be seen."""
-    said = _plain(text)
+    normalized = _normalize(text)
     for look in looks.get(instance.category, ()):
-        if f" {_plain(look.say).strip()} " in said:
+        if f" {_normalize(look.say).strip()} " in normalized:
             wrong = untrue(look, instance, materials)[:1]
             if not wrong and surface is not None and not surface.shows(look, instance):
                 wrong = ["that is under the ground or under water"]
@@ -122,29 +122,29 @@ def unlike(
                 yield f"{look.say!r} is not so of {instance.node}: {claim}"
 
 
-def discoloured(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
+def false_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
     """Say which of its colours a text says of an instance whose surface does not have it."""
     value = instance.attributes.get("colour", "")
-    if value and f" {_plain(value).strip()} " in _plain(text):
-        for word in uncoloured(value, instance, materials):
+    if value and f" {_normalize(value).strip()} " in _normalize(text):
+        for word in unsupported_colours(value, instance, materials):
             yield f"{word!r} is not the colour of {instance.node}: hardly any of its surface is"
 
 
 def repeats(say: str, instance: Instance) -> bool:
     """Whether a phrase says again what an attribute of its instance says."""
-    said = _stems(say)
+    stems = _stems(say)
     for key, value in instance.attributes.items():
-        telling = _stems(value)
+        own = _stems(value)
         lacking = value.startswith("without ") and say.startswith("no ")
-        if key not in _ELSEWHERE and len(telling) >= (1 if lacking else 2) and telling <= said:
+        if key not in _NOT_PARTS and len(own) >= (1 if lacking else 2) and own <= stems:
             return True
     return False
 
 
 def _stems(text: str) -> set[str]:
-    return {word[:_STEM] for word in _plain(text).split() if word not in _EMPTY}
+    return {word[:_STEM] for word in _normalize(text).split() if word not in _STOP_WORDS}
 
 
-def _plain(text: str) -> str:
+def _normalize(text: str) -> str:
     words = " ".join(re.findall(r"[^\W_]+", text.lower()))
     return f" {words} "

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
-from aerialdojo_gen.annotations.appearance import Looks, discoloured, unlike
+from aerialdojo_gen.annotations.appearance import Looks, false_colours, false_phrases
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.head_noun import Callings
+from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -45,10 +45,10 @@ def check_source(
         faults += _unique(source)
         for i, landmark in source.landmarks.items():
             faults += _landmark(source, scene, ("landmarks", i), landmark)
-        callings, surface = Callings(names), Surface(scene)
+        noun_checker, surface = NounChecker(names), Surface(scene)
         for i, entry in source.objects.items():
             faults += _object(source, scene, names, ("objects", i), entry)
-            faults += _called(source, scene, callings, ("objects", i), entry)
+            faults += _nouns(source, scene, noun_checker, ("objects", i), entry)
             faults += _looks(source, scene, looks or {}, surface, ("objects", i), entry)
         faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
     return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
@@ -56,10 +56,10 @@ def check_source(
 
 def _counts(source: Source, counts: tuple[int, int] | None) -> Iterable[Fault]:
     raw = source.document.value
-    for key, wanted in zip(("landmarks", "objects"), counts or (), strict=False):
+    for key, expected in zip(("landmarks", "objects"), counts or (), strict=False):
         found = len(raw[key]) if isinstance(raw, dict) and isinstance(raw.get(key), list) else 0
-        if found != wanted:
-            yield source.document.fault((key,), f"there are {found}; the paper's inventory has {wanted}")
+        if found != expected:
+            yield source.document.fault((key,), f"there are {found}; the paper's inventory has {expected}")
 
 
 def _unique(source: Source) -> Iterable[Fault]:
@@ -80,7 +80,7 @@ def _unique(source: Source) -> Iterable[Fault]:
     landmark_nodes = {entry.node: i for i, entry in source.landmarks.items()}
     for i, item in source.objects.items():
         if item.node in landmark_nodes:
-            text = f"{item.node!r} is landmarks[{landmark_nodes[item.node]}]: an object must be another thing"
+            text = f"{item.node!r} is landmarks[{landmark_nodes[item.node]}]: an object must be a different node"
             yield source.document.fault(("objects", i, "node"), text)
 
 
@@ -106,14 +106,14 @@ def _object(
         yield source.document.fault((*path, "anchor", "position_m"), "outside the scene's bounds")
 
 
-def _called(
-    source: Source, scene: Scene, callings: Callings, path: tuple[str | int, ...], entry: Object
+def _nouns(
+    source: Source, scene: Scene, noun_checker: NounChecker, path: tuple[str | int, ...], entry: Object
 ) -> Iterable[Fault]:
     """What the object is called, where the mesh is no guess at it: an imported one's names are."""
     if scene.imported or entry.node not in scene:
         return
     for key in ("name", "description"):
-        for message in callings.contradictions(getattr(entry, key), scene[entry.node]):
+        for message in noun_checker.contradictions(getattr(entry, key), scene[entry.node]):
             yield source.document.fault((*path, key), message)
 
 
@@ -123,10 +123,10 @@ def _looks(
     if scene.imported or entry.node not in scene:
         return
     thing = scene[entry.node]
-    for message in unlike(entry.description, thing, looks, scene.materials, surface):
+    for message in false_phrases(entry.description, thing, looks, scene.materials, surface):
         yield source.document.fault((*path, "description"), message)
     for key in ("name", "description"):
-        for message in discoloured(getattr(entry, key), thing, scene.materials):
+        for message in false_colours(getattr(entry, key), thing, scene.materials):
             yield source.document.fault((*path, key), message)
 
 
@@ -134,9 +134,9 @@ def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fa
     if not name.strip():
         yield source.document.fault((*path, "name"), "is empty")
     elif name != " ".join(name.split()):
-        yield source.document.fault((*path, "name"), "has space at an end or twice in a row")
+        yield source.document.fault((*path, "name"), "has leading, trailing or double spaces")
     elif _UNSPOKEN.search(name):
-        yield source.document.fault((*path, "name"), f"{name!r} is not what a person would say")
+        yield source.document.fault((*path, "name"), f"{name!r} must be plain words, without node names or numbers")
 
 
 def _node(source: Source, scene: Scene, path: tuple[str | int, ...], node: str) -> Iterable[Fault]:
@@ -152,10 +152,10 @@ def _description(source: Source, path: tuple[str | int, ...], text: str) -> Iter
         yield source.document.fault(path, "is empty")
         return
     if text != " ".join(text.split()):
-        yield source.document.fault(path, "has space at an end or twice in a row")
+        yield source.document.fault(path, "has leading, trailing or double spaces")
     unspoken = _UNSPOKEN.search(text)
     if unspoken:
-        yield source.document.fault(path, f"{unspoken.group()!r}: coordinates and node names are not for people")
+        yield source.document.fault(path, f"{unspoken.group()!r}: coordinates and node names are not allowed")
     if text.strip()[-1] not in ".!?":
         yield source.document.fault(path, "must end with a full stop")
     if len(re.findall(r"[.!?](?:\s|$)", text)) > _SENTENCES:
@@ -188,30 +188,36 @@ def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: 
         i = geometry.index[entry.node]
         bearing = nearest_landmark(geometry.centres[i], geometry.centres[list(ambiguity.landmarks)])
         if bearing is None:
-            text = "stands exactly at its nearest landmark's place, so that there is no direction to it"
+            text = "is exactly at its nearest landmark's position, so it has no direction"
             yield source.document.fault(("objects", k, "node"), text)
             continue
         for key in ("name", "description"):
-            for untruth in ambiguity.untruths(i, getattr(entry, key)):
-                yield source.document.fault(("objects", k, key), untruth)
+            for false_claim in ambiguity.false_claims(i, getattr(entry, key)):
+                yield source.document.fault(("objects", k, key), false_claim)
         same = (entry.name.lower(), bearing, entry.description.lower())
         if same in described:
             text = f"name, landmark, direction and description are those of objects[{described[same]}]"
             yield source.document.fault(("objects", k, "description"), text)
         described.setdefault(same, k)
-        rivals = ambiguity.rivals(i, entry.description) if entry.description.strip() else []
-        if rivals:
-            others = ", ".join(scene.instances[j].node for j in rivals[:3]) + ("..." if len(rivals) > 3 else "")
+        distractors = ambiguity.distractors(i, entry.description) if entry.description.strip() else []
+        if distractors:
+            others = ", ".join(scene.instances[j].node for j in distractors[:3]) + (
+                "..." if len(distractors) > 3 else ""
+            )
             text = (
                 f"ambiguous: it fits {others} as well, {bearing.direction} of the same landmark; "
-                "say how this one looks otherwise or what else stands by it"
+                "describe how it differs or what stands near it"
             )
             yield source.document.fault(("objects", k, "description"), text)
             continue
-        twins = ambiguity.twins(i, entry.name, entry.description) if entry.description.strip() else []
+        twins = (
+            ambiguity.first_sentence_distractors(i, entry.name, entry.description)
+            if entry.description.strip()
+            else []
+        )
         if twins:
             others = ", ".join(scene.instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
-            text = f"its first sentence fits {others} as well: say there what tells it apart"
+            text = f"its first sentence fits {others} as well: add what distinguishes it to the first sentence"
             yield source.document.fault(("objects", k, "description"), text)
 
 

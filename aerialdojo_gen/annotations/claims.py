@@ -17,7 +17,7 @@ from aerialdojo_gen.annotations.places import Places
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
-RIVAL_SLACK = 1.35
+DISTRACTOR_SLACK = 1.35
 GROUP = "group"  # what makes one thing of a plural: no value
 PLACE = "place"  # the attribute by which a layout says where a thing is
 

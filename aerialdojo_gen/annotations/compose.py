@@ -69,7 +69,7 @@ def compose(
     look = _least_used(words.looks, rng, used) if words.looks else ""
     comma = "," if place and needed and (len(place.split()) > _LONG_PLACE or len(needed) > 1) else ""
     template = _template(noun, look, bool(comma), bool(extra), rng, used)
-    rel = " ".join([*([place + comma] if place else []), *([_listed(needed)] if needed else [])])
+    rel = " ".join([*([place + comma] if place else []), *([_join(needed)] if needed else [])])
     fields = {
         "a": noun.a(),
         "bare": noun.bare,
@@ -83,21 +83,23 @@ def compose(
     text = template.format(**fields, A=_upper(fields["a"]), Rel=_upper(rel))
     if extra:
         more = MORE[int(rng.integers(len(MORE)))]
-        text += " " + more.format(verb=words.verb, rel=_listed(extra))
+        text += " " + more.format(verb=words.verb, rel=_join(extra))
     return text, template
 
 
-def _listed(texts: list[str]) -> str:
+def _join(texts: list[str]) -> str:
     return " and ".join([*([", ".join(texts[:-1])] if texts[1:] else []), texts[-1]])
 
 
-def _template(noun: Noun, look: str, parted: bool, more: bool, rng: np.random.Generator, used: dict[str, int]) -> str:
+def _template(
+    noun: Noun, look: str, has_comma: bool, more: bool, rng: np.random.Generator, used: dict[str, int]
+) -> str:
     pool = [
         template
         for template in (FULL if look else PLAIN)
         if not ("with {look}" in template and noun.after)
         and not ("{bare}" in template and noun.group)
-        and not (parted and "{rel} and " in template)
+        and not (has_comma and "{rel} and " in template)
         and not (more and template.count(".") > 2)
     ]
     return _least_used(pool, rng, used)

@@ -6,14 +6,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import discoloured, repeats, uncoloured, unlike
+from aerialdojo_gen.annotations.appearance import false_colours, false_phrases, repeats, unsupported_colours
 from aerialdojo_gen.annotations.check import make_ambiguity
-from aerialdojo_gen.annotations.claims import RIVAL_SLACK, spoken
+from aerialdojo_gen.annotations.claims import DISTRACTOR_SLACK, spoken
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.head_noun import Callings
+from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, place_of, words_of
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -23,13 +23,13 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 STAGE = "annotate-draft"
 # What an imported mesh has and nobody looks for.
-NO_THING = frozenset({"ground", "clutter", "slab", "terrain"})
+NON_OBJECTS = frozenset({"ground", "clutter", "slab", "terrain"})
 # The category of what is imported without a name: a person has to say what it is.
 UNKNOWN = "object"
-_MOST_FACTS = 4
+_MAX_FACTS = 4
 _TRIES = 18
-_MOST_WORDS = 60
-_WORTH_SAYING = 0.35
+_MAX_WORDS = 60
+_MIN_EXTRA_WEIGHT = 0.35
 
 
 class Vocabulary:
@@ -44,7 +44,7 @@ class Vocabulary:
         targets = frozenset(catalogue.targets)
         by_category: dict[str, Words] = {}
         for i in scene.instances:
-            if scene.imported and i.category not in NO_THING:
+            if scene.imported and i.category not in NON_OBJECTS:
                 # A mesh of another make has categories of its own, and all of them may be asked for.
                 self.names.setdefault(i.category, spoken(i.category))
                 targets |= {i.category}
@@ -55,13 +55,15 @@ class Vocabulary:
                     words = replace(words, group=group_of(words.name))
                 by_category[i.category] = words
         self.words = [by_category[i.category] for i in scene.instances]
-        self.nouns = [noun_of(self._honest(i), w) for i, w in zip(scene.instances, self.words, strict=True)]
-        self.callings = Callings(self.names)
+        self.nouns = [
+            noun_of(self._drop_false_colour(i), w) for i, w in zip(scene.instances, self.words, strict=True)
+        ]
+        self.noun_checker = NounChecker(self.names)
 
-    def _honest(self, instance: Instance) -> Instance:
+    def _drop_false_colour(self, instance: Instance) -> Instance:
         """Leave out a colour that the surface does not bear out."""
         colour = instance.attributes.get("colour", "")
-        if not colour or self.scene.imported or not uncoloured(colour, instance, self.scene.materials):
+        if not colour or self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials):
             return instance
         return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
 
@@ -69,18 +71,18 @@ class Vocabulary:
         """Phrases that are so of an instance, can be seen, and say more than its attributes do."""
         looks = self._looks.get(instance.category, ())
         true = true_looks(looks, instance, self.scene.materials)
-        seen = tuple(look.say for look in true if self._surface.shows(look, instance))
-        new = tuple(say for say in seen if not repeats(say, instance))
-        return new if len(new) >= LEAST_TRUE else seen
+        visible = tuple(look.say for look in true if self._surface.shows(look, instance))
+        new = tuple(say for say in visible if not repeats(say, instance))
+        return new if len(new) >= LEAST_TRUE else visible
 
     def faults(self, instance: Instance, text: str) -> list[str]:
         """What a text says of an instance's looks that is not so."""
         if self.scene.imported:
             return []
         return [
-            *self.callings.contradictions(text, instance),
-            *unlike(text, instance, self._looks, self.scene.materials, self._surface),
-            *discoloured(text, instance, self.scene.materials),
+            *self.noun_checker.contradictions(text, instance),
+            *false_phrases(text, instance, self._looks, self.scene.materials, self._surface),
+            *false_colours(text, instance, self.scene.materials),
         ]
 
 
@@ -97,9 +99,11 @@ class DescriptionWriter:
         )
         self._used: dict[str, int] = {}
 
-    def sound(self, i: int, name: str) -> bool:
+    def is_true_name(self, i: int, name: str) -> bool:
         """Whether a name says nothing that is not so of instance `i`."""
-        return not self._vocabulary.faults(self._scene.instances[i], name) and not self.ambiguity.untruths(i, name)
+        return not self._vocabulary.faults(self._scene.instances[i], name) and not self.ambiguity.false_claims(
+            i, name
+        )
 
     def describe(self, i: int, others: Collection[str], name: str = "") -> str | None:
         """Describe an instance."""
@@ -109,39 +113,39 @@ class DescriptionWriter:
         facts, where, name = self._finder.facts(i, rng), self._place(i), name or noun.short
         for attempt in range(_TRIES):
             place = where if attempt < _TRIES // 2 else ""
-            usable = [fact for fact in facts if not self._named_in(fact, place)][attempt % 3 :]
+            usable = [fact for fact in facts if not self._mentions(fact, place)][attempt % 3 :]
             talkative = bool(rng.random() < (0.25 if place else 0.7)) and attempt < _TRIES // 3
             needed, extra = self._choose(i, f"It is {noun.a()} {place}.", usable, talkative)
             if not needed and not (place and attempt >= _TRIES // 3):
                 continue
             plain = attempt % 6 >= 4  # a look may hold a word that reads as a claim
-            said = replace(words, looks=()) if plain else words
+            phrasing = replace(words, looks=()) if plain else words
             text, template = compose(
-                said, noun, place, [f.text for f in needed], [f.text for f in extra], rng, self._used
+                phrasing, noun, place, [f.text for f in needed], [f.text for f in extra], rng, self._used
             )
-            if text not in others and self._good(i, name, text):
+            if text not in others and self._is_valid(i, name, text):
                 self._used[template] = self._used.get(template, 0) + 1
                 for look in (look for look in words.looks if look in text):
                     self._used[look] = self._used.get(look, 0) + 1
                 return text
-        return self._bare(i, name, others) if self._scene.imported else None
+        return self._describe_alone(i, name, others) if self._scene.imported else None
 
-    def _bare(self, i: int, name: str, others: Collection[str]) -> str | None:
+    def _describe_alone(self, i: int, name: str, others: Collection[str]) -> str | None:
         """Describe what nothing can be said of but what it is, where that tells it from all of its kind."""
         noun, words = self._vocabulary.nouns[i], self._vocabulary.words[i]
-        alone = not any(self._scene.instances[j].category not in NO_THING for j in self._finder.near(i))
+        alone = not any(self._scene.instances[j].category not in NON_OBJECTS for j in self._finder.near(i))
         texts = [f"Look for {noun.a()}, {words.participle} by itself."] if alone else []
         texts.append(f"Look for {noun.a()}.")
-        return next((text for text in texts if text not in others and self._good(i, name, text)), None)
+        return next((text for text in texts if text not in others and self._is_valid(i, name, text)), None)
 
-    def _good(self, i: int, name: str, text: str) -> bool:
+    def _is_valid(self, i: int, name: str, text: str) -> bool:
         ambiguity, instance = self.ambiguity, self._scene.instances[i]
         return (
-            len(text.split()) <= _MOST_WORDS
-            and not ambiguity.untruths(i, text)
+            len(text.split()) <= _MAX_WORDS
+            and not ambiguity.false_claims(i, text)
             and not self._vocabulary.faults(instance, text)
-            and not ambiguity.rivals(i, text)
-            and not ambiguity.twins(i, name, text)
+            and not ambiguity.distractors(i, text)
+            and not ambiguity.first_sentence_distractors(i, name, text)
         )
 
     def _place(self, i: int) -> str:
@@ -152,30 +156,32 @@ class DescriptionWriter:
         bound = place.lower() in places and not places.fault(i, place.lower())
         return place if bound else ""
 
-    def _named_in(self, fact: Fact, place: str) -> bool:
+    def _mentions(self, fact: Fact, place: str) -> bool:
         """Whether the place speaks of the same thing already."""
         spoken_of = set(place.replace("'s", "").split())
         return any(self._vocabulary.nouns[j].name.split()[-1] in spoken_of for j in fact.things)
 
-    def _choose(self, i: int, said: str, facts: list[Fact], talkative: bool) -> tuple[list[Fact], list[Fact]]:
+    def _choose(self, i: int, base: str, facts: list[Fact], talkative: bool) -> tuple[list[Fact], list[Fact]]:
         """Take the most natural fact, then what rules out most of the rivals, then one more that is worth saying."""
         needed: list[Fact] = []
         extra: list[Fact] = []
-        rivals = set(self.ambiguity.rivals(i, said))
+        distractors = set(self.ambiguity.distractors(i, base))
         left = list(facts)
-        while left and len(needed) + len(extra) < _MOST_FACTS:
+        while left and len(needed) + len(extra) < _MAX_FACTS:
             best = left[0]
-            if needed and rivals:
-                best = max(left, key=lambda fact: len(rivals) - len(self._fitting(fact, rivals)))
-                if len(self._fitting(best, rivals)) == len(rivals):
+            if needed and distractors:
+                best = max(left, key=lambda fact: len(distractors) - len(self._still_fitting(fact, distractors)))
+                if len(self._still_fitting(best, distractors)) == len(distractors):
                     break
-            elif needed and not (talkative and not extra and best.weight > _WORTH_SAYING):
+            elif needed and not (talkative and not extra and best.weight > _MIN_EXTRA_WEIGHT):
                 break
-            (needed if not needed or rivals else extra).append(best)
-            rivals = self._fitting(best, rivals)
+            (needed if not needed or distractors else extra).append(best)
+            distractors = self._still_fitting(best, distractors)
             nouns = {self._vocabulary.nouns[j].short for j in best.things}
             left = [f for f in left if not nouns & {self._vocabulary.nouns[j].short for j in f.things}]
         return needed, extra
 
-    def _fitting(self, fact: Fact, rivals: set[int]) -> set[int]:
-        return {j for j in rivals if all(c.holds(self.ambiguity.geometry, j, RIVAL_SLACK) for c in fact.claims)}
+    def _still_fitting(self, fact: Fact, distractors: set[int]) -> set[int]:
+        return {
+            j for j in distractors if all(c.holds(self.ambiguity.geometry, j, DISTRACTOR_SLACK) for c in fact.claims)
+        }

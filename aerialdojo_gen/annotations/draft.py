@@ -22,25 +22,25 @@ from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 
-_ALOFT_M = 3.0
-MOST = 5
+_ELEVATED_M = 3.0
+MAX_PER_CATEGORY = 5
 SCENERY = "of ground, slabs or scraps"
 _SHOWN = 3
-_ALIKE = "without anything to tell them from others of their kind"
-_NOWHERE = "in no direction of a landmark, or outside the bounds"
+_INDISTINGUISHABLE = "indistinguishable from others of their category"
+_NO_DIRECTION = "at a landmark's position, or outside the bounds"
 
 
 @dataclass(frozen=True)
-class Choice:
+class DraftOptions:
     """Which instances may become objects, and how many of a kind."""
 
-    refuses: Callable[[str], str] | None = None
+    reject: Callable[[str], str] | None = None
     centre_m: tuple[float, float] | None = None
-    within_m: float | None = None  # Radius of the core; None for the whole scene. How long tasks are hangs on it
+    core_radius_m: float | None = None  # Radius of the core; None for the whole scene. How long tasks are hangs on it
     core_share: float = 1.0  # Share of the objects that come from the core; the others may stand anywhere
-    aloft_share: float = 0.0
-    most_vegetation: int = 3  # Most objects of one category of vegetation
-    most: int | None = None  # Most objects of any other category; 5 where absent
+    elevated_share: float = 0.0
+    max_vegetation: int = 3  # Most objects of one category of vegetation
+    max_per_category: int | None = None  # Most objects of any other category; 5 where absent
 
 
 def draft_annotations(
@@ -49,85 +49,87 @@ def draft_annotations(
     n_landmarks: int,
     n_objects: int,
     seed: int,
-    choice: Choice | None = None,
+    options: DraftOptions | None = None,
     landmarks: Sequence[str] = (),
 ) -> Annotations:
     """Draft the annotations of a scene."""
     vocabulary = Vocabulary(scene, catalogue)
     drafter = AnnotationDrafter(
-        vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, choice or Choice()
+        vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, options or DraftOptions()
     )
     objects = drafter.objects(n_objects)
     if len(objects) < n_objects:
         raise AnnotationError(
-            f"{scene.name}: {n_objects} objects are wanted, {len(objects)} can be chosen and told apart"
-            f"{drafter.why_not()}"
+            f"{scene.name}: {n_objects} objects requested, {len(objects)} can be chosen and distinguished"
+            f"{drafter.rejection_summary()}"
         )
-    return Annotations(scene.name, drafter.marks, objects)
+    return Annotations(scene.name, drafter.landmarks, objects)
 
 
 class AnnotationDrafter:
     """Chooses and describes the objects of a scene."""
 
-    def __init__(self, vocabulary: Vocabulary, marks: tuple[Landmark, ...], seed: int, choice: Choice) -> None:
-        self._vocabulary, self._scene, self._seed, self._choice = vocabulary, vocabulary.scene, seed, choice
+    def __init__(
+        self, vocabulary: Vocabulary, landmarks: tuple[Landmark, ...], seed: int, options: DraftOptions
+    ) -> None:
+        self._vocabulary, self._scene, self._seed, self._options = vocabulary, vocabulary.scene, seed, options
         self._kinds, self._nouns = vocabulary.kinds, vocabulary.nouns
-        self.marks = marks
-        self.refused: Counter[str] = Counter()
-        self.confused: list[tuple[str, Sequence[str]]] = []
-        self._teller = DescriptionWriter(vocabulary, marks, seed)
-        ambiguity = self._teller.ambiguity
-        wanted = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
-        self.things = tuple(k for k in wanted if self._placed(k, ambiguity))
+        self.landmarks = landmarks
+        self.rejections: Counter[str] = Counter()
+        self.confusions: list[tuple[str, Sequence[str]]] = []
+        self._writer = DescriptionWriter(vocabulary, landmarks, seed)
+        ambiguity = self._writer.ambiguity
+        candidates = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
+        self.things = tuple(k for k in candidates if self._has_direction(k, ambiguity))
         scenery = sum(not w.target for w in vocabulary.words) if self._scene.imported else 0
-        self.refused.update({_NOWHERE: len(wanted) - len(self.things), SCENERY: scenery})
+        self.rejections.update({_NO_DIRECTION: len(candidates) - len(self.things), SCENERY: scenery})
 
-    def room(self) -> int:
+    def capacity(self) -> int:
         """How many objects there can be at the most, by the numbers of each kind, before anything is looked at."""
         kinds = Counter(self._scene.instances[k].category for k in self.things)
-        return sum(min(n, self._most(kind)) for kind, n in kinds.items())
+        return sum(min(n, self._limit(kind)) for kind, n in kinds.items())
 
-    def why_not(self) -> str:
+    def rejection_summary(self) -> str:
         """Say what was not taken, and why: ``"; not taken: 7 ..., 2 ..."``; empty where all were."""
-        said = ", ".join(f"{n:,} {why}{self._with(why)}" for why, n in self.refused.most_common() if n)
-        return f"; not taken: {said}" if said else ""
+        text = ", ".join(f"{n:,} {why}{self._confusion_text(why)}" for why, n in self.rejections.most_common() if n)
+        return f"; not taken: {text}" if text else ""
 
-    def _with(self, why: str) -> str:
+    def _confusion_text(self, why: str) -> str:
         """Say with what the first of what could not be told apart were confused."""
-        if why != _ALIKE:
+        if why != _INDISTINGUISHABLE:
             return ""
-        pairs = [(node, others) for node, others in self.confused if others][:_SHOWN]
-        said = "; ".join(
+        pairs = [(node, others) for node, others in self.confusions if others][:_SHOWN]
+        text = "; ".join(
             f"{node} with {others[0]}{f' and {len(others) - 1:,} more' if len(others) > 1 else ''}"
             for node, others in pairs
         )
-        return f" ({said})" if said else ""
+        return f" ({text})" if text else ""
 
-    def objects(self, n: int, chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
-        """Choose and describe up to `n` objects, a category at a time in turn; `chosen` is called once each."""
-        ambiguity = self._teller.ambiguity
+    def objects(self, n: int, on_chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
+        """Choose and describe up to `n` objects, a category at a time in turn; `on_chosen` is called once each."""
+        ambiguity = self._writer.ambiguity
         taken: dict[int, str] = {}
         everywhere = self._queues()
         core = {c: [i for i in queue if self._in_core(i, ambiguity)] for c, queue in everywhere.items()}
         rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
-        aloft = {c: [i for i in queue if self._aloft(i)] for c, queue in core.items()}
-        low = {c: [i for i in queue if i not in aloft[c]] for c, queue in core.items()}
-        in_core = n if self._choice.within_m is None else round(n * self._choice.core_share)
+        elevated = {c: [i for i in queue if self._is_elevated(i)] for c, queue in core.items()}
+        low = {c: [i for i in queue if i not in elevated[c]] for c, queue in core.items()}
+        in_core = n if self._options.core_radius_m is None else round(n * self._options.core_share)
         phases: tuple[tuple[dict[str, list[int]], int], ...] = (
             (core, in_core),
             (rest, n if in_core < n else in_core),
         )
-        if self._choice.aloft_share > 0:
-            high = round(in_core * self._choice.aloft_share)
-            phases = ((aloft, high), (low, in_core), (aloft, in_core), phases[1])
+        if self._options.elevated_share > 0:
+            high = round(in_core * self._options.elevated_share)
+            phases = ((elevated, high), (low, in_core), (elevated, in_core), phases[1])
         for queues, upto in phases:
             while len(taken) < upto:
                 before = len(taken)
                 # What the core has none of comes first.
-                for category, queue in sorted(queues.items(), key=lambda item: self._many(item[0], taken) > 0):
-                    wanted = len(taken) < upto and not self._full(category, taken)
-                    if wanted and self._take(queue, taken):
-                        chosen()
+                for category, queue in sorted(queues.items(), key=lambda item: self._count(item[0], taken) > 0):
+                    open_slot = len(taken) < upto and not self._is_full(category, taken)
+                    if open_slot and self._take_next(queue, taken):
+                        on_chosen()
                 if len(taken) == before:
                     break
         return tuple(
@@ -141,15 +143,15 @@ class AnnotationDrafter:
             for k, i in enumerate(sorted(taken))
         )
 
-    def _many(self, category: str, taken: dict[int, str]) -> int:
+    def _count(self, category: str, taken: dict[int, str]) -> int:
         return sum(self._scene.instances[i].category == category for i in taken)
 
-    def _most(self, category: str) -> int:
+    def _limit(self, category: str) -> int:
         vegetation = self._kinds.get(category) == "vegetation"
-        return self._choice.most_vegetation if vegetation else self._choice.most or MOST
+        return self._options.max_vegetation if vegetation else self._options.max_per_category or MAX_PER_CATEGORY
 
-    def _full(self, category: str, taken: dict[int, str]) -> bool:
-        return self._many(category, taken) >= self._most(category)
+    def _is_full(self, category: str, taken: dict[int, str]) -> bool:
+        return self._count(category, taken) >= self._limit(category)
 
     def _queues(self) -> dict[str, list[int]]:
         """What may become an object, by category; categories in a random but fixed order."""
@@ -158,25 +160,25 @@ class AnnotationDrafter:
             queues.setdefault(self._scene.instances[i].category, []).append(i)
         return {c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, STAGE, self._scene.name, c), c))}
 
-    def _placed(self, i: int, ambiguity: Ambiguity) -> bool:
+    def _has_direction(self, i: int, ambiguity: Ambiguity) -> bool:
         middle = self._scene.instances[i].centroid
         inside = np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])
         return bool(inside) and ambiguity.bearing(i) is not None
 
-    def _aloft(self, i: int) -> bool:
-        return float(self._scene.instances[i].bounds[0, 2]) >= _ALOFT_M
+    def _is_elevated(self, i: int) -> bool:
+        return float(self._scene.instances[i].bounds[0, 2]) >= _ELEVATED_M
 
     def _in_core(self, i: int, ambiguity: Ambiguity) -> bool:
-        if self._choice.within_m is None:
+        if self._options.core_radius_m is None:
             return True
-        centre = self._choice.centre_m
+        centre = self._options.centre_m
         if centre is None:
             x, y = ambiguity.geometry.centres[list(ambiguity.landmarks), :2].mean(axis=0)
             centre = float(x), float(y)
         away = ambiguity.geometry.centres[i, :2] - np.asarray(centre)
-        return float(np.hypot(*away)) <= self._choice.within_m
+        return float(np.hypot(*away)) <= self._options.core_radius_m
 
-    def _take(self, queue: list[int], taken: dict[int, str]) -> bool:
+    def _take_next(self, queue: list[int], taken: dict[int, str]) -> bool:
         """Move one instance from its category's queue to the objects; those that will not do are dropped.
 
         Tells whether there was one.
@@ -194,48 +196,52 @@ class AnnotationDrafter:
                 ),
             )
             queue.remove(best)
-            why, text = self._described(best, instances[best], taken)
+            why, text = self._try_describe(best, instances[best], taken)
             if why:
-                self.refused[why] += 1
+                self.rejections[why] += 1
             else:
                 taken[best] = text
                 return True
         return False
 
-    def _described(self, i: int, instance: Instance, taken: dict[int, str]) -> tuple[str, str]:
-        why = self._choice.refuses(instance.node) if self._choice.refuses else ""
+    def _try_describe(self, i: int, instance: Instance, taken: dict[int, str]) -> tuple[str, str]:
+        why = self._options.reject(instance.node) if self._options.reject else ""
         if why:
             return why, ""
-        text = self._teller.describe(i, set(taken.values())) if self._teller.sound(i, self._nouns[i].short) else None
+        text = (
+            self._writer.describe(i, set(taken.values()))
+            if self._writer.is_true_name(i, self._nouns[i].short)
+            else None
+        )
         if text is not None:
             return "", text
         noun = self._nouns[i]
-        rivals = self._teller.ambiguity.rivals(i, f"Look for {noun.a()}.")
-        self.confused.append((instance.node, [self._scene.instances[j].node for j in rivals]))
-        return _ALIKE, ""
+        distractors = self._writer.ambiguity.distractors(i, f"Look for {noun.a()}.")
+        self.confusions.append((instance.node, [self._scene.instances[j].node for j in distractors]))
+        return _INDISTINGUISHABLE, ""
 
 
 def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
     """Describe the objects of annotations anew; which they are, their ids and their names stay."""
     for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
         if node not in scene:
-            raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file anew")
+            raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file again")
     vocabulary = Vocabulary(scene, catalogue)
-    teller = DescriptionWriter(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
-    index = teller.ambiguity.geometry.index
+    writer = DescriptionWriter(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
+    index = writer.ambiguity.geometry.index
     objects: list[Object] = []
     for entry in annotations.objects:
         i = index[entry.node]
         own, kind = vocabulary.nouns[i].short, scene[entry.node].category
         # A layout that has changed may have put the yellow one where the green one was.
         others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
-        sound = entry.name not in others - {own} and teller.sound(i, entry.name)
-        name = entry.name if sound else own
-        text = teller.describe(i, {other.description for other in objects}, name)
+        valid = entry.name not in others - {own} and writer.is_true_name(i, entry.name)
+        name = entry.name if valid else own
+        text = writer.describe(i, {other.description for other in objects}, name)
         if text is None:
             raise AnnotationError(
-                f"{scene.name}: {entry.node} (object {entry.id}) cannot be told from others of its kind: "
-                f"take another object in its place ({command('annotate', scene=scene.name)})"
+                f"{scene.name}: {entry.node} (object {entry.id}) cannot be distinguished from others of its "
+                f"category: choose another object ({command('annotate', scene=scene.name)})"
             )
         objects.append(entry.model_copy(update={"name": name, "category": kind, "description": text}))
     return replace(annotations, objects=tuple(objects))

@@ -16,8 +16,8 @@ from aerialdojo_gen.geometry.frames import compass_direction
 # Well within what the check takes for true, so that a drafted text stays true when the scene is touched up.
 _TIGHT = 0.9
 _REACH_M = 9.0
-_MOST_THINGS = 10
-_SMALLEST_M = 0.3
+_MAX_THINGS = 10
+_MIN_SIZE_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,16 @@ class FactFinder:
         gaps = {j: self._geometry.gap_m(i, j) for j in things}
         things.sort(key=lambda j: (-self._salience(j) / (1.5 + gaps[j]), j))
         found: list[Fact] = []
-        for j in things[:_MOST_THINGS]:
-            found += self._of(i, j, rng)
+        for j in things[:_MAX_THINGS]:
+            found += self._pair_facts(i, j, rng)
         for a, j in enumerate(things[:6]):
             for k in things[a + 1 : 6]:
-                texts = self._thing(i, j), self._thing(i, k)
+                texts = self._reference_to(i, j), self._reference_to(i, k)
                 if self._geometry.scene.imported and 0.0 in (gaps[j], gaps[k]):
                     continue
                 if texts[0] != texts[1] and self._geometry.between(i, j, k, _TIGHT):
                     weight = 1.2 * min(self._weight(i, j), self._weight(i, k))
-                    found += self._checked(i, "between {} and {}".format(*texts), weight, (j, k))
+                    found += self._verified(i, "between {} and {}".format(*texts), weight, (j, k))
         keyed = [(-fact.weight * float(rng.uniform(0.8, 1.25)), k, fact) for k, fact in enumerate(found)]
         return [fact for _, _, fact in sorted(keyed, key=lambda item: item[:2])]
 
@@ -69,7 +69,7 @@ class FactFinder:
 
     def _may_refer(self, i: int, j: int) -> bool:
         size = self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]
-        return self._words[j].reference and float(size.max()) >= _SMALLEST_M and j != i
+        return self._words[j].reference and float(size.max()) >= _MIN_SIZE_M and j != i
 
     def _salience(self, j: int) -> float:
         size = float((self._geometry.boxes[j, 1] - self._geometry.boxes[j, 0]).max())
@@ -80,30 +80,30 @@ class FactFinder:
         same = self._words[i].name == self._words[j].name
         return self._salience(j) / (1.5 + self._geometry.gap_m(i, j)) * (0.5 if same else 1.0)
 
-    def _of(self, i: int, j: int, rng: np.random.Generator) -> list[Fact]:
-        geometry, weight, thing = self._geometry, self._weight(i, j), self._thing(i, j)
+    def _pair_facts(self, i: int, j: int, rng: np.random.Generator) -> list[Fact]:
+        geometry, weight, thing = self._geometry, self._weight(i, j), self._reference_to(i, j)
         found: list[Fact] = []
         touching = geometry.support(i) == j or j in geometry.covers(i)
         imported = geometry.scene.imported
         if imported and not touching and geometry.gap_m(i, j) == 0.0:
             return []  # one goes through the other, or is a part of it: nobody says where that stands by it
         if geometry.support(i) == j and (not imported or geometry.rests_on(i, j)):
-            found += self._checked(i, self._word("on", rng).format(thing), 3.0 * weight, (j,))
+            found += self._verified(i, self._phrase("on", rng).format(thing), 3.0 * weight, (j,))
         if j in geometry.covers(i) and not (imported and geometry.support(j) == i):
-            found += self._checked(i, self._word("under", rng).format(thing), 2.0 * weight, (j,))
+            found += self._verified(i, self._phrase("under", rng).format(thing), 2.0 * weight, (j,))
         if not touching and geometry.beside(i, j, _TIGHT):
-            found += self._checked(i, self._word("beside", rng).format(thing), 1.5 * weight, (j,))
+            found += self._verified(i, self._phrase("beside", rng).format(thing), 1.5 * weight, (j,))
         elif not touching and geometry.near(i, j, _TIGHT) and geometry.level_gap_m(i, j) > 0.0:
-            found += self._checked(i, self._word("near", rng).format(thing), 0.8 * weight, (j,))
+            found += self._verified(i, self._phrase("near", rng).format(thing), 0.8 * weight, (j,))
         bearing = geometry.bearing_rad(i, j)
         if bearing is not None and not touching and geometry.level_gap_m(i, j) > 0.0:
             direction = compass_direction(float(np.cos(bearing)), float(np.sin(bearing)))
             if geometry.side(i, j, direction, _TIGHT):
-                text = self._word("side", rng).format(thing, d=direction)
-                found += self._checked(i, text, weight, (j,))
+                text = self._phrase("side", rng).format(thing, d=direction)
+                found += self._verified(i, text, weight, (j,))
         return found
 
-    def _checked(self, i: int, text: str, weight: float, things: tuple[int, ...]) -> list[Fact]:
+    def _verified(self, i: int, text: str, weight: float, things: tuple[int, ...]) -> list[Fact]:
         # The check must read the words as they were meant: names may hold words that mean something else to it.
         reading = self._ambiguity.lexicon.read(f"it stands {text}", i)
         claims = reading.claims
@@ -112,11 +112,11 @@ class FactFinder:
             return []
         return [Fact(text, claims, weight, frozenset(things))]
 
-    def _word(self, relation: str, rng: np.random.Generator) -> str:
+    def _phrase(self, relation: str, rng: np.random.Generator) -> str:
         forms = RELATIONS[relation]
         return forms[int(rng.integers(len(forms)))]
 
-    def _thing(self, i: int, j: int) -> str:
+    def _reference_to(self, i: int, j: int) -> str:
         if j in self._landmarks:
             return f"the {self._landmarks[j]}"
         noun = self._nouns[j]

@@ -17,7 +17,7 @@ GROUND = ("ground", "terrain", "river")
 _RISE_M = 3.0
 
 
-class Grounds:
+class GroundMaterials:
     """The surfaces of a scene's ground."""
 
     def __init__(self, geometry: SceneGeometry) -> None:

@@ -38,7 +38,7 @@ _NEAR = {
 _SPELT = {"gray": "grey", "golden": "gold", "silvery": "silver", "aqua": "turquoise"}
 
 
-class Callings:
+class NounChecker:
     """The things and colours that a name can speak of."""
 
     def __init__(self, names: Mapping[str, str]) -> None:

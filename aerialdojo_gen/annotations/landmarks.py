@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.annotations.describing import NO_THING, Vocabulary
+from aerialdojo_gen.annotations.describing import NON_OBJECTS, Vocabulary
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
@@ -19,22 +19,23 @@ _SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0
 
 
 def choose_landmarks(
-    vocabulary: Vocabulary, n: int, wanted: Sequence[str] = (), at_most: bool = False
+    vocabulary: Vocabulary, n: int, requested: Sequence[str] = (), at_most: bool = False
 ) -> tuple[Landmark, ...]:
     """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen."""
     scene = vocabulary.scene
-    missing = [node for node in wanted if node not in scene]
+    missing = [node for node in requested if node not in scene]
     if missing:
         raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
-    chosen = [scene[node] for node in dict.fromkeys(wanted)][:n]
+    chosen = [scene[node] for node in dict.fromkeys(requested)][:n]
     own: dict[str, str] = {}
     nouns = {i.node: noun for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)}
     if scene.imported:
-        names = _Names(vocabulary)
+        names = _UniqueNames(vocabulary)
         nameless = [i.node for i in chosen if not names.of(i)]
         if nameless:
             raise AnnotationError(
-                f"{scene.name}: nothing tells the landmark {nameless[0]!r} from others of its kind: take another node"
+                f"{scene.name}: the landmark {nameless[0]!r} is indistinguishable from others of its "
+                "category: choose another node"
             )
         prominent = [i for i in _prominent(vocabulary) if i not in chosen]
         rest = [i for i in prominent[: 8 * n] if names.of(i)]
@@ -45,8 +46,8 @@ def choose_landmarks(
         rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
         if len(chosen) + len(rest) < n and at_most:
             # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
-            named = _Names(vocabulary)
-            large = [i for i in _prominent(vocabulary) if _seen_from_afar(i)][: 8 * n]
+            named = _UniqueNames(vocabulary)
+            large = [i for i in _prominent(vocabulary) if _is_large(i)][: 8 * n]
             own = {i.node: named.of(i) for i in large if i not in (*chosen, *rest) and named.of(i)}
             rest += [i for i in large if i.node in own]
     while len(chosen) < n and rest:
@@ -58,12 +59,14 @@ def choose_landmarks(
             rest = [i for i in rest if nouns[i.node].short != nouns[best.node].short]
     if len(chosen) < n and not (at_most and chosen):
         raise AnnotationError(
-            f"{scene.name}: {n} landmark{'s are' if n > 1 else ' is'} wanted, the scene has {len(chosen)}"
+            f"{scene.name}: {n} landmark{'s' if n > 1 else ''} requested, the scene has {len(chosen)}"
         )
-    said = [names.of(i) for i in chosen] if scene.imported else _catalogued(vocabulary, chosen, own)
-    if len(set(said)) < len(said):
-        raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(said))}")
-    return tuple(Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(said, chosen, strict=True)))
+    landmark_names = [names.of(i) for i in chosen] if scene.imported else _catalogue_names(vocabulary, chosen, own)
+    if len(set(landmark_names)) < len(landmark_names):
+        raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(landmark_names))}")
+    return tuple(
+        Landmark(id=k, name=name, node=i.node) for k, (name, i) in enumerate(zip(landmark_names, chosen, strict=True))
+    )
 
 
 def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
@@ -74,16 +77,16 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
 
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
     """The things of a mesh of another make, the highest first."""
-    things = [i for i in vocabulary.scene.instances if i.category not in NO_THING]
+    things = [i for i in vocabulary.scene.instances if i.category not in NON_OBJECTS]
     return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
 
 
-def _seen_from_afar(instance: Instance) -> bool:
+def _is_large(instance: Instance) -> bool:
     """Whether a thing is large: what stands on a tall roof is high, and no landmark."""
     return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
 
 
-def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
+def _catalogue_names(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
     """Name landmarks as the catalogue does; what it has no landmark's name for, by what it has of its own."""
     noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
     plain = [noun[i.node].name for i in chosen]
@@ -91,7 +94,7 @@ def _catalogued(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping
             for i, p in zip(chosen, plain, strict=True)]  # fmt: skip
 
 
-class _Names:
+class _UniqueNames:
     """Names that are so of one thing of a scene alone, by what a mesh of another make tells."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:

@@ -69,8 +69,8 @@ def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
                 raise AnnotationError(f"{path}: [{name}] stands in another file of its folder already")
             tables[name] = entry
     tables.pop("colours")
-    said = {key: str(value) for key, value in tables.pop("values").items()}
-    return tables, said
+    values = {key: str(value) for key, value in tables.pop("values").items()}
+    return tables, values
 
 
 def _files() -> list[Path]:
@@ -141,14 +141,14 @@ def noun_of(instance: Instance, words: Words) -> Noun:
         others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE and k not in _NAMING]
         if not value or value in words.name.split() or any(value in v.split() for v in others):
             continue
-        said = _said(key, value)
+        phrase = _phrase_value(key, value)
         if words.name.split()[-1] in _LETTERED:
-            said = said.replace("with a sign reading", "reading")
-        if said.startswith("+"):
-            before.append(said[1:])
+            phrase = phrase.replace("with a sign reading", "reading")
+        if phrase.startswith("+"):
+            before.append(phrase[1:])
         else:
-            after.append(said)
-    tail = _joined(after)
+            after.append(phrase)
+    tail = _join(after)
     if " with " in words.name and tail.startswith("with "):
         tail = "and" + tail.removeprefix("with")
     return Noun(tuple(before), words.name, tail, words.group)
@@ -159,7 +159,7 @@ def place_of(instance: Instance) -> str:
     return instance.attributes.get(_PLACE, "")
 
 
-def _said(key: str, value: str) -> str:
+def _phrase_value(key: str, value: str) -> str:
     """Say one value: ``+`` before an adjective, else the words that follow the noun."""
     table = _tables()[1]
     pattern = table.get(f"{key}={value}") or table.get(f"{key}=*", "")
@@ -190,7 +190,7 @@ def _with_article(text: str) -> str:
     return f"{article(text)} {text}"
 
 
-def _joined(parts: list[str]) -> str:
+def _join(parts: list[str]) -> str:
     text = ""
     for part in parts:
         again = part.startswith("with ") and "with " in text

@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.ground import GROUND, Grounds
+from aerialdojo_gen.annotations.ground import GROUND, GroundMaterials
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
@@ -36,7 +36,7 @@ THINGS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside
 SIDES = frozenset({"north_of", "south_of", "east_of", "west_of"})
 _FOLDER = Path(__file__).parent / "places"
 _PARTS = frozenset(f"{a}{b}" for a in ("", "north", "south") for b in ("", "east", "west")) - {""} | {"middle"}
-_MOST_AMONG_M = 15.0
+_MAX_AMONG_M = 15.0
 
 
 @cache
@@ -73,7 +73,7 @@ def _number(value: Any) -> bool:
 def _among(value: Any) -> bool:
     return (
         isinstance(value, list) and len(value) == 3 and isinstance(value[0], int) and value[0] > 0
-        and _text(value[1]) and _number(value[2]) and 0 < value[2] <= _MOST_AMONG_M
+        and _text(value[1]) and _number(value[2]) and 0 < value[2] <= _MAX_AMONG_M
     )  # fmt: skip
 
 
@@ -105,7 +105,7 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
-        self._grounds = Grounds(geometry)
+        self._ground_materials = GroundMaterials(geometry)
         self._sets: dict[str, frozenset[int]] = {}
         self._slabs: dict[int, NDArray[np.float64]] = {}
         self._found: dict[tuple[int, str, float], str] = {}
@@ -127,7 +127,7 @@ class Places:
             self._found[key] = next(wrong, "")
         return self._found[key]
 
-    def _things(self, pattern: str) -> frozenset[int]:
+    def _match(self, pattern: str) -> frozenset[int]:
         if pattern not in self._sets:
             instances = self._geometry.scene.instances
             self._sets[pattern] = frozenset(
@@ -144,13 +144,13 @@ class Places:
         return _TESTS[name](self, i, value, slack)
 
     def _within(self, i: int, pattern: str, most_m: float) -> bool:
-        if most_m >= AT_M and i in self._things(pattern):
+        if most_m >= AT_M and i in self._match(pattern):
             return True  # what makes the place is there itself
         close = set(self._geometry.neighbours(i, most_m))
-        return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._things(pattern) & close))
+        return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._match(pattern) & close))
 
     def _beyond(self, i: int, pattern: str, direction: str) -> bool:
-        boxes = self._geometry.boxes[sorted(self._things(pattern) - {i})]
+        boxes = self._geometry.boxes[sorted(self._match(pattern) - {i})]
         if len(boxes) == 0:
             return False
         middle = (boxes[:, 0, :2].min(axis=0) + boxes[:, 1, :2].max(axis=0)) / 2.0
@@ -161,13 +161,13 @@ class Places:
         chain: list[int] = []
         at = self._geometry.support(i)
         if at is None:
-            at = self._sunk(i)
+            at = self._uneven_support(i)
         while at is not None and at not in chain and len(chain) < 5:
             chain.append(at)
             at = self._geometry.support(at)
         return chain
 
-    def _sunk(self, i: int) -> int | None:
+    def _uneven_support(self, i: int) -> int | None:
         """What an instance stands on where its feet are not level: a slope, a rock."""
         low = float(self._geometry.boxes[i, 0, 2])
         found = [
@@ -180,11 +180,11 @@ class Places:
         return best[1] if best[0] >= low - 2.0 * _STEP_M else None
 
     def _on(self, i: int, pattern: str, _slack: float) -> bool:
-        return bool(self._things(pattern) & set(self._stack(i)))
+        return bool(self._match(pattern) & set(self._stack(i)))
 
     def _roof(self, i: int, pattern: str, slack: float) -> bool:
         """On it, aloft, and under no part of it."""
-        mine = self._things(pattern) & set(self._stack(i))
+        mine = self._match(pattern) & set(self._stack(i))
         return bool(mine) and not mine & self._overhead(i) and self._high(i, 1.8, slack)
 
     def _overhead(self, i: int) -> set[int]:
@@ -194,13 +194,13 @@ class Places:
         return {j for j, heights in geometry.columns(i, x, y) if (heights >= top).any()}
 
     def _under(self, i: int, pattern: str, _slack: float) -> bool:
-        return bool(self._things(pattern) & self._overhead(i))
+        return bool(self._match(pattern) & self._overhead(i))
 
     def _inside(self, i: int, pattern: str, slack: float) -> bool:
-        return any(self._within_hull(i, [j]) for j in sorted(self._things(pattern) - {i}))
+        return any(self._within_hull(i, [j]) for j in sorted(self._match(pattern) - {i}))
 
     def _hull(self, i: int, pattern: str, slack: float) -> bool:
-        return self._within_hull(i, sorted(self._things(pattern) - {i}))
+        return self._within_hull(i, sorted(self._match(pattern) - {i}))
 
     def _within_hull(self, i: int, things: list[int]) -> bool:
         if not things:
@@ -220,7 +220,7 @@ class Places:
         geometry = self._geometry
         x, y = (float(c) for c in geometry.centres[i, :2])
         close = set(geometry.neighbours(i, NEAR_M * slack))
-        first, second = (sorted(self._things(pattern) & close) for pattern in patterns)
+        first, second = (sorted(self._match(pattern) & close) for pattern in patterns)
         for a in first:
             for b in second:
                 if a == b or max(geometry.gap_m(i, a), geometry.gap_m(i, b)) > NEAR_M * slack:
@@ -234,7 +234,7 @@ class Places:
         """Above a thing, or above ground of that material."""
         geometry = self._geometry
         low = float(geometry.boxes[i, 0, 2])
-        for j in sorted(self._things(pattern) - {i}):
+        for j in sorted(self._match(pattern) - {i}):
             lower = float(geometry.boxes[j, 0, 2]) < low + _STEP_M
             if lower and shapely.intersects(geometry.outline(i), geometry.outline(j)):
                 return True
@@ -253,7 +253,7 @@ class Places:
 
     def _by(self, i: int, pattern: str, slack: float) -> bool:
         """Ground of that material is no farther than what one stands beside."""
-        return self._grounds.within(i, pattern, BESIDE_M * slack)
+        return self._ground_materials.within(i, pattern, BESIDE_M * slack)
 
     @staticmethod
     def _named(material: str, pattern: str) -> bool:
@@ -303,7 +303,7 @@ class Places:
         """On that floor of a thing: so many of its slabs lie above its ground floor and not above the foot."""
         number, pattern = value
         low = float(self._geometry.boxes[i, 0, 2])
-        for j in sorted(self._things(pattern) & set(self._stack(i))):
+        for j in sorted(self._match(pattern) & set(self._stack(i))):
             slabs = self._slab_heights(j)
             if len(slabs) and int((slabs[1:] <= low + _STEP_M).sum()) == number:
                 return True
@@ -341,7 +341,7 @@ class Places:
 
     def _among(self, i: int, value: list[Any], slack: float) -> bool:
         least, pattern, most_m = value
-        others = self._things(pattern) - {i}
+        others = self._match(pattern) - {i}
         near = (j for j in self._geometry.neighbours(i, most_m * slack) if j in others)
         return sum(self._geometry.gap_m(i, j) <= most_m * slack for j in near) >= least
 

@@ -13,7 +13,7 @@ from typing import Any, cast
 from aerialdojo_gen.base.errors import BeyondBounds, brief
 from aerialdojo_gen.base.safe_parse import JsonPath, find_violation, scan_json
 
-MOST_VALUES = 200_000
+MAX_VALUES = 200_000
 _HALF = re.compile("[\ud800-\udfff]")
 
 
@@ -85,8 +85,8 @@ class _Pairs(list[tuple[str, _Located]]):
 
 def read_json(text: str) -> Document:
     """Parse a JSON text and note where every value stands."""
-    if text.count(",") + text.count("[") + text.count("{") > MOST_VALUES:
-        return Document(None, {}, (Fault(0, "", f"holds more than {MOST_VALUES} values"),))
+    if text.count(",") + text.count("[") + text.count("{") > MAX_VALUES:
+        return Document(None, {}, (Fault(0, "", f"holds more than {MAX_VALUES} values"),))
     try:
         scan_json(text)
         root = cast(_Located, _Decoder().decode(text))
@@ -115,19 +115,19 @@ def _unwrap(
     if isinstance(node.value, _Pairs):
         plain: dict[str, Any] = {}
         for raw, child in node.value:
-            key = _whole(raw, path, lines, faults)
+            key = _clean_text(raw, path, lines, faults)
             inner = _unwrap(child, (*path, key), newlines, lines, faults)
             if key in plain:
-                fault = Fault(lines[*path, key], dotted((*path, key)), f"the key {key!r} stands twice in one object")
+                fault = Fault(lines[*path, key], dotted((*path, key)), f"the key {key!r} occurs twice in one object")
                 faults.append(fault)
             plain[key] = inner
         return plain
     if isinstance(node.value, list):
         return [_unwrap(child, (*path, i), newlines, lines, faults) for i, child in enumerate(node.value)]
-    return _whole(node.value, path, lines, faults) if isinstance(node.value, str) else node.value
+    return _clean_text(node.value, path, lines, faults) if isinstance(node.value, str) else node.value
 
 
-def _whole(text: str, path: JsonPath, lines: dict[JsonPath, int], faults: list[Fault]) -> str:
+def _clean_text(text: str, path: JsonPath, lines: dict[JsonPath, int], faults: list[Fault]) -> str:
     """Pass a text on that can be written as UTF-8: JSON can spell half of a surrogate pair, UTF-8 cannot."""
     half = _HALF.search(text)
     if half is None:

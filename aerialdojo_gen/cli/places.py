@@ -10,7 +10,7 @@ import typer
 from aerialdojo_gen.base import cli_context
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.imports.places import Place
+    from aerialdojo_gen.imports.places import AddedPlace
 
 app = typer.Typer()
 
@@ -96,14 +96,14 @@ def _box(text: str) -> tuple[float, float, float, float]:
     return west, south, east, north
 
 
-def _print_scenes(added: list[Place], project: Path) -> None:
+def _print_scenes(added: list[AddedPlace], project: Path) -> None:
     for place in added:
         size = place.scene.bounds[1] - place.scene.bounds[0]
         print(
             f"{place.name}: {len(place.scene.instances):,} instances, {place.scene.n_triangles:,} triangles, "
             f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {place.scene.ceiling_m:.0f} m"
         )
-        for line in place.said:
+        for line in place.notes:
             print(f"  {line}")
     first = added[0]
     print(f"next: {cli_context.command('annotate-draft', first.name, pipeline=first.pipeline)}")

@@ -138,7 +138,7 @@ def show(
     pictured = picture_task(found, "image" if task_id.endswith("-i") else "semantic", frames)
     stream = sys.stderr if as_json else sys.stdout
     if not as_json:
-        print("\n".join([pictured.title, pictured.told, *facts(pictured.facts, terminal_width())]))
+        print("\n".join([pictured.title, pictured.terminal_goal, *facts(pictured.facts, terminal_width())]))
     if out is not None or html is None:
         print(write_png(pictured, out or Path(f"{task_id}.png")), file=stream)
     if html is not None:

@@ -27,7 +27,7 @@ from aerialdojo_gen.cli.common import (
 )
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.imports.command import Added
+    from aerialdojo_gen.imports.command import AddedScene
 
 app = typer.Typer()
 
@@ -92,7 +92,7 @@ def add_scene(
     cut |= {"light": light, "texture_px": texture_px}
     scale = 1.0 if scale is None else scale
     if tiles is not None:
-        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, watch=_describe, **cut)
+        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, on_added=_describe, **cut)
         print(f"{len(made):,} scenes in one frame")
     else:
         made = [command.add_scene(name, mesh, project, up=up, scale=scale, annotations=annotations, **cut)]
@@ -103,7 +103,7 @@ def add_scene(
     print(f"then: {cli_context.command('run', made[0].pipeline, data=project / 'data')}")
 
 
-def _describe(added: Added) -> None:
+def _describe(added: AddedScene) -> None:
     scene = added.scene
     size = scene.bounds[1] - scene.bounds[0]
     print(
@@ -159,7 +159,7 @@ def annotate_draft(
     quiet: Quiet = False,
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
-    from aerialdojo_gen.annotations.draft import Choice
+    from aerialdojo_gen.annotations.draft import DraftOptions
     from aerialdojo_gen.cli.sources import given_scene, pick_scene
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
@@ -168,18 +168,18 @@ def annotate_draft(
     config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
     given = given_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
-    choice = Choice(
+    options = DraftOptions(
         centre_m=centre,
-        within_m=within,
+        core_radius_m=within,
         core_share=core_share,
-        aloft_share=min_share_elevated,
-        most_vegetation=max_plants,
-        most=max_per_category,
+        elevated_share=min_share_elevated,
+        max_vegetation=max_plants,
+        max_per_category=max_per_category,
     )
     path = draft_scene(
         scene, config, roots, n_landmarks=landmarks,
         n_objects=int(objects) if objects and objects != "auto" else objects,
-        choice=choice, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
+        options=options, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
         reporter=Reporter(quiet=quiet),
     )  # fmt: skip
     print(path)

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, lacks
-from aerialdojo_gen.imports.pictures import TEXTURE_PX, Paint, surfaces_of
-from aerialdojo_gen.imports.raw import RawNode, joined, no_corners
+from aerialdojo_gen.imports.pictures import TEXTURE_PX, SourceMaterial, decode_surfaces
+from aerialdojo_gen.imports.raw import RawNode, empty_corners, merge_nodes
 
 
-def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
+def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
     """Read a Collada or FBX file: one RawNode a mesh node, in the order of the tree, transforms applied."""
     try:
         assimp: Any = importlib.import_module("assimp_py")
@@ -29,12 +29,12 @@ def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int 
             f"Assimp cannot read it ({str(error).splitlines()[0][:120] if str(error) else 'no reason'})"
         ) from None
     diffuse = int(assimp.TextureType_DIFFUSE)
-    surfaces, index = surfaces_of([_paint(m, diffuse, resolve) for m in scene.materials], texture_px)
+    surfaces, index = decode_surfaces([_source_material(m, diffuse, resolve) for m in scene.materials], texture_px)
     meshes = [_mesh(mesh) for mesh in scene.meshes]
     out: list[RawNode] = []
-    waiting = [(scene.root_node, np.eye(4))]
-    while waiting:
-        node, parent = waiting.pop()
+    stack = [(scene.root_node, np.eye(4))]
+    while stack:
+        node, parent = stack.pop()
         world = parent @ np.array(node.transformation, dtype=np.float64).reshape(4, 4)
         bodies = []
         for k in node.mesh_indices:
@@ -50,8 +50,8 @@ def read_by_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int 
                 np.full(len(faces), surface, dtype=np.int32), corners[turned], surfaces,
             ))  # fmt: skip
         if bodies:
-            out.append(bodies[0] if len(bodies) == 1 else joined(node.name, bodies))
-        waiting += [(child, world) for child in reversed(node.children)]
+            out.append(bodies[0] if len(bodies) == 1 else merge_nodes(node.name, bodies))
+        stack += [(child, world) for child in reversed(node.children)]
     return out
 
 
@@ -61,7 +61,7 @@ def _mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np
     flat = np.asarray(mesh.indices, dtype=np.int64).ravel()
     # Lines and points are meshes of their own, and no triangles.
     faces = flat.reshape(-1, 3) if len(flat) == 3 * mesh.num_faces else np.zeros((0, 3), dtype=np.int64)
-    corners = no_corners(len(vertices))[:, 0]
+    corners = empty_corners(len(vertices))[:, 0]
     if mesh.texcoords:
         uv = np.asarray(mesh.texcoords[0], dtype=np.float32).reshape(len(vertices), -1)[:, :2]
         corners[:, :2] = np.nan_to_num(uv)
@@ -72,10 +72,10 @@ def _mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np
     return vertices, faces, corners
 
 
-def _paint(material: dict[str, Any], diffuse: int, resolve: Callable[[str], bytes]) -> Paint:
+def _source_material(material: dict[str, Any], diffuse: int, resolve: Callable[[str], bytes]) -> SourceMaterial:
     name = str(material.get("NAME", ""))
-    told = material.get("COLOR_DIFFUSE") or material.get("BASE_COLOR") or (0.66, 0.64, 0.61)
-    red, green, blue = (float(c) for c in list(told)[:3])
+    diffuse_colour = material.get("COLOR_DIFFUSE") or material.get("BASE_COLOR") or (0.66, 0.64, 0.61)
+    red, green, blue = (float(c) for c in list(diffuse_colour)[:3])
     files = (material.get("TEXTURES") or {}).get(diffuse) or []
     image, missing = None, ""
     if files:
@@ -83,7 +83,7 @@ def _paint(material: dict[str, Any], diffuse: int, resolve: Callable[[str], byte
             image = resolve(str(files[0]))
         except FileNotFoundError:
             missing = str(files[0])[-80:]
-    return Paint(
+    return SourceMaterial(
         name, (1.0, 1.0, 1.0) if image is not None else (red, green, blue), image, missing, alpha="blend",
         double_sided=bool(material.get("TWOSIDED", 0)),
     )  # fmt: skip

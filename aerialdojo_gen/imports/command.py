@@ -12,11 +12,11 @@ from pathlib import Path
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief, check_regular
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import Place, Repairs, check_options, import_mesh, region_of
-from aerialdojo_gen.imports.listing import contents
+from aerialdojo_gen.imports.import_mesh import Repairs, SourceMesh, check_options, import_mesh, make_region
+from aerialdojo_gen.imports.listing import describe_mesh
 from aerialdojo_gen.imports.naming import read_names
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.tiles import tile_name, tiles_of
+from aerialdojo_gen.imports.tiles import make_tiles, tile_name
 from aerialdojo_gen.imports.toml_text import toml_value
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
@@ -28,7 +28,7 @@ PIPELINE = "pipeline.toml"
 
 
 @dataclass(frozen=True)
-class Added:
+class AddedScene:
     """What `add_scene` made."""
 
     scene: Scene  # The scene
@@ -52,20 +52,22 @@ def add_scene(
     light: str = "auto",
     texture_px: int = TEXTURE_PX,
     force: bool = False,
-) -> Added:
+) -> AddedScene:
     """Make a scene of a mesh file in a project folder; nothing else in the folder is touched."""
-    _check_free([name], project, force)
+    check_free([name], project, force)
     check_options(up, scale, light)
-    region_of(crop_m, box_m)
+    make_region(crop_m, box_m)
     naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
-    with _naming_the_file(mesh):
+    with _prefix_errors(mesh):
         scene, repairs = import_mesh(
             name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, box_m=box_m,
             ceiling_m=ceiling_m, naming=naming, light=light,
         )  # fmt: skip
-    kept = {"crop_m": crop_m, "box_m": box_m}
-    return _put(scene, repairs, project, _recipe(_digested(mesh), scene, repairs, up, scale, kept), text)
+    region_options = {"crop_m": crop_m, "box_m": box_m}
+    return _write_scene(
+        scene, repairs, project, _recipe(_file_digest(mesh), scene, repairs, up, scale, region_options), text
+    )
 
 
 def add_tiles(
@@ -83,32 +85,32 @@ def add_tiles(
     light: str = "auto",
     texture_px: int = TEXTURE_PX,
     force: bool = False,
-    watch: Callable[[Added], None] = lambda added: None,
-) -> list[Added]:
+    on_added: Callable[[AddedScene], None] = lambda added: None,
+) -> list[AddedScene]:
     """Make scenes of a large mesh, a square of `edge_m` metres each, in one frame.
 
     All or none of them are written.
     """
     check_scene_name(tile_name(name, 99, 99))
     check_options(up, scale, light)
-    region = region_of(crop_m, box_m)
+    region = make_region(crop_m, box_m)
     naming = None if names is None else read_names(names)
-    with _naming_the_file(mesh):
-        place = Place.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
+    with _prefix_errors(mesh):
+        source = SourceMesh.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
         if region is not None:
-            place = place.within(region)
+            source = source.within(region)
         # Every tile is made before one is written, so that what cannot be made leaves nothing behind.
-        tiles = list(tiles_of(name, place, edge_m, ceiling_m=ceiling_m, naming=naming, light=light))
+        tiles = list(make_tiles(name, source, edge_m, ceiling_m=ceiling_m, naming=naming, light=light))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
-    _check_free([tile.name for tile in tiles], project, force)
-    digested, out = _digested(mesh), []
+    check_free([tile.name for tile in tiles], project, force)
+    source_digest, out = _file_digest(mesh), []
     for tile in tiles:
         (x0, y0), (x1, y1) = tile.region.low.tolist(), tile.region.high.tolist()
-        kept = {"crop_m": crop_m, "box_m": (x0, y0, x1, y1)}
-        recipe = _recipe(digested, tile.scene, tile.repairs, up, scale, kept)
-        out.append(_put(tile.scene, tile.repairs, project, recipe, None))
-        watch(out[-1])
+        region_options = {"crop_m": crop_m, "box_m": (x0, y0, x1, y1)}
+        recipe = _recipe(source_digest, tile.scene, tile.repairs, up, scale, region_options)
+        out.append(_write_scene(tile.scene, tile.repairs, project, recipe, None))
+        on_added(out[-1])
     return out
 
 
@@ -120,14 +122,15 @@ def list_mesh(
     names: Path | None = None,
     width: int | None = None,
 ) -> list[str]:
-    """Say what a mesh file holds, in lines for a terminal (`aerialdojo_gen.imports.listing.contents`)."""
+    """Say what a mesh file holds, in lines for a terminal (`aerialdojo_gen.imports.listing.describe_mesh`)."""
     check_options(up, scale)
     naming = None if names is None else read_names(names)
-    with _naming_the_file(mesh):
-        return [f"{mesh.name}:", *contents(read_mesh(mesh), up=up, scale=scale, naming=naming, width=width)]
+    with _prefix_errors(mesh):
+        return [f"{mesh.name}:", *describe_mesh(read_mesh(mesh), up=up, scale=scale, naming=naming, width=width)]
 
 
-def _check_free(names: Sequence[str], project: Path, force: bool) -> None:
+def check_free(names: Sequence[str], project: Path, force: bool) -> None:
+    """Refuse names of scenes that the project has already, unless `force` replaces them."""
     for name in names:
         check_scene_name(name)
         recipe = project / "scenes" / f"{name}.toml"
@@ -136,7 +139,7 @@ def _check_free(names: Sequence[str], project: Path, force: bool) -> None:
 
 
 @contextmanager
-def _naming_the_file(mesh: Path) -> Iterator[None]:
+def _prefix_errors(mesh: Path) -> Iterator[None]:
     """Put the file before what is wrong with it."""
     try:
         yield
@@ -145,7 +148,7 @@ def _naming_the_file(mesh: Path) -> Iterator[None]:
         raise AssetError(message if message.startswith(str(mesh)) else f"{mesh}: {message}") from None
 
 
-def _put(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str | None) -> Added:
+def _write_scene(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str | None) -> AddedScene:
     """Write a scene into a project, its recipe after its mesh, so that what is killed half-way is no scene."""
     name = scene.name
     for folder in ("scenes", "annotations"):
@@ -157,10 +160,8 @@ def _put(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str |
     if text is not None:
         with atomic_file(project, f"annotations/{name}.json") as path:
             path.write_text(text, encoding="utf-8")
-    if not (project / PIPELINE).exists():
-        with atomic_file(project, PIPELINE) as path:
-            path.write_text(pipeline_text(project), encoding="utf-8")
-    return Added(scene, repairs, project / PIPELINE, project / "annotations" / f"{name}.json")
+    write_pipeline(project)
+    return AddedScene(scene, repairs, project / PIPELINE, project / "annotations" / f"{name}.json")
 
 
 def _annotations(path: Path, name: str) -> str:
@@ -180,7 +181,7 @@ def _annotations(path: Path, name: str) -> str:
     return text
 
 
-def _digested(mesh: Path) -> tuple[str, str]:
+def _file_digest(mesh: Path) -> tuple[str, str]:
     return mesh.name, hashlib.sha256(mesh.read_bytes()).hexdigest()
 
 
@@ -190,7 +191,7 @@ def _recipe(
     repairs: Repairs,
     up: str,
     scale: float,
-    kept: Mapping[str, tuple[float, ...] | None],
+    region_options: Mapping[str, tuple[float, ...] | None],
 ) -> str:
     lines = [
         "# Made by add-scene; the mesh lies beside this file, repaired, in metres.",
@@ -199,7 +200,7 @@ def _recipe(
         f'source_sha256 = "{source[1]}"',
         f'up = "{up}"',
         f"scale = {scale}",
-        *(f"{key} = {list(part)}" for key, part in kept.items() if part),
+        *(f"{key} = {list(part)}" for key, part in region_options.items() if part),
         f"origin_m = {list(repairs.origin_m)}",
         f"ceiling_m = {scene.ceiling_m}",
         'sky = "#{:02x}{:02x}{:02x}"'.format(*scene.sky),
@@ -208,8 +209,10 @@ def _recipe(
     return "\n".join(lines) + "\n"
 
 
-def pipeline_text(project: Path) -> str:
-    """Write the pipeline file of a project of one's own scenes."""
+def write_pipeline(project: Path) -> None:
+    """Write the pipeline file of a project that has none."""
+    if (project / PIPELINE).exists():
+        return
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
     stages = [stage.name for stage in STAGES if stage.name != "render"]
     lines = [
@@ -221,4 +224,5 @@ def pipeline_text(project: Path) -> str:
         'annotations = "annotations"',
         f"stages = {json.dumps(stages)}",
     ]
-    return "\n".join(lines) + "\n"
+    with atomic_file(project, PIPELINE) as path:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -26,7 +26,7 @@ class Region:
     """A convex part of the plan, with what a user calls it."""
 
     corners: tuple[tuple[float, float], ...]  # tuple of (x, y); metres, counter-clockwise
-    said: str  # ``"--crop 10 20 100"``
+    option: str  # ``"--crop 10 20 100"``
 
     @classmethod
     def circle(cls, x: float, y: float, radius: float) -> Region:
@@ -73,7 +73,7 @@ class Pieces:
 def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     """Clip triangles to a convex region; closed bodies are closed again along the border."""
     corners = vertices[faces]
-    body, closed = bodies_of(faces, len(vertices))
+    body, closed = connected_bodies(faces, len(vertices))
     pieces = Pieces(corners, np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3)))
     # A closed body must come to the planes whole, for what each of them cuts away tells where it is to be closed.
     low, high = np.full((len(closed), 2), np.inf), np.full((len(closed), 2), -np.inf)
@@ -83,24 +83,24 @@ def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     low = np.where(own, low[body], corners[:, :, :2].min(axis=1))
     high = np.where(own, high[body], corners[:, :, :2].max(axis=1))
     touched = np.asarray((low <= region.high).all(axis=1) & (high >= region.low).all(axis=1))
-    pieces = _some(pieces, touched)
+    pieces = _select(pieces, touched)
     for normal, offset in region.planes:
-        pieces = _halved(pieces, body, closed, normal, offset)
+        pieces = _clip_by_plane(pieces, body, closed, normal, offset)
     return pieces
 
 
-def _some(pieces: Pieces, rows: NDArray[np.bool_] | Ints) -> Pieces:
+def _select(pieces: Pieces, rows: NDArray[np.bool_] | Ints) -> Pieces:
     return Pieces(pieces.corners[rows], pieces.source[rows], pieces.weights[rows])
 
 
-def _joined(parts: Sequence[Pieces]) -> Pieces:
+def _concatenate(parts: Sequence[Pieces]) -> Pieces:
     return Pieces(
         np.concatenate([p.corners for p in parts]), np.concatenate([p.source for p in parts]),
         np.concatenate([p.weights for p in parts]),
     )  # fmt: skip
 
 
-def _halved(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float) -> Pieces:
+def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float) -> Pieces:
     """Keep what lies on the inner side of an upright plane, and close what was closed."""
     away = pieces.corners[:, :, :2] @ normal - offset
     # What lies in the plane is within, so that every surface is cut alike however often its corners meet it.
@@ -109,13 +109,13 @@ def _halved(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Float
     inner = n == 0
     if inner.all():
         return pieces
-    keep, one, two = _some(pieces, inner), np.flatnonzero(n == 1), np.flatnonzero(n == 2)
+    keep, one, two = _select(pieces, inner), np.flatnonzero(n == 1), np.flatnonzero(n == 2)
     # The odd corner first, so that the two cases are cut alike.
     first = np.concatenate([np.argmax(outside[one], axis=1), np.argmin(outside[two], axis=1)])
     rows = np.concatenate([one, two])
     turn = (first[:, None] + np.arange(3)) % 3
     at = np.arange(len(rows))[:, None]
-    split = _some(pieces, rows)
+    split = _select(pieces, rows)
     c, w, d = split.corners[at, turn], split.weights[at, turn], away[rows][at, turn]
     k = len(one)
     at_border, weights = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 3))
@@ -136,12 +136,12 @@ def _halved(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Float
         Pieces(np.stack([c[k:, 0], at_border[k:, 0], at_border[k:, 1]], 1), source[k:],
                np.stack([w[k:, 0], weights[k:, 0], weights[k:, 1]], 1)),
     ]  # fmt: skip
-    kept = _joined([keep, *quads])
-    kept = _some(kept, np.argsort(kept.source, kind="stable"))
-    return _joined([kept, *_lids(at_border, source, body, closed, normal, offset)])
+    kept = _concatenate([keep, *quads])
+    kept = _select(kept, np.argsort(kept.source, kind="stable"))
+    return _concatenate([kept, *_caps(at_border, source, body, closed, normal, offset)])
 
 
-def _lids(
+def _caps(
     segments: Floats, source: Ints, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float
 ) -> list[Pieces]:
     """Triangles in a plane that close the closed bodies whose rims there are `segments`, (n, 2, 3)."""
@@ -152,14 +152,14 @@ def _lids(
     for k in np.unique(body[source[whole]]):
         rows = whole[body[source[whole]] == k]
         flat = np.stack([(segments[rows][:, :, :2] - origin) @ along, segments[rows][:, :, 2]], axis=-1)
-        spot = _spots(flat.reshape(-1, 2))
+        spot = _merge_close_points(flat.reshape(-1, 2))
         _, first = np.unique(spot, return_index=True)
         grid = np.round(flat.reshape(-1, 2)[first] / _GRID_M)[spot].reshape(-1, 2, 2)
         lines = shapely.linestrings(grid * _GRID_M)
         lines = lines[shapely.length(lines) > 0]
         if not len(lines):
             continue
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(_filled(lines)))
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(_polygons_inside(lines)))
         if not len(triangles):
             continue
         uz = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
@@ -171,9 +171,9 @@ def _lids(
         corners[:, :, 2] = uz[:, :, 1]
         # The very places of the rim, so that nothing gapes.
         ends = dict(zip(map(tuple, grid.reshape(-1, 2).tolist()), segments[rows].reshape(-1, 3), strict=True))
-        wanted = np.round(uz / _GRID_M).reshape(-1, 2).tolist()
+        keys = np.round(uz / _GRID_M).reshape(-1, 2).tolist()
         corners = np.array(
-            [ends.get((u, z), at) for (u, z), at in zip(wanted, corners.reshape(-1, 3), strict=True)]
+            [ends.get((u, z), at) for (u, z), at in zip(keys, corners.reshape(-1, 3), strict=True)]
         ).reshape(-1, 3, 3)
         one = np.zeros((len(uz), 3, 3))
         one[:, :, 0] = 1.0
@@ -181,14 +181,14 @@ def _lids(
     return out
 
 
-def _spots(ends: Floats) -> Ints:
+def _merge_close_points(ends: Floats) -> Ints:
     """Number the places of points, (n, 2): those no farther apart than the grid are one, which rounding may part."""
     pairs = cKDTree(ends).query_pairs(_GRID_M, output_type="ndarray")
     near = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(len(ends), len(ends)))
     return connected_components(near, directed=False)[1].astype(np.int64)
 
 
-def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
+def _polygons_inside(lines: NDArray[np.object_]) -> NDArray[np.object_]:
     """Polygons within closed outlines, holes left out: what a line to the far side crosses an odd number of times."""
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
     inner = shapely.get_coordinates(shapely.point_on_surface(faces))
@@ -203,7 +203,7 @@ def _filled(lines: NDArray[np.object_]) -> NDArray[np.object_]:
     return np.asarray(faces[odd])
 
 
-def bodies_of(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
+def connected_bodies(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
     """Edge-connected bodies of faces (m, 3): body of each face, and which bodies are closed."""
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros(0, np.bool_)

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
-from aerialdojo_gen.imports.earth import Bbox, in_words
+from aerialdojo_gen.imports.earth import Bbox, format_bbox
 
 Floats = NDArray[np.float64]
 # What a survey flies over has far fewer; a continent's model is cut first.
-_MOST_CELLS = 100_000_000
-_MOST_TEXT_BYTES = 512 << 20
-_HIGHEST_M = 1e5
-_BEYOND = 1e-6
+_MAX_CELLS = 100_000_000
+_MAX_TEXT_BYTES = 512 << 20
+_MAX_HEIGHT_M = 1e5
+_EDGE = 1e-6
 _DEGREES = 1.0
 _ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
 _SUFFIXES = (".tif", ".tiff", ".asc", ".npz")
@@ -50,7 +50,7 @@ class Dem:
         """Heights by bilinear interpolation at points of its own coordinates; NaN beyond it and next to no height."""
         rows, columns = self.heights_m.shape
         u, v = (x - self.x0) / self.dx, (self.y0 - y) / self.dy
-        near = (u > -_BEYOND) & (v > -_BEYOND) & (u < columns - 1 + _BEYOND) & (v < rows - 1 + _BEYOND)
+        near = (u > -_EDGE) & (v > -_EDGE) & (u < columns - 1 + _EDGE) & (v < rows - 1 + _EDGE)
         u, v = np.clip(u, 0, columns - 1), np.clip(v, 0, rows - 1)
         j, i = np.minimum(u.astype(int), columns - 2), np.minimum(v.astype(int), rows - 2)
         u, v = u - j, v - i
@@ -64,7 +64,7 @@ class Dem:
     def at_degrees(self, lon: Floats, lat: Floats) -> Floats:
         """Heights at points on earth; a `UsageError` where the file does not say where it is."""
         if self.to_grid is None:
-            raise UsageError(f"{self.path} does not say where on earth it is: give a GeoTIFF, or a grid in degrees")
+            raise UsageError(f"{self.path} has no geographic coordinates: use a GeoTIFF or a grid in degrees")
         return self.at(*self.to_grid(lon, lat))
 
 
@@ -79,9 +79,11 @@ def read_dem(path: Path) -> Dem:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     dem = _geotiff(path) if suffix in (".tif", ".tiff") else _ascii(path) if suffix == ".asc" else _npz(path)
     if min(dem.heights_m.shape) < 2:
-        raise AssetError(f"{path}: has {' by '.join(map(str, dem.heights_m.shape))} heights, a relief needs 2 by 2")
+        raise AssetError(
+            f"{path}: has {' by '.join(map(str, dem.heights_m.shape))} heights, at least 2 by 2 are needed"
+        )
     if not np.isfinite(dem.heights_m).any():
-        raise AssetError(f"{path}: holds no height, every cell is nodata")
+        raise AssetError(f"{path}: contains no heights: every cell is nodata")
     return dem
 
 
@@ -94,21 +96,21 @@ def _geotiff(path: Path) -> Dem:
     try:
         # By its own driver alone: others follow what a file says to other files, and to the net.
         with rasterio.open(path, driver="GTiff") as file:
-            if file.width * file.height > _MOST_CELLS:
+            if file.width * file.height > _MAX_CELLS:
                 raise AssetError(
-                    f"{path} has {file.width:,} x {file.height:,} heights, {_MOST_CELLS:,} are the most: "
+                    f"{path} has {file.width:,} x {file.height:,} heights, {_MAX_CELLS:,} are the most: "
                     "cut a part out of it first"
                 )
             z = file.read(1, masked=True).astype(np.float64).filled(np.nan)
             crs, t = file.crs, file.transform
     except rasterio.errors.RasterioError as error:
         raise AssetError(
-            f"{path} cannot be read as a GeoTIFF, or is cut short: {_line(error)}; get it again"
+            f"{path} cannot be read as a GeoTIFF, or is cut short: {_one_line(error)}; get it again"
         ) from None
     if crs is None:
         raise AssetError(f"{path} has no coordinate system: set one, e.g. gdal_edit.py -a_srs EPSG:4326 {path.name}")
     if abs(t.b) > 1e-12 or abs(t.d) > 1e-12 or t.a <= 0 or t.e >= 0:
-        raise AssetError(f"{path} is turned or mirrored: north must be up (gdalwarp -t_srs EPSG:4326 makes it so)")
+        raise AssetError(f"{path} is rotated or mirrored: north must be up (gdalwarp -t_srs EPSG:4326 fixes it)")
     if not crs.is_geographic and not math.isclose(crs.linear_units_factor[1], 1.0, rel_tol=1e-9):
         raise AssetError(
             f"{path} is in {crs.linear_units_factor[0]}, not in metres or degrees: "
@@ -120,14 +122,14 @@ def _geotiff(path: Path) -> Dem:
         x, y = warp.transform("EPSG:4326", crs, np.ravel(lon).tolist(), np.ravel(lat).tolist())
         return np.reshape(x, shape), np.reshape(y, shape)
 
-    z[~(np.abs(z) < _HIGHEST_M)] = np.nan
+    z[~(np.abs(z) < _MAX_HEIGHT_M)] = np.nan
     # A GeoTIFF's heights are those of the middles of its cells.
     return Dem(path, z, t.c + t.a / 2, t.f + t.e / 2, t.a, -t.e, bool(crs.is_geographic), to_grid)
 
 
 def _ascii(path: Path) -> Dem:
-    if path.stat().st_size > _MOST_TEXT_BYTES:
-        raise AssetError(f"{path} has more than {_MOST_TEXT_BYTES >> 20} MiB: cut a part out of it first")
+    if path.stat().st_size > _MAX_TEXT_BYTES:
+        raise AssetError(f"{path} has more than {_MAX_TEXT_BYTES >> 20} MiB: cut a part out of it first")
     head: dict[str, float] = {}
     try:
         with path.open(encoding="ascii") as file:
@@ -141,28 +143,28 @@ def _ascii(path: Path) -> Dem:
             columns, rows, cell = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
             if min(columns, rows) < 1:
                 raise ValueError(f"{columns} columns, {rows} rows")
-            fits = columns * rows <= _MOST_CELLS
+            fits = columns * rows <= _MAX_CELLS
             numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if fits else None
     except (KeyError, ValueError, OverflowError, UnicodeDecodeError) as error:
         raise AssetError(
-            f"{path} is no ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_line(error)}"
+            f"{path} is not an ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_one_line(error)}"
         ) from None
     if numbers is None or numbers.size != columns * rows or not (cell > 0 and math.isfinite(cell)):
         found = "too many" if numbers is None else f"{numbers.size:,}"
-        raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it cut short?")
+        raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it truncated?")
     z = numbers.reshape(rows, columns)
-    z[(z == head.get("nodata_value", -9999.0)) | ~(np.abs(z) < _HIGHEST_M)] = np.nan
+    z[(z == head.get("nodata_value", -9999.0)) | ~(np.abs(z) < _MAX_HEIGHT_M)] = np.nan
     half = 0.0 if "xllcenter" in head else cell / 2
     west = head.get("xllcenter", head.get("xllcorner", 0.0)) + half
     south = head.get("yllcenter", head.get("yllcorner", 0.0)) + half
     north = south + (rows - 1) * cell
     geographic = cell * max(rows, columns) < 5 and abs(west) <= 180 and abs(north) <= 90 and cell < _DEGREES / 10
-    return Dem(path, z, west, north, cell, cell, geographic or None, _same if geographic else None)
+    return Dem(path, z, west, north, cell, cell, geographic or None, _identity if geographic else None)
 
 
 def _npz(path: Path) -> Dem:
     try:
-        _look_over_npz(path)
+        _check_npz_sizes(path)
         with np.load(path, allow_pickle=False) as file:
             z = np.array(file["heights_m"], dtype=np.float64)
             cell = float(file["cell_m"]) if "cell_m" in file else None
@@ -171,25 +173,25 @@ def _npz(path: Path) -> Dem:
         OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile,
     ) as error:  # fmt: skip
         raise AssetError(
-            f"{path} cannot be read: {_line(error)}; it must hold heights_m with cell_m or bbox_deg"
+            f"{path} cannot be read: {_one_line(error)}; it must hold heights_m with cell_m or bbox_deg"
         ) from None
-    if z.ndim != 2 or z.size > _MOST_CELLS or (cell is None) == (bbox is None) or min(z.shape) < 2:
+    if z.ndim != 2 or z.size > _MAX_CELLS or (cell is None) == (bbox is None) or min(z.shape) < 2:
         raise AssetError(
             f"{path} must hold heights_m, 2 by 2 or more, with cell_m (metres) or bbox_deg (west, south, east, north)"
         )
-    z[~(np.abs(z) < _HIGHEST_M)] = np.nan
+    z[~(np.abs(z) < _MAX_HEIGHT_M)] = np.nan
     rows, columns = z.shape
     if bbox is not None:
         if len(bbox) != 4 or not (bbox[0] < bbox[2] and bbox[1] < bbox[3]):
             raise AssetError(f"{path}: bbox_deg must be west, south, east, north")
         west, south, east, north = bbox
-        return Dem(path, z, west, north, (east - west) / (columns - 1), (north - south) / (rows - 1), True, _same)
+        return Dem(path, z, west, north, (east - west) / (columns - 1), (north - south) / (rows - 1), True, _identity)
     if cell is None or not (math.isfinite(cell) and cell > 0):
         raise AssetError(f"{path}: cell_m must be a number above 0")
     return Dem(path, z, 0.0, (rows - 1) * cell, cell, cell, None, None)
 
 
-def _look_over_npz(path: Path) -> None:
+def _check_npz_sizes(path: Path) -> None:
     """Refuse an NPZ whose arrays are larger than any height model: some kilobytes may ask for terabytes."""
     with zipfile.ZipFile(path) as archive:
         for name in ("heights_m.npy", "cell_m.npy", "bbox_deg.npy"):
@@ -201,21 +203,21 @@ def _look_over_npz(path: Path) -> None:
                     np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
                 )
                 shape, _, dtype = read(file)
-            if math.prod(shape) * dtype.itemsize > 8 * _MOST_CELLS:
-                raise ValueError(f"{name} has {math.prod(shape):,} numbers, {_MOST_CELLS:,} are the most")
+            if math.prod(shape) * dtype.itemsize > 8 * _MAX_CELLS:
+                raise ValueError(f"{name} has {math.prod(shape):,} numbers, {_MAX_CELLS:,} are the most")
 
 
-def _same(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+def _identity(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
     return lon, lat
 
 
-def _line(error: BaseException) -> str:
+def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split())[:160] or type(error).__name__
 
 
-def outside(dem: Dem) -> str:
+def describe_coverage(dem: Dem) -> str:
     """Say over what a height model reaches, for a message."""
     west, south, east, north = dem.extent
     if dem.geographic:
-        return f"{dem.path.name} reaches over {in_words(dem.extent)}"
-    return f"{dem.path.name} reaches over x {west:,.0f} to {east:,.0f}, y {south:,.0f} to {north:,.0f} m"
+        return f"{dem.path.name} covers {format_bbox(dem.extent)}"
+    return f"{dem.path.name} covers x {west:,.0f} to {east:,.0f}, y {south:,.0f} to {north:,.0f} m"

@@ -57,17 +57,17 @@ class LocalFrame:
         return lon, self.lat_deg + np.asarray(y, dtype=np.float64) / north
 
 
-def checked_bbox(bbox: Bbox) -> Bbox:
+def check_bbox(bbox: Bbox) -> Bbox:
     """Refuse what is no bounding box; a `UsageError` says what it should be."""
     west, south, east, north = bbox
-    said = " ".join(f"{v:g}" for v in bbox)
+    text = " ".join(f"{v:g}" for v in bbox)
     if not all(math.isfinite(v) for v in bbox) or not (west < east and south < north):
         raise UsageError(
-            f"--bbox {said}: must be WEST SOUTH EAST NORTH, degrees, west below east and south below north"
+            f"--bbox {text}: must be WEST SOUTH EAST NORTH, degrees, west below east and south below north"
         )
     if not (west >= -180 and east <= 180 and south >= -_POLE_DEG and north <= _POLE_DEG):
         raise UsageError(
-            f"--bbox {said}: degrees of longitude reach from -180 to 180, of latitude here from -{_POLE_DEG:g} to "
+            f"--bbox {text}: degrees of longitude reach from -180 to 180, of latitude here from -{_POLE_DEG:g} to "
             f"{_POLE_DEG:g}; WEST SOUTH EAST NORTH is the order"
         )
     return bbox
@@ -80,7 +80,7 @@ def size_m(bbox: Bbox) -> tuple[float, float]:
     return float(x1 - x0), float(y1 - y0)
 
 
-def tiles(bbox: Bbox, tile_m: float) -> list[Bbox]:
+def tile_bboxes(bbox: Bbox, tile_m: float) -> list[Bbox]:
     """Cut a bounding box into squares, from its south-west corner by rows running north; the rest is not used."""
     wide, deep = size_m(bbox)
     east, north = LocalFrame.about(bbox).metres_a_degree
@@ -96,6 +96,6 @@ def tiles(bbox: Bbox, tile_m: float) -> list[Bbox]:
     ]
 
 
-def in_words(bbox: Bbox) -> str:
+def format_bbox(bbox: Bbox) -> str:
     """Write a bounding box for a message, as ``--bbox`` takes it."""
     return " ".join(f"{v:.4f}" for v in bbox)

@@ -23,7 +23,7 @@ from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.gltf import read_gltf
 from aerialdojo_gen.imports.mesh_materials import mesh_materials
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, RawSurface, joined
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, merge_nodes
 from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, SiblingFiles, exit_status, mismatch, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -44,16 +44,16 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
         raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
-    if unlike := _unlike(path):
-        raise AssetError(f"{path}: {unlike}")
+    if fault := _type_mismatch(path):
+        raise AssetError(f"{path}: {fault}")
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
-        arguments = [str(out), str(texture_px)]
-        read_in_sandbox(__name__, path, arguments, max_memory_bytes, "simplify or split the mesh")
-        return unpacked(out)
+        args = [str(out), str(texture_px)]
+        read_in_sandbox(__name__, path, args, max_memory_bytes, "simplify or split the mesh")
+        return unpack_nodes(out)
 
 
-def _unlike(path: Path) -> str:
+def _type_mismatch(path: Path) -> str:
     try:
         return mismatch(path, SUFFIXES)
     except OSError as error:
@@ -92,18 +92,18 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
 
         return read_3ds(path.read_bytes())
     if suffix in (".glb", ".gltf"):
-        look_over_glb(path)
+        check_glb(path)
         return read_gltf(path.read_bytes(), SiblingFiles(path).get, texture_px)
     if suffix in (".dae", ".fbx"):
-        from aerialdojo_gen.imports.assimp import read_by_assimp
+        from aerialdojo_gen.imports.assimp import read_assimp
 
-        return read_by_assimp(path, SiblingFiles(path).get, texture_px)
+        return read_assimp(path, SiblingFiles(path).get, texture_px)
     import trimesh
 
     # What the file refers to comes through a resolver that stays in its folder.
-    beside = _beside(path)
+    siblings = _resolver(path)
     scene = trimesh.load_scene(
-        path, file_type=suffix[1:], resolver=beside, process=False, split_objects=True, group_material=True,
+        path, file_type=suffix[1:], resolver=siblings, process=False, split_objects=True, group_material=True,
         maintain_order=False,
     )  # fmt: skip
     shown = []
@@ -113,25 +113,27 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
         if isinstance(body, trimesh.Trimesh):
             vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
             shown.append((str(name), body, vertices))
-    skins = mesh_materials([body for _, body, _ in shown], beside, texture_px)
+    materials = mesh_materials([body for _, body, _ in shown], siblings, texture_px)
     named = _objects_of(path) if suffix == ".obj" else {}
     nodes: dict[str, list[RawNode]] = {}
-    for (name, body, vertices), skin in zip(shown, skins, strict=True):
+    for (name, body, vertices), material in zip(shown, materials, strict=True):
         label = "" if suffix in (".stl", ".ply") else _object_of(name, named, path)
         faces = np.asarray(body.faces, dtype=np.int64)
-        made = RawNode(label, vertices, faces, skin.colours, skin.surface, skin.corners, skin.surfaces)
+        made = RawNode(
+            label, vertices, faces, material.colours, material.surface, material.corners, material.surfaces
+        )
         nodes.setdefault(label, []).append(made)
-    return [bodies[0] if len(bodies) == 1 else joined(bodies[0].name, bodies) for bodies in nodes.values()]
+    return [bodies[0] if len(bodies) == 1 else merge_nodes(bodies[0].name, bodies) for bodies in nodes.values()]
 
 
 def _objects_of(path: Path) -> dict[str, str]:
     """Read the objects of an OBJ file: by the names that trimesh gives to what of one is of one material."""
     named, thing, material = {}, "", ""
-    for key, told in re.findall(rb"^(o|usemtl)[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE):
+    for key, value in re.findall(rb"^(o|usemtl)[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE):
         if key == b"o":
-            thing = told.decode("utf-8", "replace")
+            thing = value.decode("utf-8", "replace")
         else:
-            material = told.decode("utf-8", "replace")
+            material = value.decode("utf-8", "replace")
         named["_".join(word for word in (thing, material) if word)] = thing
     return named
 
@@ -146,7 +148,7 @@ def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
     return named.get(name, other)
 
 
-def _beside(path: Path) -> Any:
+def _resolver(path: Path) -> Any:
     import trimesh
 
     class Resolver(SiblingFiles, trimesh.resolvers.Resolver):
@@ -155,7 +157,7 @@ def _beside(path: Path) -> Any:
     return Resolver(path)
 
 
-def look_over_glb(path: Path) -> None:
+def check_glb(path: Path) -> None:
     """Refuse a GLB or glTF file whose arrays would be far larger than the file, before any of them is made.
 
     An accessor without a buffer view is all zeros and costs the file nothing, and several nodes may show one mesh: a
@@ -191,28 +193,28 @@ def look_over_glb(path: Path) -> None:
 def _glb_json(file: BinaryIO) -> bytes:
     head = file.read(20)
     if len(head) < 20 or head[:4] != b"glTF":
-        raise AssetError("is no GLB file")
+        raise AssetError("is not a GLB file")
     version, _, length, kind = struct.unpack("<IIII", head[4:])
     if version != 2 or kind != 0x4E4F534A or length > MAX_FILE_BYTES // 4:
-        raise AssetError("is no GLB 2 file")
+        raise AssetError("is not a GLB 2 file")
     return file.read(length)
 
 
 def _pack(nodes: list[RawNode], out: Path) -> None:
     arrays: dict[str, Any] = {"names": np.array([n.name for n in nodes], dtype=np.str_)}
-    shelves = {n.surfaces: None for n in nodes}
-    place = {shelf: k for k, shelf in enumerate(shelves)}
-    arrays["shelves"] = np.array([place[n.surfaces] for n in nodes])
-    said = []
-    for shelf in shelves:
-        said.append([{"name": s.name, "colour": s.colour, "double_sided": s.double_sided, "unlit": s.unlit,
-                      "notes": s.notes} for s in shelf])  # fmt: skip
-        for k, s in enumerate(shelf):
-            key = f"{place[shelf]}-{k}"
+    surface_sets = {n.surfaces: None for n in nodes}
+    place = {surface_set: k for k, surface_set in enumerate(surface_sets)}
+    arrays["surface_sets"] = np.array([place[n.surfaces] for n in nodes])
+    descriptions = []
+    for surface_set in surface_sets:
+        descriptions.append([{"name": s.name, "colour": s.colour, "double_sided": s.double_sided, "unlit": s.unlit,
+                      "notes": s.notes} for s in surface_set])  # fmt: skip
+        for k, s in enumerate(surface_set):
+            key = f"{place[surface_set]}-{k}"
             arrays |= {f"t{key}": s.texture} if s.texture is not None else {}
             arrays |= {f"m{key}": s.mask} if s.mask is not None else {}
             arrays |= {f"j{key}": np.frombuffer(s.jpeg, dtype=np.uint8)} if s.jpeg else {}
-    arrays["said"] = np.frombuffer(json.dumps(said).encode(), dtype=np.uint8)
+    arrays["surfaces"] = np.frombuffer(json.dumps(descriptions).encode(), dtype=np.uint8)
     for k, node in enumerate(nodes):
         arrays |= {f"v{k}": node.vertices, f"f{k}": node.faces, f"c{k}": node.colours}
         arrays |= {f"s{k}": node.surface} if node.surface is not None else {}
@@ -220,32 +222,33 @@ def _pack(nodes: list[RawNode], out: Path) -> None:
     np.savez(out, **arrays)
 
 
-def unpacked(path: Path) -> list[RawNode]:
+def unpack_nodes(path: Path) -> list[RawNode]:
     """Return the nodes that `read_into` wrote."""
     with np.load(path, allow_pickle=False) as file:
 
-        def got(key: str) -> Any:
+        def optional(key: str) -> Any:
             return file[key] if key in file.files else None
 
-        shelves = []
-        for n, shelf in enumerate(json.loads(file["said"].tobytes())):
+        surface_sets = []
+        for n, surface_set in enumerate(json.loads(file["surfaces"].tobytes())):
             surfaces = []
-            for k, said in enumerate(shelf):
-                red, green, blue = said["colour"]
-                jpeg = got(f"j{n}-{k}")
+            for k, item in enumerate(surface_set):
+                red, green, blue = item["colour"]
+                jpeg = optional(f"j{n}-{k}")
                 surfaces.append(RawSurface(
-                    said["name"], (red, green, blue), got(f"t{n}-{k}"), got(f"m{n}-{k}"), said["double_sided"],
-                    said["unlit"], b"" if jpeg is None else jpeg.tobytes(), tuple(said["notes"]),
+                    item["name"], (red, green, blue), optional(f"t{n}-{k}"), optional(f"m{n}-{k}"),
+                    item["double_sided"], item["unlit"], b"" if jpeg is None else jpeg.tobytes(),
+                    tuple(item["notes"]),
                 ))  # fmt: skip
-            shelves.append(tuple(surfaces))
+            surface_sets.append(tuple(surfaces))
         return [
             RawNode(
-                str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"], got(f"s{k}"), got(f"u{k}"),
-                shelves[int(file["shelves"][k])],
+                str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"], optional(f"s{k}"), optional(f"u{k}"),
+                surface_sets[int(file["surface_sets"][k])],
             )
             for k, name in enumerate(file["names"])
         ]  # fmt: skip
 
 
 if __name__ == "__main__":
-    raise SystemExit(exit_status(lambda given: read_into(Path(given[0]), Path(given[1]), int(given[2]))))
+    raise SystemExit(exit_status(lambda args: read_into(Path(args[0]), Path(args[1]), int(args[2]))))

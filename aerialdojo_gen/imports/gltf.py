@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.imports.pictures import CUTOFF, TEXTURE_PX, Paint, srgb_of, surfaces_of
-from aerialdojo_gen.imports.raw import RawNode, joined, no_corners, plain
+from aerialdojo_gen.imports.pictures import CUTOFF, TEXTURE_PX, SourceMaterial, decode_surfaces, to_srgb
+from aerialdojo_gen.imports.raw import RawNode, default_colours, empty_corners, merge_nodes
 
 Floats = NDArray[np.float64]
 Resolve = Callable[[str], bytes]
@@ -27,7 +27,7 @@ _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 # Writers that put sRGB into vertex colours, which the format means to be linear.
-_CARELESS = ("trimesh", "meshlab", "open3d")
+_SRGB_WRITERS = ("trimesh", "meshlab", "open3d")
 
 
 def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
@@ -38,18 +38,18 @@ def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> lis
 class _File:
     def __init__(self, raw: bytes, resolve: Resolve, texture_px: int) -> None:
         self._resolve = resolve
-        self._document, self._own = _opened(raw)
+        self._document, self._own = _parse(raw)
         self._buffers: dict[int, memoryview] = {}
         writer = str(self._document.get("asset", {}).get("generator", "")).lower()
-        self._srgb_colours = any(word in writer for word in _CARELESS)
+        self._srgb_colours = any(word in writer for word in _SRGB_WRITERS)
         materials = self._document.get("materials", [])
-        surfaces, index = surfaces_of([self._paint(m, k) for k, m in enumerate(materials)], texture_px)
+        surfaces, index = decode_surfaces([self._source_material(m, k) for k, m in enumerate(materials)], texture_px)
         self._surfaces, self._index = surfaces, index
 
     def nodes(self) -> list[RawNode]:
         """Return the nodes that show a mesh, in the order of the file's tree."""
         document, out = self._document, []
-        for k, world in self._placed():
+        for k, world in self._world_transforms():
             node = document["nodes"][k]
             if "mesh" not in node:
                 continue
@@ -57,10 +57,10 @@ class _File:
             name = str(node.get("name") or mesh.get("name") or "")
             bodies = [b for p in mesh["primitives"] for b in [self._primitive(p, name, world)] if len(b.faces)]
             if bodies:
-                out.append(bodies[0] if len(bodies) == 1 else joined(name, bodies))
+                out.append(bodies[0] if len(bodies) == 1 else merge_nodes(name, bodies))
         return out
 
-    def _placed(self) -> Iterator[tuple[int, Floats]]:
+    def _world_transforms(self) -> Iterator[tuple[int, Floats]]:
         nodes = self._document.get("nodes", [])
         scenes = self._document.get("scenes", [])
         if scenes:
@@ -68,15 +68,15 @@ class _File:
         else:
             children = {c for n in nodes for c in n.get("children", ())}
             roots = [k for k in range(len(nodes)) if k not in children]
-        waiting, seen = [(int(k), np.eye(4)) for k in reversed(roots)], set()
-        while waiting:
-            k, parent = waiting.pop()
+        stack, seen = [(int(k), np.eye(4)) for k in reversed(roots)], set()
+        while stack:
+            k, parent = stack.pop()
             if k in seen or not 0 <= k < len(nodes):
                 continue
             seen.add(k)
             world = parent @ _local(nodes[k])
             yield k, world
-            waiting += [(int(child), world) for child in reversed(nodes[k].get("children", ()))]
+            stack += [(int(child), world) for child in reversed(nodes[k].get("children", ()))]
 
     def _primitive(self, primitive: dict[str, Any], name: str, world: Floats) -> RawNode:
         attributes = primitive["attributes"]
@@ -91,7 +91,7 @@ class _File:
             raise AssetError("is a damaged glTF file: a triangle beyond its vertices")
         material = primitive.get("material")
         surface = np.full(m, -1 if material is None else self._index[material], dtype=np.int32)
-        colours, corners = plain(m), no_corners(m)
+        colours, corners = default_colours(m), empty_corners(m)
         if material is not None:
             shown = self._surfaces[self._index[material]]
             colours = np.tile(np.array(shown.colour, dtype=np.uint8), (m, 1))
@@ -103,7 +103,7 @@ class _File:
             factor = self._factor(material)
             if factor is not None:
                 light = light * factor
-            own = 255.0 * (np.clip(light, 0.0, 1.0) if self._srgb_colours else srgb_of(light))
+            own = 255.0 * (np.clip(light, 0.0, 1.0) if self._srgb_colours else to_srgb(light))
             if (own < 254.5).any():
                 corners[..., 2:] = np.rint(own[faces])
                 colours = np.rint(own[faces].mean(axis=1)).astype(np.uint8)
@@ -113,10 +113,10 @@ class _File:
         """Return what vertex colours are multiplied by, linear; None for white."""
         if material is None:
             return None
-        factor = np.array(_base(self._document["materials"][material])[0][:3], dtype=np.float64)
+        factor = np.array(_base_colour(self._document["materials"][material])[0][:3], dtype=np.float64)
         if (factor == 1.0).all():
             return None
-        return srgb_of(factor) if self._srgb_colours else factor
+        return to_srgb(factor) if self._srgb_colours else factor
 
     def _faces(self, primitive: dict[str, Any], n: int) -> NDArray[np.int64]:
         mode = primitive.get("mode", _TRIANGLES)
@@ -137,7 +137,7 @@ class _File:
     def _texture_coordinates(
         self, material: dict[str, Any], attributes: dict[str, int]
     ) -> NDArray[np.float32] | None:
-        source = _base(material)[1]
+        source = _base_colour(material)[1]
         if source is None:
             return None
         moved = source.get("extensions", {}).get("KHR_texture_transform", {})
@@ -154,12 +154,12 @@ class _File:
         # The format's v points down.
         return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)
 
-    def _paint(self, material: dict[str, Any], k: int) -> Paint:
-        factor, source = _base(material)
+    def _source_material(self, material: dict[str, Any], k: int) -> SourceMaterial:
+        factor, source = _base_colour(material)
         extensions = material.get("extensions", {})
         image, missing = (None, "") if source is None else self._image(source["index"])
-        red, green, blue = srgb_of(np.array(factor[:3], dtype=np.float64)).tolist()
-        return Paint(
+        red, green, blue = to_srgb(np.array(factor[:3], dtype=np.float64)).tolist()
+        return SourceMaterial(
             str(material.get("name") or f"material {k}"), (red, green, blue), image, missing,
             alpha=str(material.get("alphaMode", "OPAQUE")).lower(),
             cutoff=float(material.get("alphaCutoff", CUTOFF)) if material.get("alphaMode") == "MASK" else CUTOFF,
@@ -179,11 +179,11 @@ class _File:
             return bytes(self._view(image["bufferView"])), ""
         uri = str(image["uri"])
         try:
-            return self._fetched(uri), ""
+            return self._fetch(uri), ""
         except FileNotFoundError:
             return None, unquote(uri)[:80]
 
-    def _fetched(self, uri: str) -> bytes:
+    def _fetch(self, uri: str) -> bytes:
         if uri.startswith("data:"):
             return base64.b64decode(uri.split(",", 1)[1])
         return self._resolve(unquote(uri))
@@ -199,12 +199,12 @@ class _File:
             values = np.zeros((count, width), dtype=dtype)
         if "sparse" in entry:
             sparse, n = entry["sparse"], int(entry["sparse"]["count"])
-            told = sparse["indices"]
-            kind = np.dtype(_DTYPES[told["componentType"]])
-            rows = self._strided(told["bufferView"], int(told.get("byteOffset", 0)), kind, n, 1).ravel()
-            told = sparse["values"]
+            part = sparse["indices"]
+            kind = np.dtype(_DTYPES[part["componentType"]])
+            rows = self._strided(part["bufferView"], int(part.get("byteOffset", 0)), kind, n, 1).ravel()
+            part = sparse["values"]
             values = values.copy()
-            values[rows] = self._strided(told["bufferView"], int(told.get("byteOffset", 0)), dtype, n, width)
+            values[rows] = self._strided(part["bufferView"], int(part.get("byteOffset", 0)), dtype, n, width)
         if entry.get("normalized") and dtype.kind in "iu":
             return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return values
@@ -232,7 +232,7 @@ class _File:
             entry = self._document["buffers"][k]
             if "uri" in entry:
                 try:
-                    self._buffers[k] = memoryview(self._fetched(str(entry["uri"])))
+                    self._buffers[k] = memoryview(self._fetch(str(entry["uri"])))
                 except FileNotFoundError:
                     raise AssetError(f"refers to {str(entry['uri'])[:80]}, which is not beside it") from None
             else:
@@ -240,11 +240,11 @@ class _File:
         return self._buffers[k]
 
 
-def _opened(raw: bytes) -> tuple[dict[str, Any], memoryview]:
+def _parse(raw: bytes) -> tuple[dict[str, Any], memoryview]:
     if raw[:4] != b"glTF":
         document = loads_json(raw, finite=False)
         if not isinstance(document, dict):
-            raise AssetError("is no glTF file")
+            raise AssetError("is not a glTF file")
         return document, memoryview(b"")
     (length,) = struct.unpack_from("<I", raw, 12)
     document = loads_json(raw[20 : 20 + length], finite=False)
@@ -255,7 +255,7 @@ def _opened(raw: bytes) -> tuple[dict[str, Any], memoryview]:
     return document, rest[8 : 8 + size]
 
 
-def _base(material: dict[str, Any]) -> tuple[list[float], dict[str, Any] | None]:
+def _base_colour(material: dict[str, Any]) -> tuple[list[float], dict[str, Any] | None]:
     """Return a material's colour, linear, and its texture."""
     old = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
     if old is not None:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
-from aerialdojo_gen.imports.cutting import Region, bodies_of, unique_rows
-from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, photographed
+from aerialdojo_gen.imports.cutting import Region, connected_bodies, unique_rows
+from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
 from aerialdojo_gen.imports.naming import Naming
-from aerialdojo_gen.imports.raw import RawNode, cut_to, in_place_order, joined
+from aerialdojo_gen.imports.raw import RawNode, clip_node, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
-from aerialdojo_gen.imports.surfaces import SKY, decided, describe, domes_of
+from aerialdojo_gen.imports.surfaces import SKY, classify_surfaces, describe_surfaces, find_domes
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -29,18 +29,18 @@ Floats = NDArray[np.float64]
 LARGEST_M = 2000.0
 SMALLEST_M = 5.0
 # Cells of half a metre that planning keeps a few bytes each of.
-_MOST_CELLS = 150e6
+_MAX_CELLS = 150e6
 _MARGIN_M = 5.0
 _HEADROOM_M = 6.0
 _LOWEST_CEILING_M = 12.0
 _GROUND_COVER = 0.97
 _CLUTTER_M = 0.5
-_MOST_INSTANCES = 3000
-_LEAST_AREA_M2 = 1e-9
+_MAX_INSTANCES = 3000
+_MIN_AREA_M2 = 1e-9
 _LEVEL_SHARE = 0.7
 _WELD_M = 1e-4
 _GROUND = (122, 132, 108)
-_MOST_NOTES = 8
+_MAX_NOTES = 8
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Repairs:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SourceMesh:
     """A foreign mesh in metres, z up, mended, before any of it is cut away."""
 
     bodies: list[RawNode]  # What stands there, and the skies around it; in the order of their places
@@ -65,18 +65,18 @@ class Place:
     repairs: Repairs  # What was mended
 
     @classmethod
-    def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> Place:
+    def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> SourceMesh:
         """Turn, scale and mend the nodes of a file; errors as of `import_mesh`."""
         check_options(up, scale)
         repairs = Repairs()
-        bodies = [b for node in nodes for b in [_sound(_turned(node, up, scale), repairs)] if len(b.faces)]
+        bodies = [b for node in nodes for b in [_repair(_reorient(node, up, scale), repairs)] if len(b.faces)]
         if not bodies:
-            raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+            raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
         # Lines of repairs, too, must not depend on the order in which a reader gives the nodes.
         repairs.lines.sort()
-        bodies = in_place_order(bodies)
-        called = [naming.told(b.name).category if naming else "" for b in bodies]
-        domes = domes_of(bodies, called)
+        bodies = sort_by_position(bodies)
+        table_names = [naming.from_table(b.name).category if naming else "" for b in bodies]
+        domes = find_domes(bodies, table_names)
         rest = [b for k, b in enumerate(bodies) if k not in domes]
         return cls(rest, [bodies[k] for k in domes], repairs)
 
@@ -90,13 +90,13 @@ class Place:
         """Upper corner, (3,) float64, metres."""
         return _bounds(self.bodies)[1]
 
-    def within(self, region: Region) -> Place:
+    def within(self, region: Region) -> SourceMesh:
         """Cut away what lies outside a region; AssetError where nothing is left, with what lies where."""
-        cut = [_sound(cut_to(b, region), Repairs()) for b in self.bodies]
+        cut = [_repair(clip_node(b, region), Repairs()) for b in self.bodies]
         kept = [b for b in cut if len(b.faces)]
         if not kept:
-            raise AssetError(f"{region.said}: nothing of the mesh lies there: {describe_extent(self.bodies)}")
-        return Place(kept, self.domes, self.repairs)
+            raise AssetError(f"{region.option}: contains no part of the mesh: {describe_extent(self.bodies)}")
+        return SourceMesh(kept, self.domes, self.repairs)
 
 
 def describe_extent(bodies: Sequence[RawNode]) -> str:
@@ -143,19 +143,19 @@ def import_mesh(
 
     Returns the scene and what was repaired.
     """
-    place = Place.of(nodes, up, scale, naming)
-    return settled(name, place, region_of(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
+    source = SourceMesh.of(nodes, up, scale, naming)
+    return make_scene(name, source, make_region(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
 
 
-def region_of(
+def make_region(
     crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
 ) -> Region | None:
     """Return the part that is kept; UsageError for two of them, or one without an area."""
     if crop_m is not None and box_m is not None:
-        raise UsageError("--crop and --box both say what to keep: give one of them")
+        raise UsageError("--crop and --box are mutually exclusive")
     numbers = crop_m or box_m or ()
     if not all(math.isfinite(v) and abs(v) < 1e7 for v in numbers):
-        raise UsageError("--crop and --box take numbers of metres")
+        raise UsageError("--crop and --box take finite numbers of metres")
     if crop_m is not None:
         if crop_m[2] <= 0:
             raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
@@ -167,9 +167,9 @@ def region_of(
     return None
 
 
-def settled(
+def make_scene(
     name: str,
-    place: Place,
+    source: SourceMesh,
     region: Region | None = None,
     *,
     ceiling_m: float | None = None,
@@ -179,39 +179,39 @@ def settled(
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a place, or of the part of it in `region`; returns the scene and what was repaired."""
     check_options(None, None, light)
-    repairs = Repairs(list(place.repairs.lines))
-    part = place if region is None else place.within(region)
+    repairs = Repairs(list(source.repairs.lines))
+    part = source if region is None else source.within(region)
     bodies = part.bodies
     low, high = part.low, part.high
     _check_extent(high - low, bodies)
-    bodies, apart = split_components(bodies)
-    repairs.lines += apart.lines()
+    bodies, split_stats = split_components(bodies)
+    repairs.lines += split_stats.lines()
     shift = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]) if origin_m is None else origin_m
     repairs.origin_m = (float(shift[0]), float(shift[1]), float(shift[2]))
-    bodies = _merged_clutter(_moved(in_place_order(bodies), -shift))
-    domes = _moved(part.domes, -shift)
-    skinner = MaterialBuilder(light == "baked" or (light == "auto" and photographed(bodies)))
-    skinner.scale([*bodies, *domes])
-    parts = skinner.materials
-    dressed = [(b, made) for b in bodies for made in [_parts(b, skinner, repairs)] if made]
-    instances = _named(dressed, naming or Naming(), parts)
+    bodies = _merged_clutter(_translate(sort_by_position(bodies), -shift))
+    domes = _translate(part.domes, -shift)
+    builder = MaterialBuilder(light == "baked" or (light == "auto" and is_photographic(bodies)))
+    builder.measure_texture_scales([*bodies, *domes])
+    parts = builder.materials
+    built = [(b, made) for b in bodies for made in [_parts(b, builder, repairs)] if made]
+    instances = _make_instances(built, naming or Naming(), parts)
     if not instances:
-        raise AssetError("no triangle is left after repair: the mesh is empty or degenerate")
+        raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
     instances = [
-        replace(instance, surface="solid" if bodies_of(body.faces, len(body.vertices))[1].all() else "sheet")
-        for instance, (body, _) in zip(instances, dressed, strict=True)
+        replace(instance, surface="solid" if connected_bodies(body.faces, len(body.vertices))[1].all() else "sheet")
+        for instance, (body, _) in zip(instances, built, strict=True)
     ]
-    called = {instance.node: body.name for instance, (body, _) in zip(instances, dressed, strict=True)}
+    source_names = {instance.node: body.name for instance, (body, _) in zip(instances, built, strict=True)}
     backdrop = tuple(
-        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, skinner, Repairs()), surface="dome")
+        Instance(f"{SKY}_{k:04d}", SKY, "", {}, _parts(dome, builder, Repairs()), surface="dome")
         for k, dome in enumerate(domes)
     )
-    _tell_textures([*bodies, *domes], skinner, light, repairs)
+    _report_textures([*bodies, *domes], builder, light, repairs)
     low, high = low - shift, high - shift
     cover = _ground_cover(instances, low, high)
     if cover < _GROUND_COVER:
         instances.insert(0, _ground_plane(low, high, parts))
-        repairs.lines.append(f"level ground laid under it (the mesh covers {cover:.0%} of its extent)")
+        repairs.lines.append(f"ground plane added (the mesh covers {cover:.0%} of its extent)")
     top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
     bounds = np.array(
         [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
@@ -220,23 +220,25 @@ def settled(
         # What is cut open at the border is shut by the end of the flight volume.
         bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
         bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
-    scene = decided(Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), called)
-    repairs.lines += describe(scene)
+    scene = classify_surfaces(
+        Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), source_names
+    )
+    repairs.lines += describe_surfaces(scene)
     return replace(scene, imported=False), repairs
 
 
-def _moved(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
-    return [b.placed(b.vertices + by_m) for b in bodies]
+def _translate(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
+    return [b.with_vertices(b.vertices + by_m) for b in bodies]
 
 
-def _turned(node: RawNode, up: str, scale: float) -> RawNode:
+def _reorient(node: RawNode, up: str, scale: float) -> RawNode:
     v = node.vertices * scale
     if up == "y":
         v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
-    return node.placed(v)
+    return node.with_vertices(v)
 
 
-def _sound(node: RawNode, repairs: Repairs) -> RawNode:
+def _repair(node: RawNode, repairs: Repairs) -> RawNode:
     """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
     faces = node.faces
     inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
@@ -244,16 +246,16 @@ def _sound(node: RawNode, repairs: Repairs) -> RawNode:
     ok = np.array(inside)
     ok[inside] = finite[faces[inside]].all(axis=1)
     repairs.add(int((~ok).sum()), f"triangles of {node.name or 'the mesh'} with no place (NaN, infinite) dropped")
-    node = node.some(ok)
+    node = node.select_faces(ok)
     used, faces = np.unique(node.faces, return_inverse=True)
     vertices = node.vertices[used]
     if len(vertices):
         first, same, _ = unique_rows(*np.round(vertices / _WELD_M).T)
         vertices, faces = vertices[first], same[faces.reshape(-1)]
     faces = faces.reshape(-1, 3).astype(np.int64)
-    solid = _areas(vertices, faces) > _LEAST_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
+    solid = _areas(vertices, faces) > _MIN_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
-    return node.placed(vertices, faces).some(solid)
+    return node.with_vertices(vertices, faces).select_faces(solid)
 
 
 def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
@@ -269,7 +271,7 @@ def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:
 def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
     wide = float(max(size[0], size[1]))
     text = f"the mesh is {size_text(size)}"
-    if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MOST_CELLS:
+    if wide > LARGEST_M or math.prod(2 * (s + 2 * _MARGIN_M) for s in size) > _MAX_CELLS:
         raise AssetError(
             f"{text}, too large to plan in: --scale 0.01 if it is in centimetres, --crop X Y RADIUS or "
             f"--box X0 Y0 X1 Y1 for a part, --tiles 200 for all of it in parts; {describe_extent(bodies)}"
@@ -285,15 +287,15 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
     """Make one body of all that is too small to be a thing of its own."""
     size = np.array([np.linalg.norm(b.vertices.max(axis=0) - b.vertices.min(axis=0)) for b in bodies])
     small = (size < _CLUTTER_M) & np.array([not b.name for b in bodies])
-    if len(bodies) - small.sum() > _MOST_INSTANCES:
-        small |= size < np.sort(size)[-_MOST_INSTANCES]
+    if len(bodies) - small.sum() > _MAX_INSTANCES:
+        small |= size < np.sort(size)[-_MAX_INSTANCES]
     if small.sum() < 2:
         return bodies
     scraps = [b for b, s in zip(bodies, small, strict=True) if s]
-    return [*(b for b, s in zip(bodies, small, strict=True) if not s), joined("clutter", scraps)]
+    return [*(b for b, s in zip(bodies, small, strict=True) if not s), merge_nodes("clutter", scraps)]
 
 
-def _parts(body: RawNode, skinner: MaterialBuilder, repairs: Repairs) -> tuple[Part, ...]:
+def _parts(body: RawNode, builder: MaterialBuilder, repairs: Repairs) -> tuple[Part, ...]:
     """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
     mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
     closed = mesh.is_watertight and mesh.is_winding_consistent
@@ -301,12 +303,12 @@ def _parts(body: RawNode, skinner: MaterialBuilder, repairs: Repairs) -> tuple[P
         corners = None if body.corners is None else body.corners[:, ::-1]
         body = replace(body, faces=body.faces[:, ::-1], corners=corners)
         repairs.lines.append(f"{body.name or 'a component'} was inside out")
-    return skinner.parts(body, double_sided=not closed)
+    return builder.parts(body, double_sided=not closed)
 
 
-def _tell_textures(bodies: Sequence[RawNode], skinner: MaterialBuilder, light: str, repairs: Repairs) -> None:
+def _report_textures(bodies: Sequence[RawNode], builder: MaterialBuilder, light: str, repairs: Repairs) -> None:
     """Say what became of the textures."""
-    shown = [m for m in skinner.materials.values() if m.texture is not None]
+    shown = [m for m in builder.materials.values() if m.texture is not None]
     if shown:
         sizes = {m.name.split(",")[0]: m.texture.shape[:2] for m in shown if m.texture is not None}
         most = max(sizes.values(), key=lambda size: size[0] * size[1])
@@ -315,11 +317,11 @@ def _tell_textures(bodies: Sequence[RawNode], skinner: MaterialBuilder, light: s
         other = "" if light != "auto" else f" (--light {'sun' if unlit else 'baked'} for the other)"
         repairs.add(len(sizes), f"textures, the largest {most[1]} x {most[0]} pixels, {how}{other}")
     notes = {note: None for b in bodies for s in b.surfaces for note in s.notes}
-    repairs.lines += [*notes][:_MOST_NOTES]
-    repairs.add(max(len(notes) - _MOST_NOTES, 0), "more textures like that")
+    repairs.lines += [*notes][:_MAX_NOTES]
+    repairs.add(max(len(notes) - _MAX_NOTES, 0), "more notes on textures")
 
 
-def _named(
+def _make_instances(
     bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
 ) -> list[Instance]:
     """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
@@ -331,13 +333,13 @@ def _named(
     for body, parts in bodies:
         if not parts:
             continue
-        called = naming.called(body.name)
+        name = naming.name_of(body.name)
         ground = len(bodies) > 1 and _is_terrain(body, most - least)
-        category = called.category or ("terrain" if ground and body.name != "clutter" else _category(body))
-        looks = _looks(body, parts, materials, tall, low)
-        looks |= (_form(body, looks) if category == UNKNOWN else {}) | called.attributes
+        category = name.category or ("terrain" if ground and body.name != "clutter" else _category(body))
+        appearance = _appearance(body, parts, materials, tall, low)
+        appearance |= (_shape_attributes(body, appearance) if category == UNKNOWN else {}) | name.attributes
         k = counts[category] = counts.get(category, -1) + 1
-        out.append(Instance(f"{category}_{k:04d}", category, "", looks, parts))
+        out.append(Instance(f"{category}_{k:04d}", category, "", appearance, parts))
     return out
 
 
@@ -349,7 +351,7 @@ def _is_terrain(body: RawNode, extent: Floats) -> bool:
     a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     level = np.abs(normal[:, 2]).sum() >= _LEVEL_SHARE * np.linalg.norm(normal, axis=1).sum()
-    return bool(level) and not bodies_of(body.faces, len(body.vertices))[1].all()
+    return bool(level) and not connected_bodies(body.faces, len(body.vertices))[1].all()
 
 
 def _category(body: RawNode) -> str:
@@ -359,15 +361,15 @@ def _category(body: RawNode) -> str:
     return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
 
 
-def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
+def _shape_attributes(body: RawNode, appearance: dict[str, str]) -> dict[str, str]:
     """Say the form of what has no name, as nothing else tells it from others: each has one, and a size."""
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
     outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
     if outline.area < 1e-6:
         return {}
-    around = shapely.minimum_rotated_rectangle(outline)
-    filled = outline.area / around.area
-    short, long = sorted(math.dist(around.exterior.coords[k], around.exterior.coords[k + 1]) for k in (0, 1))
+    rectangle = shapely.minimum_rotated_rectangle(outline)
+    filled = outline.area / rectangle.area
+    short, long = sorted(math.dist(rectangle.exterior.coords[k], rectangle.exterior.coords[k + 1]) for k in (0, 1))
     if long > 3.0 * short:
         plan = "long"
     elif long > 1.15 * short:
@@ -376,21 +378,21 @@ def _form(body: RawNode, looks: dict[str, str]) -> dict[str, str]:
         # A disc fills 0.785 of the square around it, an octagon 0.828.
         plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
     rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
-    return {"size": looks.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
+    return {"size": appearance.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
 
 
-def _looks(
+def _appearance(
     body: RawNode, parts: Sequence[Part], materials: dict[str, Material], tall: float, low: float
 ) -> dict[str, str]:
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    looks = {"colour": colour_words(*shown_colours(parts, materials))}
+    appearance = {"colour": colour_words(*shown_colours(parts, materials))}
     if tall > 1.2 * low:
-        looks |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
+        appearance |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
     flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(flat.T) + 1e-9 * np.eye(2)), 0.0))
     if spread[1] > 3.0 * spread[0]:
-        looks["shape"] = "long"
-    return looks
+        appearance["shape"] = "long"
+    return appearance
 
 
 def _ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.text_table import Column, TextTable
-from aerialdojo_gen.imports.cutting import bodies_of
-from aerialdojo_gen.imports.import_mesh import LARGEST_M, Place, describe_extent, size_text
+from aerialdojo_gen.imports.cutting import connected_bodies
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, SourceMesh, describe_extent, size_text
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.mesh import areas
@@ -68,19 +68,19 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
 
 def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming | None) -> Guess:
     """Guess by what stands within sky domes, whose form tells neither axis nor scale of the place."""
-    found = guess(nodes)
-    for up in (found.up, "z" if found.up == "y" else "y"):
-        taken = scale or found.units[0][0]
-        place = Place.of(nodes, up, taken, naming)
-        if place.domes:
+    guessed = guess(nodes)
+    for up in (guessed.up, "z" if guessed.up == "y" else "y"):
+        taken = scale or guessed.units[0][0]
+        source = SourceMesh.of(nodes, up, taken, naming)
+        if source.domes:
             # Back into the file's axes and unit.
-            v = [b.vertices / taken for b in place.bodies]
+            v = [b.vertices / taken for b in source.bodies]
             own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
-            return guess([b.placed(x) for b, x in zip(place.bodies, own, strict=True)])
-    return found
+            return guess([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
+    return guessed
 
 
-def contents(
+def describe_mesh(
     nodes: Sequence[RawNode],
     *,
     up: str | None = None,
@@ -89,43 +89,43 @@ def contents(
     width: int | None = None,
 ) -> list[str]:
     """Say what a file holds, in lines for a terminal."""
-    found = _guess_within_domes(nodes, scale, naming)
-    taken_up, taken_scale = up or found.up, scale or found.units[0][0]
-    place = Place.of(nodes, taken_up, taken_scale, naming)
+    guessed = _guess_within_domes(nodes, scale, naming)
+    taken_up, taken_scale = up or guessed.up, scale or guessed.units[0][0]
+    source = SourceMesh.of(nodes, taken_up, taken_scale, naming)
     naming = naming or Naming()
-    triangles = sum(len(b.faces) for b in (*place.bodies, *place.domes))
-    bodies = [(b, *bodies_of(b.faces, len(b.vertices))) for b in place.bodies]
+    triangles = sum(len(b.faces) for b in (*source.bodies, *source.domes))
+    bodies = [(b, *connected_bodies(b.faces, len(b.vertices))) for b in source.bodies]
     pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)
-    colours = len(np.unique(np.concatenate([b.colours for b in place.bodies]) // 16, axis=0))
-    low, high = place.low, place.high
-    sure = "" if found.up_sure else ", not by much: look at it in a viewer"
+    colours = len(np.unique(np.concatenate([b.colours for b in source.bodies]) // 16, axis=0))
+    low, high = source.low, source.high
+    sure = "" if guessed.up_sure else ", not by much: look at it in a viewer"
     lines = [
         f"{len(nodes):,} node{'s' * (len(nodes) != 1)} with {triangles:,} triangle{'s' * (triangles != 1)} in "
         f"{pieces:,} connected piece{'s' * (pieces != 1)}, {colours:,} colour{'s' * (colours != 1)}",
-        f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {found.up} is the guess)",
-        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {found.units[0][1]}'}: "
+        f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {guessed.up} is the guess)",
+        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {guessed.units[0][1]}'}: "
         f"{size_text(high - low)} (x, y, z)",
         *(
             f"   or: {other:g} if its unit is {unit}: {size_text((high - low) * other / taken_scale)}"
-            for other, unit in found.units
+            for other, unit in guessed.units
             if other != taken_scale
         ),
-        f"there: {describe_extent(place.bodies)}",
+        f"there: {describe_extent(source.bodies)}",
         f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
     ]
     if max(high - low) > LARGEST_M:
         lines.append(
             f"wider than {LARGEST_M:g} m: --tiles 200 makes scenes of its parts, --crop or --box one of a part"
         )
-    lines += [f"dome: {d.name or 'a node without a name'}, {len(d.faces):,} triangles" for d in place.domes]
-    lines += [f"note: {line}" for line in place.repairs.lines]
+    lines += [f"dome: {d.name or 'a node without a name'}, {len(d.faces):,} triangles" for d in source.domes]
+    lines += [f"note: {line}" for line in source.repairs.lines]
     largest = sorted(bodies, key=lambda row: -float(areas(row[0].vertices, row[0].faces.astype(np.int32)).sum()))
     rows = []
     for body, label, closed in largest[:_SHOWN]:
-        called = naming.called(body.name).category.replace("_", " ")
+        name = naming.name_of(body.name).category.replace("_", " ")
         west, east = body.vertices.min(axis=0) + 0.0, body.vertices.max(axis=0) + 0.0  # no minus before a zero
         ranges = [f"{a:.1f} to {b:.1f}" for a, b in zip(west, east, strict=True)]
-        cells = [called[:20] or "-", f"{len(body.faces):,}", f"{int(label.max()) + 1:,}", f"{closed.mean():.0%}"]
+        cells = [name[:20] or "-", f"{len(body.faces):,}", f"{int(label.max()) + 1:,}", f"{closed.mean():.0%}"]
         rows.append((body.name[:24] or "-", [*cells, *ranges]))
     heads = [Column("called", words=True), *map(Column, ("triangles", "pieces", "closed", "x, m", "y, m", "z, m"))]
     lines += ["", *TextTable("node", heads, rows).lines(width)]

@@ -16,7 +16,7 @@ import numpy as np
 from shapely.geometry import LineString, Point, Polygon
 from shapely.ops import linemerge, substring
 
-from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_tags import Tags, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -30,8 +30,8 @@ _CLEAR_M = {"rail": 5.5, "road": 4.7, "water": 3.2, "path": 2.8, "": 2.8}
 _DEPTH_M = {"rail": 1.0, "road": 0.8, "path": 0.45}
 # What a ramp climbs a metre where it has room, and where it has none.
 _GRADE = {"rail": (0.03, 0.08), "road": (0.06, 0.14), "path": (0.1, 0.2)}
-_BESIDE_M, _ALONG = 14.0, math.cos(math.radians(30.0))
-_LONGEST_RAMP_M = 120.0
+_MAX_OFFSET_M, _ALONG = 14.0, math.cos(math.radians(30.0))
+_MAX_RAMP_M = 120.0
 _STATION_M, _ROUND_M = 2.0, 8.0
 _LEAST_M = 4.0
 
@@ -56,7 +56,7 @@ class Bridge:
         s = self.axis.project(Point(x, y))
         return float(np.interp(s, np.linspace(0.0, self.axis.length, len(self.heights_m)), self.heights_m))
 
-    def table(self) -> dict[str, Any]:
+    def to_recipe(self) -> dict[str, Any]:
         """Make the recipe's table."""
         at = np.linspace(0.0, self.axis.length, len(self.heights_m))
         name = next((f.tags["name"] for f in self.members if f.tags.get("name")), "")[:80]
@@ -71,18 +71,18 @@ class Bridge:
 
 
 def bridges(
-    lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, told: Told
+    lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, summary: MapSummary
 ) -> tuple[list[Bridge], list[Feature]]:
     """Find the bridges (metres) that touch the site, lowest first, and cut the lines that lie on them."""
     ways = [f for f in lines if _kind(f.tags) and isinstance(f.shape, LineString) and not below_ground(f.tags)]
-    net = _Net(ways)
+    net = _RoadNetwork(ways)
     out: list[Bridge] = []
     on: dict[int, list[Feature]] = {}
-    clusters = _clusters([f for f in ways if _bridged(f.tags) and f.shape.length >= _LEAST_M])
+    clusters = _clusters([f for f in ways if _is_bridge(f.tags) and f.shape.length >= _LEAST_M])
     for members in clusters:
         if not any(f.shape.intersects(site) for f in members):
             continue
-        bridge, ramps, enough = _raised(members, net, lines, areas, site, ground, out)
+        bridge, ramps, enough = _build_bridge(members, net, lines, areas, site, ground, out)
         if max(bridge.heights_m) < 0.3 and _level(bridge, ground):
             continue
         number = {BRIDGE: str(len(out))}
@@ -92,9 +92,9 @@ def bridges(
             on[id(way)] = [replace(way, shape=shape, tags={**way.tags, **(number if up else {})})
                            for shape, up in pieces]  # fmt: skip
         out.append(bridge)
-        told.add("bridges")
+        summary.add("bridges")
         if not enough:
-            told.add("bridges lower than what passes below them needs: their ramps have no room")
+            summary.add("bridges lower than the required clearance: no room for ramps")
     return out, [one for f in lines for one in on.get(id(f), [f])]
 
 
@@ -107,7 +107,7 @@ def _kind(tags: Tags) -> str:
     return "path" if highway in _PATHS else "road"
 
 
-def _bridged(tags: Tags) -> bool:
+def _is_bridge(tags: Tags) -> bool:
     return tags.get("bridge", "no") not in ("no", "abandoned") and _layer(tags) >= 0
 
 
@@ -120,7 +120,7 @@ def _at(point: Sequence[float]) -> At:
     return round(point[0], 3), round(point[1], 3)
 
 
-class _Net:
+class _RoadNetwork:
     """Which ways meet at which points."""
 
     def __init__(self, ways: Sequence[Feature]) -> None:
@@ -138,7 +138,7 @@ class _Net:
         length = 0.0
         while length < most_m:
             others = [f for f in self._meet[end] if f is not way]
-            if len(others) != 1 or _kind(others[0].tags) != _kind(way.tags) or _bridged(others[0].tags):
+            if len(others) != 1 or _kind(others[0].tags) != _kind(way.tags) or _is_bridge(others[0].tags):
                 break
             way = others[0]
             points = [_at(p) for p in way.shape.coords]
@@ -166,7 +166,7 @@ def _clusters(ways: Sequence[Feature]) -> list[tuple[Feature, ...]]:
 
     for i, a in enumerate(ways):
         for j in range(i):
-            if _layer(a.tags) == _layer(ways[j].tags) and _together(a.shape, ways[j].shape):
+            if _layer(a.tags) == _layer(ways[j].tags) and _same_bridge(a.shape, ways[j].shape):
                 low, high = sorted((root(i), root(j)))
                 group[high] = low
     found: dict[int, list[Feature]] = {}
@@ -175,8 +175,8 @@ def _clusters(ways: Sequence[Feature]) -> list[tuple[Feature, ...]]:
     return [tuple(members) for _, members in sorted(found.items())]
 
 
-def _together(a: LineString, b: LineString) -> bool:
-    if a.distance(b) > _BESIDE_M:
+def _same_bridge(a: LineString, b: LineString) -> bool:
+    if a.distance(b) > _MAX_OFFSET_M:
         return False
     u, v = (np.subtract(line.coords[-1], line.coords[0])[:2] for line in (a, b))
     lengths = float(np.hypot(*u) * np.hypot(*v))
@@ -189,7 +189,7 @@ def _together(a: LineString, b: LineString) -> bool:
     p, q = (np.asarray(line.coords)[:, :2] @ along for line in (a, b))
     overlap = min(p.max(), q.max()) - max(p.min(), q.min())
     aside = abs(float((np.mean(a.coords, axis=0)[:2] - np.mean(b.coords, axis=0)[:2]) @ across))
-    return bool(ends) or (overlap > 0.5 * min(np.ptp(p), np.ptp(q)) and aside < _BESIDE_M)
+    return bool(ends) or (overlap > 0.5 * min(np.ptp(p), np.ptp(q)) and aside < _MAX_OFFSET_M)
 
 
 def _merged(members: Sequence[Feature]) -> LineString:
@@ -204,13 +204,13 @@ def _heaviest(members: Sequence[Feature]) -> str:
     return min((_kind(f.tags) for f in members), key=("road", "rail", "path").index)
 
 
-def _raised(
-    members: tuple[Feature, ...], net: _Net, lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
-    ground: Ground, lower: Sequence[Bridge],
+def _build_bridge(
+    members: tuple[Feature, ...], net: _RoadNetwork, lines: Sequence[Feature], areas: Sequence[Feature],
+    site: Polygon, ground: Ground, lower: Sequence[Bridge],
 ) -> tuple[Bridge, list[Cut], bool]:  # fmt: skip
     kind, core = _heaviest(members), _merged(members)
     usual, most = _GRADE[kind]
-    needs = _needs(members, core, kind, lines, areas, ground, lower)
+    needs = _required_rises(members, core, kind, lines, areas, ground, lower)
     rise = max(need for _, need in needs)
     # Ramps of all ways of a side end together, so that none of them ends in a step.
     ends = [[(f, e) for f, e in _ends(members) if (core.project(Point(e)) > core.length / 2) == far]
@@ -221,9 +221,9 @@ def _raised(
         beyond[side] = bool(several) and all(not site.buffer(10.0).contains(Point(e)) for _, e in several)
         if beyond[side] or not several:
             continue
-        runs[side] = [net.approach(f, e, _LONGEST_RAMP_M) for f, e in several]
+        runs[side] = [net.approach(f, e, _MAX_RAMP_M) for f, e in several]
         room[side] = min(sum(LineString(p).length for _, p in run) for run in runs[side])
-    ramp = [min(r, rise / usual, _LONGEST_RAMP_M) for r in room]
+    ramp = [min(r, rise / usual, _MAX_RAMP_M) for r in room]
     axis = _axis(core, runs, ramp, kind)
     start = axis.project(Point(core.coords[0]))
     end = axis.project(Point(core.coords[-1]))
@@ -235,8 +235,8 @@ def _raised(
         grade = max(grade, need / max(foot, 1.0) * 1.05)
     enough, grade = grade <= most, min(grade, most)
     heights = np.minimum(grade * np.minimum(at + climbs[0], axis.length - at + climbs[1]), rise)
-    heights = _rounded(at, heights, beyond)
-    pieces = [piece for side in (0, 1) for run in runs[side] for piece in _cut(run, ramp[side])]
+    heights = _smooth(at, heights, beyond)
+    pieces = [piece for side in (0, 1) for run in runs[side] for piece in _split_ways(run, ramp[side])]
     bridge = Bridge(axis, tuple(float(h) for h in heights), (start, end), kind, _layer(members[0].tags), members)
     return bridge, pieces, enough
 
@@ -247,7 +247,7 @@ def _ends(members: Sequence[Feature]) -> list[tuple[Feature, At]]:
     return [(f, e) for f in members for e in (_at(f.shape.coords[0]), _at(f.shape.coords[-1])) if count[e] == 1]
 
 
-def _needs(
+def _required_rises(
     members: Sequence[Feature], core: LineString, kind: str, lines: Sequence[Feature], areas: Sequence[Feature],
     ground: Ground, lower: Sequence[Bridge],
 ) -> list[tuple[float, float]]:  # fmt: skip
@@ -265,7 +265,7 @@ def _needs(
         below = _kind(f.tags)
         if not below or id(f) in own or below_ground(f.tags) or not f.shape.intersects(core):
             continue
-        if _bridged(f.tags) and _layer(f.tags) >= _layer(members[0].tags):
+        if _is_bridge(f.tags) and _layer(f.tags) >= _layer(members[0].tags):
             continue
         half = (metres(f.tags, "width") or {"rail": 4.0, "road": 7.0, "path": 2.5}[below]) / 2
         for p in getattr(f.shape.intersection(core), "geoms", [f.shape.intersection(core)]):
@@ -293,17 +293,17 @@ def _axis(core: LineString, runs: Sequence[Sequence[Any]], ramp: Sequence[float]
         run = next((r for r in runs[side] if r and r[0][1][0] == end), None)
         if run is None:
             continue
-        whole = LineString(_joined(run))
+        whole = LineString(_join_points(run))
         more = [tuple(p) for p in substring(whole, 0.0, ramp[side]).coords][1:]
         points = points + more if side else more[::-1] + points
     return LineString(points)
 
 
-def _joined(run: Sequence[tuple[Feature, list[At]]]) -> list[At]:
+def _join_points(run: Sequence[tuple[Feature, list[At]]]) -> list[At]:
     return [run[0][1][0], *(p for _, points in run for p in points[1:])]
 
 
-def _cut(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[Cut]:
+def _split_ways(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[Cut]:
     """Cut the ways of an approach where its ramp ends: each with its pieces, and whether they are on the ramp."""
     out: list[Cut] = []
     done = 0.0
@@ -323,7 +323,7 @@ def _cut(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[Cut]:
     return out
 
 
-def _rounded(at: Any, heights: Any, beyond: Sequence[bool]) -> Any:
+def _smooth(at: Any, heights: Any, beyond: Sequence[bool]) -> Any:
     """Round crest and feet by a moving average; an end on the ground stays there."""
     near = np.abs(at[:, None] - at[None, :]) <= _ROUND_M / 2
     out = (near * heights[None, :]).sum(axis=1) / near.sum(axis=1)

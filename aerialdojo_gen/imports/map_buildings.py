@@ -26,7 +26,7 @@ _LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
 _LEAST_HOLE_M2 = 1.0
 # A recipe takes rings of 1,000.
 _MOST_POINTS = 900
-_LEFT_OUT = "outlines that cross themselves, or have too many corners, left out"
+_LEFT_OUT = "outlines left out: self-intersecting or with too many corners"
 _PITCH = 0.62
 _MOST_RISE_M = 5.0
 # Of a building's ground: where its parts take more, its outline has nothing to add.
@@ -78,7 +78,7 @@ _ROOFS = {
 
 
 @dataclass
-class Told:
+class MapSummary:
     """What was made of the map, for the user to read: how often, by what."""
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -88,7 +88,7 @@ class Told:
         self.counts[what] += n
 
 
-def plans_of(shape: BaseGeometry, tolerance_m: float, told: Told) -> list[Polygon]:
+def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> list[Polygon]:
     """Simplify an area, and round it to centimetres; count what is left out as it crosses itself then."""
     out = []
     for piece in polygons_of(shape):
@@ -99,7 +99,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, told: Told) -> list[Polygo
             rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
         valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MOST_POINTS]
         if len(valid) < len(rounded):
-            told.add(_LEFT_OUT, len(rounded) - len(valid))
+            summary.add(_LEFT_OUT, len(rounded) - len(valid))
         out += valid
     return out
 
@@ -118,7 +118,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
 
 
 def buildings(
-    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, told: Told
+    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: MapSummary
 ) -> list[dict[str, Any]]:
     """Make the recipe's buildings from map areas in metres."""
     outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
@@ -137,15 +137,15 @@ def buildings(
         bodies = [
             b
             for part in own
-            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, told, part=True)
+            for b in _bodies(part.shape.intersection(plan), _inherited(area, part), usual, site, summary, part=True)
         ]
         rest = plan.difference(shapely.union_all([p.shape for p in own])) if own else plan
         if not own or rest.area > (1.0 - _PARTED) * area.shape.area:
-            bodies += _bodies(rest, area, usual, site, told)
+            bodies += _bodies(rest, area, usual, site, summary)
         if not bodies:
             continue
         out.append((area.key, _building(area, bodies, shop_points)))
-    told.add("buildings", len(out))
+    summary.add("buildings", len(out))
     return [made for _, made in sorted(out, key=lambda item: item[0])]
 
 
@@ -189,13 +189,13 @@ def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry |
 
 
 def _bodies(
-    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, told: Told, *, part: bool = False
+    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, summary: MapSummary, *, part: bool = False
 ) -> list[dict[str, Any]]:
     out = []
-    for plan in plans_of(shape.intersection(site), 0.12, told):
+    for plan in plans_of(shape.intersection(site), 0.12, summary):
         if plan.area < _LEAST_M2 or plan.buffer(-_LEAST_WIDTH_M / 2).is_empty:
             continue
-        base, top, roof, rise = _heights(area, plan, usual, None if part else told)
+        base, top, roof, rise = _heights(area, plan, usual, None if part else summary)
         out.append({
             **rings_of(plan), **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
             **({"roof_m": round(rise, 2)} if rise else {}),
@@ -203,7 +203,7 @@ def _bodies(
     return out
 
 
-def _heights(area: Feature, plan: Polygon, usual: int, told: Told | None) -> tuple[float, float, str, float]:
+def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | None) -> tuple[float, float, str, float]:
     """Base, top, roof's form and rise, metres over the ground."""
     tags, kind = area.tags, category(area.tags)
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
@@ -212,8 +212,8 @@ def _heights(area: Feature, plan: Polygon, usual: int, told: Told | None) -> tup
         levels_used = _LEVELS.get(kind, small)
     else:
         levels_used = levels
-    if told is not None:
-        told.add("height" if height else "levels" if levels else "rule")
+    if summary is not None:
+        summary.add("height" if height else "levels" if levels else "rule")
     form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
     # A roof's slope is as long as half its narrower side.
     half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import Told, plans_of, rings_of
+from aerialdojo_gen.imports.map_buildings import MapSummary, plans_of, rings_of
 from aerialdojo_gen.imports.map_tags import SURFACES, Tags, below_ground, count, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -64,7 +64,7 @@ _AREAS: dict[str, dict[str, tuple[str, str]]] = {
 _WATERWAYS = {"river": 8.0, "canal": 8.0, "stream": 1.6, "ditch": 1.0}
 
 
-def streets(lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[str, Any]]:
+def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> list[dict[str, Any]]:
     """Make the recipe's streets and paths, clipped to a window somewhat larger than the site."""
     out = []
     for feature in lines:
@@ -72,14 +72,14 @@ def streets(lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[
         if made is None:
             continue
         if below_ground(feature.tags):
-            told.add("ways in tunnels or below ground left out")
+            summary.add("ways in tunnels or below ground left out")
             continue
         if BRIDGE in feature.tags:
             # Nobody parks on a bridge.
             made = {k: v for k, v in made.items() if k != "parking"} | {"bridge": int(feature.tags[BRIDGE])}
         for line in clipped(feature.shape, window):
             out.append({**made, "line": line})
-            told.add("streets" if made["kind"] != "path" else "paths")
+            summary.add("streets" if made["kind"] != "path" else "paths")
     return out
 
 
@@ -136,13 +136,13 @@ def _wide(width: float) -> float:
 
 
 def _parks(tags: Tags, *, by_rule: bool) -> bool:
-    said = [
+    values = [
         v
         for k, v in tags.items()
         if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))
     ]
-    if said:
-        return any(v in _PARKED for v in said)
+    if values:
+        return any(v in _PARKED for v in values)
     return by_rule
 
 
@@ -153,26 +153,28 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
     return [line for f in open_ if f.tags.get(BRIDGE, "") == on for line in clipped(f.shape, window)]
 
 
-def areas(found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, told: Told) -> list[dict[str, Any]]:
+def areas(
+    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: MapSummary
+) -> list[dict[str, Any]]:
     """Make the recipe's areas: the larger before the smaller, water over land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
     for feature in found:
-        said = _ground(feature.tags)
-        if said is None or below_ground(feature.tags) or "building" in feature.tags:
+        rule = _ground(feature.tags)
+        if rule is None or below_ground(feature.tags) or "building" in feature.tags:
             continue
-        material, grows = said
+        material, grows = rule
         parking = feature.tags.get("amenity") == "parking"
         name = feature.tags.get("name", "")[:80] if grows == "park" or parking else ""
-        for made in _areas(feature.shape.intersection(window), told, material, grows, parking, name):
+        for made in _areas(feature.shape.intersection(window), summary, material, grows, parking, name):
             out.append((material.startswith("water"), -feature.shape.area, feature.key, made))
     for feature in lines:
         wide = _WATERWAYS.get(feature.tags.get("waterway", ""))
         if wide and not below_ground(feature.tags):
             wide = metres(feature.tags, "width") or wide
             wet = feature.shape.buffer(wide / 2).intersection(window)
-            out += [(True, -wet.area, feature.key, made) for made in _areas(wet, told, "water")]
+            out += [(True, -wet.area, feature.key, made) for made in _areas(wet, summary, "water")]
     for piece in _sea(lines, window):
-        out += [(True, -piece.area, "sea", made) for made in _areas(piece, told, "water:#46788c")]
+        out += [(True, -piece.area, "sea", made) for made in _areas(piece, summary, "water:#46788c")]
     return [made for *_, made in sorted(out, key=lambda row: row[:3])]
 
 
@@ -188,11 +190,11 @@ def _ground(tags: Tags) -> tuple[str, str] | None:
 
 
 def _areas(
-    shape: BaseGeometry, told: Told, material: str, grows: str = "", parking: bool = False, name: str = ""
+    shape: BaseGeometry, summary: MapSummary, material: str, grows: str = "", parking: bool = False, name: str = ""
 ) -> list[dict[str, Any]]:
-    said = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
-    plans = (plan for plan in plans_of(shape, 0.1, told) if plan.area >= _LEAST_AREA_M2)
-    return [{"material": material, **said, **rings_of(plan)} for plan in plans]
+    optional = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
+    plans = (plan for plan in plans_of(shape, 0.1, summary) if plan.area >= _LEAST_AREA_M2)
+    return [{"material": material, **optional, **rings_of(plan)} for plan in plans]
 
 
 def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:

@@ -12,8 +12,8 @@ from shapely.geometry import Polygon
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_things
-from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
-from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
+from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.toml_text import recipe_text
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
@@ -25,7 +25,7 @@ _BEYOND_M = 15.0
 _HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0
 # Where so much of the ground is built on it is paved between.
 _PAVED = 0.12
-_MOST = 1000
+_MAX_ITEMS = 1000
 
 Heights = dict[str, Any]
 
@@ -34,21 +34,21 @@ def town_recipe(
     found: Map, bbox: Bbox, source: str, *,
     heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
     extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
-) -> tuple[str, Told]:  # fmt: skip
+) -> tuple[str, MapSummary]:  # fmt: skip
     """Write the recipe of a town from map data; the middle of the bounding box (degrees) is the origin."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
     if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
         raise UsageError(
-            f"--bbox {in_words(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene "
+            f"--bbox {format_bbox(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene "
             f"{SMALLEST_M:g} to {LARGEST_M:,.0f} m: --tiles 200 cuts a large one into several"
         )
     frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
     window = site.buffer(_BEYOND_M, join_style="mitre")
     points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
-    told = Told()
+    summary = MapSummary()
     inner = site.buffer(-0.3, join_style="mitre")
     shops = map_things.shop_points(points, areas)
-    buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, told)
+    buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, summary)
     built = shapely.union_all([Polygon(b["outline"], b.get("holes", ())) for one in buildings for b in one["bodies"]])
     share = built.area / site.area
     origin = {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
@@ -56,28 +56,30 @@ def town_recipe(
     if table is not None:
         origin["z_m"] = table.pop("z_m")
     ground = _level if table is None else _terrain(table, (width, depth))
-    raised, lines = map_bridges.bridges(lines, areas, site, ground, told)
+    raised, lines = map_bridges.bridges(lines, areas, site, ground, summary)
     parameters: dict[str, Any] = {
         "ground": "paving:#98958d" if share > _PAVED else "grass",
         "drive_on": drive_on,
         "rails": map_ground.rails(lines, window),
         "crossings": map_things.crossings(points, site),
         "signals": map_things.signals(points, site),
-        "areas": map_ground.areas(areas, lines, window, told),
-        "roads": map_ground.streets(lines, window, told),
-        "bridges": [b.table() | _on(map_ground.rails(lines, window, str(k))) for k, b in enumerate(raised)],
+        "areas": map_ground.areas(areas, lines, window, summary),
+        "roads": map_ground.streets(lines, window, summary),
+        "bridges": [
+            b.to_recipe() | _rails_table(map_ground.rails(lines, window, str(k))) for k, b in enumerate(raised)
+        ],
         "buildings": buildings,
         "barriers": map_ground.barriers(lines, inner),
-        "things": map_things.things(points, lines, areas, inner, built, told),
+        "things": map_things.things(points, lines, areas, inner, built, summary),
     }
     for key, value in parameters.items():
-        if isinstance(value, list) and len(value) > _MOST:
-            told.add(f"{key} beyond the first {_MOST:,} left out", len(value) - _MOST)
-            parameters[key] = value[:_MOST]
+        if isinstance(value, list) and len(value) > _MAX_ITEMS:
+            summary.add(f"{key} beyond the first {_MAX_ITEMS:,} left out", len(value) - _MAX_ITEMS)
+            parameters[key] = value[:_MAX_ITEMS]
     parameters = {k: v for k, v in parameters.items() if v != []}
     if not ({"buildings", "roads", "areas", "things"} & parameters.keys()):
         raise UsageError(
-            f"--bbox {in_words(bbox)} has nothing of the map in it: {source} reaches over {in_words(found.extent)}"
+            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(found.extent)}"
         )
     rise = 0.0
     if table is not None:
@@ -94,10 +96,10 @@ def town_recipe(
         f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",
         "Metres about the middle of the box, x east, y north. Change what is not so, and run again.",
     )
-    return recipe_text(head, parameters, comments), told
+    return recipe_text(head, parameters, comments), summary
 
 
-def _on(rails: list[Any]) -> dict[str, Any]:
+def _rails_table(rails: list[Any]) -> dict[str, Any]:
     return {"rails": rails} if rails else {}
 
 
@@ -115,10 +117,10 @@ def _in_metres(frame: LocalFrame, features: Sequence[Feature]) -> list[Feature]:
         x, y = frame.metres(at[:, 0], at[:, 1])
         return shapely.get_coordinates(shapely.points(x, y))
 
-    return [Feature(f.key, _valid(shapely.transform(f.shape, moved)), f.tags) for f in features]
+    return [Feature(f.key, _make_valid(shapely.transform(f.shape, moved)), f.tags) for f in features]
 
 
-def _valid(shape: Any) -> Any:
+def _make_valid(shape: Any) -> Any:
     if shape.is_valid:
         return shape
     made = shapely.make_valid(shape)

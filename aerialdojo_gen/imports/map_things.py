@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.imports.map_buildings import Told
+from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_tags import Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -47,7 +47,7 @@ _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 
 def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
-           built: BaseGeometry, told: Told) -> list[dict[str, Any]]:  # fmt: skip
+           built: BaseGeometry, summary: MapSummary) -> list[dict[str, Any]]:  # fmt: skip
     """Make the recipe's things: points of the map, rows of trees and bollards, small things drawn as areas.
 
     What lies in a building is no street furniture, and is counted as left out; what is drawn within its wall's
@@ -58,9 +58,9 @@ def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[
         category = _category(feature.tags)
         if category is None or below_ground(feature.tags) or not site.contains(feature.shape):
             continue
-        at = _before_walls(feature.shape, built)
+        at = _move_before_wall(feature.shape, built)
         if at is None:
-            told.add("things inside buildings left out")
+            summary.add("things inside buildings left out")
             continue
         out.append(_thing(category, at, feature.tags))
     for feature in lines:
@@ -76,7 +76,7 @@ def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[
         at = feature.shape.representative_point()
         if category and category != "urban_tree" and site.contains(at) and not built.contains(at):
             out.append(_thing(category, at, feature.tags))
-    told.add("things of the map", len(out))
+    summary.add("things of the map", len(out))
     return out
 
 
@@ -143,7 +143,7 @@ def _along(line: BaseGeometry, spacing_m: float) -> list[Point]:
     return [line.interpolate(line.length * k / n) for k in range(n + 1)]
 
 
-def _before_walls(point: Point, built: BaseGeometry, thick_m: float = 1.5, out_m: float = 1.0) -> Point | None:
+def _move_before_wall(point: Point, built: BaseGeometry, thick_m: float = 1.5, out_m: float = 1.0) -> Point | None:
     """Where a thing stands that was drawn in a wall or on one: before it; None where it is well inside."""
     if built.is_empty or not built.intersects(point.buffer(0.3)):
         return point

@@ -17,9 +17,9 @@ from aerialdojo_gen.scenes.model import Material, Part
 LIGHTS = ("auto", "sun", "baked")
 
 # A thing with more plain colours than this is painted vertex by vertex, and no longer part by part.
-_MOST_PLAIN = 64
+_MAX_PLAIN = 64
 # More colours than this are those of a photograph.
-_MOST_PAINTED = 256
+_MAX_PAINTED = 256
 # A texture that covers itself more often than this is a pattern, and no picture of a place (a box has six sides).
 _REPEATED = 8.0
 _MIXED = "vertex colours"
@@ -36,28 +36,28 @@ class MaterialBuilder:
     def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
         """Make a body's parts, one a material, in the order of the materials' names."""
         found: list[tuple[Material, Part]] = []
-        kind = _kinds(body)
+        kind = _face_kinds(body)
         plain = kind == _PLAIN
         for rgb in np.unique(body.colours[plain], axis=0):
             rows = plain & (body.colours == rgb).all(axis=1)
             red, green, blue = (int(c) for c in rgb)
             name = f"#{red:02x}{green:02x}{blue:02x}"
-            found += self._made(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
+            found += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
         painted = kind == _PAINTED
         if painted.any():
             # White: vertex colours take its place, and where a program multiplies by both they stay what they are.
             paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
-            found += self._made(body, painted, paint)
+            found += self._build_parts(body, painted, paint)
         for k in np.unique(kind[kind >= 0]):
-            found += self._made(body, kind == k, self._textured(body.surfaces[k], double_sided))
+            found += self._build_parts(body, kind == k, self._textured(body.surfaces[k], double_sided))
         return tuple(part for _, part in sorted(found, key=lambda pair: pair[0].name))
 
-    def scale(self, nodes: Sequence[RawNode]) -> None:
+    def measure_texture_scales(self, nodes: Sequence[RawNode]) -> None:
         """Find how many metres a texture's width stands for, over all that shows it; vertices are in metres."""
         world: dict[str, float] = {}
         flat: dict[str, float] = {}
         for node in nodes:
-            kind = _kinds(node)
+            kind = _face_kinds(node)
             for k in np.unique(kind[kind >= 0]):
                 rows, key = kind == k, node.surfaces[k].digest
                 own = areas(node.vertices, node.faces[rows].astype(np.int32))
@@ -73,8 +73,8 @@ class MaterialBuilder:
             unlit=self.baked or surface.unlit, jpeg=surface.jpeg,
         )  # fmt: skip
 
-    def _made(self, body: RawNode, rows: NDArray[np.bool_], material: Material) -> list[tuple[Material, Part]]:
-        material = replace(material, name=_name(material))
+    def _build_parts(self, body: RawNode, rows: NDArray[np.bool_], material: Material) -> list[tuple[Material, Part]]:
+        material = replace(material, name=_material_name(material))
         material = self.materials.get(material.name, material)
         corners = None
         if material.texture is not None and body.corners is not None:
@@ -100,7 +100,7 @@ class MaterialBuilder:
 _PLAIN, _PAINTED = -1, -2
 
 
-def _kinds(body: RawNode) -> NDArray[np.int32]:
+def _face_kinds(body: RawNode) -> NDArray[np.int32]:
     """Tell how each face is drawn: the index of its texture, or one of `_PLAIN` and `_PAINTED`."""
     n = len(body.faces)
     kind = np.full(n, _PLAIN, dtype=np.int32)
@@ -116,7 +116,7 @@ def _kinds(body: RawNode) -> NDArray[np.int32]:
             shown = shows[body.surface]
             kind[shown] = body.surface[shown].astype(np.int32)
     plain = kind == _PLAIN
-    if plain.any() and len(np.unique(body.colours[plain], axis=0)) > _MOST_PLAIN:
+    if plain.any() and len(np.unique(body.colours[plain], axis=0)) > _MAX_PLAIN:
         kind[plain] = _PAINTED
     return kind
 
@@ -155,19 +155,19 @@ def _split(
     return vertices[used[flat[first]]], index.reshape(-1, 3), carried[first]
 
 
-def _name(material: Material) -> str:
+def _material_name(material: Material) -> str:
     base = material.name.split(",")[0]
     return base + (", both sides" if material.double_sided else "") + (", unlit" if material.unlit else "")
 
 
-def photographed(nodes: Sequence[RawNode]) -> bool:
+def is_photographic(nodes: Sequence[RawNode]) -> bool:
     """Guess whether most of a mesh shows photographs of the place, with their light in them, and no patterns."""
     whole = painted = 0.0
     shown: dict[str, float] = {}
     flat: dict[str, float] = {}
     colours: list[NDArray[np.uint8]] = []
     for node in nodes:
-        area, kind = areas(node.vertices, node.faces.astype(np.int32)), _kinds(node)
+        area, kind = areas(node.vertices, node.faces.astype(np.int32)), _face_kinds(node)
         whole += float(area.sum())
         painted += float(area[kind == _PAINTED].sum())
         colours.append(np.unique(node.colours[kind == _PAINTED], axis=0))
@@ -175,6 +175,6 @@ def photographed(nodes: Sequence[RawNode]) -> bool:
             key, rows = node.surfaces[k].digest, kind == k
             shown[key] = shown.get(key, 0.0) + float(area[rows].sum())
             flat[key] = flat.get(key, 0.0) + float(_uv_areas(node, rows).sum())
-    many = len(np.unique(np.concatenate([*colours, np.zeros((0, 3), np.uint8)]), axis=0)) > _MOST_PAINTED
+    many = len(np.unique(np.concatenate([*colours, np.zeros((0, 3), np.uint8)]), axis=0)) > _MAX_PAINTED
     once = sum(area for key, area in shown.items() if flat[key] <= _REPEATED)
     return once + (painted if many else 0.0) > 0.5 * whole

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.imports.pictures import Paint, surfaces_of
-from aerialdojo_gen.imports.raw import RawSurface, no_corners, plain
+from aerialdojo_gen.imports.pictures import SourceMaterial, decode_surfaces
+from aerialdojo_gen.imports.raw import RawSurface, default_colours, empty_corners
 from aerialdojo_gen.imports.untrusted import SiblingFiles
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class FaceMaterials:
     """What the faces of a mesh look like; see `aerialdojo_gen.imports.raw.RawNode`."""
 
     colours: NDArray[np.uint8]
@@ -24,64 +24,64 @@ class Skin:
     surfaces: tuple[RawSurface, ...]
 
 
-def mesh_materials(bodies: Sequence[Any], beside: SiblingFiles, texture_px: int) -> list[Skin]:
+def mesh_materials(bodies: Sequence[Any], siblings: SiblingFiles, texture_px: int) -> list[FaceMaterials]:
     """Describe the materials of the meshes of one file."""
     materials: dict[int, Any] = {}
     for body in bodies:
         material = getattr(body.visual, "material", None)
         if material is not None and body.visual.kind not in ("face", "vertex"):
             materials[id(material)] = material
-    lost = tuple(
-        RawSurface(notes=(f"{name} is not there: drawn in one grey, or in the colours of its vertices",))
-        for name in beside.missing
+    missing = tuple(
+        RawSurface(notes=(f"{name} is missing: drawn in grey or in vertex colours",))
+        for name in siblings.missing
         if name.lower().endswith(".mtl") or not materials
     )
-    maps = _maps(beside)
-    surfaces, index = surfaces_of([_paint(m, maps, beside) for m in materials.values()], texture_px)
-    surfaces += lost
+    maps = _maps(siblings)
+    surfaces, index = decode_surfaces([_source_material(m, maps, siblings) for m in materials.values()], texture_px)
+    surfaces += missing
     place = dict(zip(materials, index, strict=True))
-    return [_skin(body, place, surfaces) for body in bodies]
+    return [_face_materials(body, place, surfaces) for body in bodies]
 
 
-def _skin(body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> Skin:
+def _face_materials(body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> FaceMaterials:
     n, visual = len(body.faces), body.visual
     if visual.kind == "face":
-        return Skin(np.asarray(visual.face_colors[:, :3], dtype=np.uint8), None, None, surfaces)
+        return FaceMaterials(np.asarray(visual.face_colors[:, :3], dtype=np.uint8), None, None, surfaces)
     if visual.kind == "vertex":
-        corners = no_corners(n)
+        corners = empty_corners(n)
         own = np.asarray(visual.vertex_colors[:, :3], dtype=np.float32)[body.faces]
         corners[..., 2:] = own
-        return Skin(np.rint(own.mean(axis=1)).astype(np.uint8), None, corners, surfaces)
+        return FaceMaterials(np.rint(own.mean(axis=1)).astype(np.uint8), None, corners, surfaces)
     material = getattr(visual, "material", None)
     if material is None:
-        return Skin(plain(n), None, None, surfaces)
+        return FaceMaterials(default_colours(n), None, None, surfaces)
     k = place[id(material)]
-    corners = no_corners(n)
+    corners = empty_corners(n)
     uv = getattr(visual, "uv", None)
     if uv is not None and len(uv) == len(body.vertices) and surfaces[k].texture is not None:
         corners[..., :2] = np.nan_to_num(np.asarray(uv, dtype=np.float32)[:, :2])[body.faces]
     colours = np.tile(np.array(surfaces[k].colour, dtype=np.uint8), (n, 1))
-    return Skin(colours, np.full(n, k, dtype=np.int32), corners, surfaces)
+    return FaceMaterials(colours, np.full(n, k, dtype=np.int32), corners, surfaces)
 
 
-def _paint(material: Any, maps: dict[str, dict[str, str]], beside: SiblingFiles) -> Paint:
+def _source_material(material: Any, maps: dict[str, dict[str, str]], siblings: SiblingFiles) -> SourceMaterial:
     """Read a material of an MTL file, or of a PLY that names a picture."""
     name = str(getattr(material, "name", "") or "")
-    told = maps.get(name, {})
-    file, missing = _asked(told.get("map_kd", ""), beside)
-    if getattr(material, "image", None) is not None and not told:
-        file = next(iter(beside.given.values()), None)
-    mask, _ = _asked(told.get("map_d", ""), beside)
+    textures = maps.get(name, {})
+    file, missing = _read_texture(textures.get("map_kd", ""), siblings)
+    if getattr(material, "image", None) is not None and not textures:
+        file = next(iter(siblings.loaded.values()), None)
+    mask, _ = _read_texture(textures.get("map_d", ""), siblings)
     red, green, blue = (float(c) / 255.0 for c in np.asarray(material.main_color)[:3])
     # Where there is a picture, writers leave any number as its colour, and few programs multiply by it.
     factor = (1.0, 1.0, 1.0) if file is not None else (red, green, blue)
-    return Paint(name, factor, file, missing, alpha="blend" if mask is None else "mask", mask=mask)
+    return SourceMaterial(name, factor, file, missing, alpha="blend" if mask is None else "mask", mask=mask)
 
 
-def _maps(beside: SiblingFiles) -> dict[str, dict[str, str]]:
+def _maps(siblings: SiblingFiles) -> dict[str, dict[str, str]]:
     """Read which pictures the MTL files name, by material."""
     out: dict[str, dict[str, str]] = {}
-    for name, data in list(beside.given.items()):
+    for name, data in list(siblings.loaded.items()):
         own: dict[str, str] = {}
         for line in data.decode("utf-8", "replace").splitlines() if name.lower().endswith(".mtl") else ():
             key, _, rest = line.strip().partition(" ")
@@ -92,8 +92,8 @@ def _maps(beside: SiblingFiles) -> dict[str, dict[str, str]]:
     return out
 
 
-def _asked(name: str, beside: SiblingFiles) -> tuple[bytes | None, str]:
+def _read_texture(name: str, siblings: SiblingFiles) -> tuple[bytes | None, str]:
     try:
-        return (beside.get(name) if name else None), ""
+        return (siblings.get(name) if name else None), ""
     except FileNotFoundError:
         return None, name[-80:]

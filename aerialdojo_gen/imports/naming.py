@@ -30,10 +30,10 @@ _NOISE = frozenset({
 # Words that might be hexadecimal digits.
 _HEX_WORDS = frozenset({"bed", "cab", "cafe", "facade", "facades", "beds", "cabs", "cafes"})
 _SHORT = frozenset({"atm", "bus", "gym", "hut", "van", "tv", "spa", "shrub", "sky", "crypt", "gypsum"})
-_MOST_WORDS = 4
-_MOST_LETTERS = 18
+_MAX_WORDS = 4
+_MAX_LETTERS = 18
 _COLUMNS = ("pattern", "name", "category", "plural")
-_MOST_BYTES = 4 << 20
+_MAX_BYTES = 4 << 20
 
 
 @dataclass(frozen=True)
@@ -44,24 +44,24 @@ class NodeName:
     attributes: dict[str, str]
 
 
-NOTHING = NodeName("", {})
+UNNAMED = NodeName("", {})
 
 
 @dataclass(frozen=True)
 class Naming:
     """A user's table of node patterns."""
 
-    rows: Sequence[tuple[str, NodeName]] = ()  # sequence of (str, Called)
+    rows: Sequence[tuple[str, NodeName]] = ()  # glob, name
 
-    def called(self, node: str) -> NodeName:
+    def name_of(self, node: str) -> NodeName:
         """Say what a node of the file is called: by the table, else by the words in its name."""
-        told = self.told(node)
+        entry = self.from_table(node)
         words = words_in(node)
-        return told if told is not NOTHING else _called(" ".join(words), "", "") if words else NOTHING
+        return entry if entry is not UNNAMED else _node_name(" ".join(words), "", "") if words else UNNAMED
 
-    def told(self, node: str) -> NodeName:
-        """Say what the table calls a node; `NOTHING` where it says nothing of it."""
-        return next((called for pattern, called in self.rows if fnmatchcase(node, pattern)), NOTHING)
+    def from_table(self, node: str) -> NodeName:
+        """Say what the table calls a node; `UNNAMED` where it says nothing of it."""
+        return next((name for pattern, name in self.rows if fnmatchcase(node, pattern)), UNNAMED)
 
 
 def words_in(node: str) -> list[str]:
@@ -71,7 +71,7 @@ def words_in(node: str) -> list[str]:
     words = [word for word in map(_word, tokens) if word]
     # "building building": a mesh and its node are often called alike.
     words = [word for k, word in enumerate(words) if word not in words[:k]]
-    return words[:_MOST_WORDS]
+    return words[:_MAX_WORDS]
 
 
 def _word(token: str) -> str:
@@ -79,7 +79,7 @@ def _word(token: str) -> str:
     if stem and not re.fullmatch(r"[a-fA-F]+", stem.group(1)):
         token = stem.group(1)  # House03
     word = token.lower()
-    if not word.isalpha() or word in _NOISE or not 2 <= len(word) <= _MOST_LETTERS:
+    if not word.isalpha() or word in _NOISE or not 2 <= len(word) <= _MAX_LETTERS:
         return ""
     if word in _SHORT or word in _HEX_WORDS:
         return word
@@ -88,7 +88,7 @@ def _word(token: str) -> str:
     return word if spoken and not hexadecimal else ""
 
 
-def _called(name: str, category: str, group: str) -> NodeName:
+def _node_name(name: str, category: str, group: str) -> NodeName:
     kind = category or re.sub(r"[^a-z]+", "_", name.lower()).strip("_")[:40].strip("_")
     attributes = {"called": name} if name and name != kind.replace("_", " ") else {}
     return NodeName(kind, attributes | ({"group": group} if group else {}))
@@ -103,14 +103,14 @@ def read_names(path: Path) -> Naming:
     """
     try:
         check_regular(path)
-        raw = path.read_bytes()[: _MOST_BYTES + 1]
+        raw = path.read_bytes()[: _MAX_BYTES + 1]
         text = raw.decode("utf-8-sig")
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise AssetError(f"{path}: is not UTF-8") from None
-    if len(raw) > _MOST_BYTES:
-        raise AssetError(f"{path}: larger than {_MOST_BYTES >> 20} MiB")
+    if len(raw) > _MAX_BYTES:
+        raise AssetError(f"{path}: larger than {_MAX_BYTES >> 20} MiB")
     reader = csv.DictReader(io.StringIO(text), restkey="", restval="")
     columns = tuple(reader.fieldnames or ())
     unknown = [name for name in columns if name not in _COLUMNS]
@@ -133,7 +133,7 @@ def _row(row: dict[str, str]) -> tuple[str, NodeName]:
     if not pattern:
         raise ValueError("has no pattern")
     if not re.fullmatch(r"[^\W\d_]+(?:[ '-][^\W\d_]+)*", name) or len(name) > 60:
-        raise ValueError(f"name {name[:40]!r} is no name that a person would say: letters, spaces and hyphens")
+        raise ValueError(f"name {name[:40]!r} must be letters, spaces and hyphens")
     if category and not re.fullmatch(r"[a-z]+(?:_[a-z]+)*", category):
         raise ValueError(f"category {category[:40]!r} must be lower-case words joined by _")
     if not category and not re.search(r"[A-Za-z]", name):
@@ -141,4 +141,4 @@ def _row(row: dict[str, str]) -> tuple[str, NodeName]:
     group = "" if many in ("", "no") else (group_of(name) or "a group of") if many == "yes" else plural
     if group and not re.fullmatch(r"an? [a-z ]+ of", group):
         raise ValueError(f"plural {plural[:40]!r} is neither yes nor words like 'a row of'")
-    return pattern, _called(name.lower() if name.isascii() else name, category, group)
+    return pattern, _node_name(name.lower() if name.isascii() else name, category, group)

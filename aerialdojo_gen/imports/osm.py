@@ -18,15 +18,15 @@ from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
-from aerialdojo_gen.imports.earth import Bbox, in_words
+from aerialdojo_gen.imports.earth import Bbox, format_bbox
 from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"
 SUFFIXES = (".pbf", ".osm", ".osm.bz2", ".osm.gz")
 # An extract of a city has tens of megabytes; positions of a country's points take gigabytes of memory.
-_LARGEST_BYTES = 1 << 30
-_MOST_POINTS = 5_000
+_MAX_BYTES = 1 << 30
+_MAX_POINTS = 5_000
 # Ways of these are outlines of areas where they are closed; others stay lines.
 _AREA_KEYS = ("building", "building:part", "landuse", "leisure", "natural", "amenity", "area", "area:highway",
               "tourism", "place", "water", "man_made", "public_transport", "railway")  # fmt: skip
@@ -36,7 +36,7 @@ _LINES = {"natural": ("tree_row", "cliff", "coastline"), "man_made": ("embankmen
 _KINDS = ("points", "lines", "areas")
 
 Tags = Mapping[str, str]
-_Said = tuple[str, str, Tags]
+_RawFeature = tuple[str, str, Tags]
 """Key, shape as hexadecimal WKB, tags."""
 
 
@@ -72,21 +72,21 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
         size = path.stat().st_size
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
-    if size > _LARGEST_BYTES:
-        raise AssetError(f"{path} has {size / 2**30:.1f} GiB, 1 GiB is the most: {_part(path, boxes)}")
+    if size > _MAX_BYTES:
+        raise AssetError(f"{path} has {size / 2**30:.1f} GiB, 1 GiB is the most: {_extract_advice(path, boxes)}")
     with scratch_folder() as folder:
         out = folder / "found.json"
-        given = [str(out), json.dumps(boxes)]
-        read_in_sandbox(__name__, path, given, max_memory_bytes, _part(path, boxes))
+        args = [str(out), json.dumps(boxes)]
+        read_in_sandbox(__name__, path, args, max_memory_bytes, _extract_advice(path, boxes))
         found = json.loads(out.read_text(encoding="utf-8"))
     west, south, east, north = found["extent"]
     extent = (west, south, east, north)
     maps = []
     for box, own in zip(boxes, found["boxes"], strict=True):
         if not any(own.values()):
-            apart = box[0] > east or box[2] < west or box[1] > north or box[3] < south
-            why = "lies outside the extract" if apart else "has nothing of the map in it"
-            raise UsageError(f"--bbox {in_words(box)} {why}: {path.name} reaches over {in_words(extent)}")
+            disjoint = box[0] > east or box[2] < west or box[1] > north or box[3] < south
+            why = "lies outside the extract" if disjoint else "contains no map data"
+            raise UsageError(f"--bbox {format_bbox(box)} {why}: {path.name} covers {format_bbox(extent)}")
         points, lines, areas = (
             tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=_order))
             for kind in _KINDS
@@ -95,7 +95,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     return maps
 
 
-def _part(path: Path, boxes: Sequence[Bbox]) -> str:
+def _extract_advice(path: Path, boxes: Sequence[Bbox]) -> str:
     west, south = (min(box[k] for box in boxes) for k in (0, 1))
     east, north = (max(box[k] for box in boxes) for k in (2, 3))
     where = f"{west:g},{south:g},{east:g},{north:g}"
@@ -129,18 +129,18 @@ def _key(shape: Any) -> str:
     return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
 
 
-def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_Said]]], Bbox | None]:
+def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_RawFeature]]], Bbox | None]:
     """Go through a file once; the extent is that of its points, which a header need not state."""
     windows = shapely.box(*np.asarray(boxes, dtype=np.float64).T)
-    around = shapely.box(*shapely.total_bounds(windows))
-    for shape in (windows, around):
+    extent_box = shapely.box(*shapely.total_bounds(windows))
+    for shape in (windows, extent_box):
         shapely.prepare(shape)
-    found: list[dict[str, list[_Said]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
+    found: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
     low, high = [1e9, 1e9], [-1e9, -1e9]
     factory = osmium.geom.WKBFactory()
 
     def keep(kind: str, shape: Any, part: Any, tags: Tags) -> None:
-        if not around.intersects(part):
+        if not extent_box.intersects(part):
             return
         for k in np.flatnonzero(shapely.intersects(windows, part)):
             found[k][kind].append((_key(shape), str(shapely.to_wkb(part, hex=True)), tags))
@@ -154,7 +154,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
                 keep("points", point, point, dict(thing.tags))
         elif thing.is_way():
             tags = dict(thing.tags)
-            if not tags or (thing.is_closed() and _is_area(tags)) or len(thing.nodes) > _MOST_POINTS:
+            if not tags or (thing.is_closed() and _is_area(tags)) or len(thing.nodes) > _MAX_POINTS:
                 continue
             line = _line(thing.nodes)
             if line is not None:
@@ -190,4 +190,4 @@ def _line(nodes: Any) -> LineString | None:
 
 
 if __name__ == "__main__":
-    raise SystemExit(exit_status(lambda given: read_into(Path(given[0]), Path(given[1]), json.loads(given[2]))))
+    raise SystemExit(exit_status(lambda args: read_into(Path(args[0]), Path(args[1]), json.loads(args[2]))))

@@ -25,7 +25,7 @@ _HOLES, _GONE = 0.05, 0.1
 
 
 @dataclass(frozen=True)
-class Paint:
+class SourceMaterial:
     """What a file's material says, before its texture is decoded."""
 
     name: str  # Its name, for messages
@@ -39,70 +39,74 @@ class Paint:
     unlit: bool = False
 
 
-def surfaces_of(paints: Sequence[Paint], texture_px: int = TEXTURE_PX) -> tuple[tuple[RawSurface, ...], list[int]]:
+def decode_surfaces(
+    materials: Sequence[SourceMaterial], texture_px: int = TEXTURE_PX
+) -> tuple[tuple[RawSurface, ...], list[int]]:
     """Decode what materials show."""
     decoded: dict[bytes, tuple[NDArray[Any] | None, str]] = {}
-    made = [_surface(paint, decoded) for paint in paints]
-    made = _held(made, texture_px)
+    made = [_surface(material, decoded) for material in materials]
+    made = _limit_sizes(made, texture_px)
     surfaces = {s.digest: s for s in reversed(made)}
     order = sorted(surfaces)
     return tuple(surfaces[d] for d in order), [order.index(s.digest) for s in made]
 
 
-def _surface(paint: Paint, decoded: dict[bytes, tuple[NDArray[Any] | None, str]]) -> RawSurface:
-    red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in paint.factor)
-    name = paint.name or "a material"
+def _surface(material: SourceMaterial, decoded: dict[bytes, tuple[NDArray[Any] | None, str]]) -> RawSurface:
+    red, green, blue = (round(255 * min(max(c, 0.0), 1.0)) for c in material.factor)
+    name = material.name or "a material"
     plain = RawSurface(
-        paint.name, (red, green, blue), double_sided=paint.double_sided, unlit=paint.unlit,
-        notes=(f"{name}: its texture {paint.missing} is not there: drawn in its colour",) if paint.missing else (),
+        material.name, (red, green, blue), double_sided=material.double_sided, unlit=material.unlit,
+        notes=(f"{name}: texture {material.missing} is missing: drawn in its colour",) if material.missing else (),
     )  # fmt: skip
-    if paint.image is None:
+    if material.image is None:
         return plain
-    if paint.image not in decoded:
-        decoded[paint.image] = _decoded(paint.image)
-    image, fault = decoded[paint.image]
+    if material.image not in decoded:
+        decoded[material.image] = _decode(material.image)
+    image, fault = decoded[material.image]
     if image is None:
         return replace(plain, notes=(f"{name}: its texture {fault}: drawn in its colour",))
     rgb, alpha = _channels(image)
     white = min(red, green, blue) == 255
     if not white:
         # What modellers mean is a product of light; a texture's numbers are not.
-        scale = _linear(np.array([red, green, blue]) / 255.0)
-        table = np.rint(255 * _srgb(_linear(np.arange(256) / 255.0)[:, None] * scale)).astype(np.uint8)
+        scale = _srgb_to_linear(np.array([red, green, blue]) / 255.0)
+        levels = _srgb_to_linear(np.arange(256) / 255.0)[:, None] * scale
+        table = np.rint(255 * _linear_to_srgb(levels)).astype(np.uint8)
         rgb = np.stack([table[:, k][rgb[..., k]] for k in range(3)], axis=2)
-    if paint.mask is not None:
-        other, _ = _decoded(paint.mask)
+    if material.mask is not None:
+        other, _ = _decode(material.mask)
         if other is not None:
             grey = _channels(other)[0].max(axis=2)
             alpha = cv2.resize(grey, (rgb.shape[1], rgb.shape[0]), interpolation=cv2.INTER_AREA).astype(np.uint8)
-    mask = _mask(alpha, paint)
-    mean = _mean(rgb, mask)
-    jpeg = paint.image if white and mask is None and paint.image[:3] == b"\xff\xd8\xff" and image.ndim == 3 else b""
+    mask = _mask(alpha, material)
+    mean = _mean_colour(rgb, mask)
+    is_jpeg = material.image[:3] == b"\xff\xd8\xff" and image.ndim == 3
+    jpeg = material.image if white and mask is None and is_jpeg else b""
     return replace(plain, colour=mean, texture=rgb, mask=mask, jpeg=jpeg)
 
 
-def _mask(alpha: NDArray[np.uint8] | None, paint: Paint) -> NDArray[np.bool_] | None:
-    if alpha is None or paint.alpha == "opaque":
+def _mask(alpha: NDArray[np.uint8] | None, material: SourceMaterial) -> NDArray[np.bool_] | None:
+    if alpha is None or material.alpha == "opaque":
         return None
-    if paint.alpha == "blend" and float((alpha < 255 * _GONE).mean()) < _HOLES:
+    if material.alpha == "blend" and float((alpha < 255 * _GONE).mean()) < _HOLES:
         return None
-    mask = np.asarray(alpha >= 255 * paint.cutoff)
+    mask = np.asarray(alpha >= 255 * material.cutoff)
     return None if mask.all() else mask
 
 
-def _mean(rgb: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> tuple[int, int, int]:
+def _mean_colour(rgb: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> tuple[int, int, int]:
     seen = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
     red, green, blue = (int(c) for c in seen.mean(axis=0, dtype=np.float64).round())
     return red, green, blue
 
 
-def _decoded(file: bytes) -> tuple[NDArray[Any] | None, str]:
+def _decode(file: bytes) -> tuple[NDArray[Any] | None, str]:
     """Decode an image file, with the channels that it has, RGB(A); or say what is wrong with it."""
     size = image_size(file)
     if file[:12] == b"\xabKTX 20\xbb\r\n\x1a\n":
         return None, "is in KTX2, which is not read (export it as PNG or JPEG)"
     if size is None:
-        return None, "is no PNG, JPEG, BMP or WebP"
+        return None, "is not PNG, JPEG, BMP or WebP"
     if max(size) > _LARGEST_PX or size[0] * size[1] > _MOST_DECODED:
         return None, f"has {size[0]} x {size[1]} pixels, {_LARGEST_PX} a side are the most"
     image = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
@@ -123,19 +127,19 @@ def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.u
     return image, None
 
 
-def _held(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
+def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
     """Make textures smaller until each, and all together, keep to what they are given."""
     different = {s.digest: s for s in made if s.texture is not None}
     sides = {d: s.texture.shape[:2] for d, s in different.items() if s.texture is not None}
-    size = {d: _fitted(shape, texture_px) for d, shape in sides.items()}
+    size = {d: _fit_size(shape, texture_px) for d, shape in sides.items()}
     while sum(h * w for h, w in size.values()) > TEXELS:
         largest = max(max(shape) for shape in size.values())
-        size = {d: _fitted(shape, max(1, largest // 2)) for d, shape in size.items()}
-    resized = {d: _resized(s, size[d]) for d, s in different.items() if size[d] != sides[d]}
+        size = {d: _fit_size(shape, max(1, largest // 2)) for d, shape in size.items()}
+    resized = {d: _resize(s, size[d]) for d, s in different.items() if size[d] != sides[d]}
     return [resized.get(s.digest, s) for s in made]
 
 
-def _fitted(shape: tuple[int, ...], most: int) -> tuple[int, int]:
+def _fit_size(shape: tuple[int, ...], most: int) -> tuple[int, int]:
     height, width = shape[0], shape[1]
     longest = max(height, width)
     if longest <= most:
@@ -143,7 +147,7 @@ def _fitted(shape: tuple[int, ...], most: int) -> tuple[int, int]:
     return max(1, round(height * most / longest)), max(1, round(width * most / longest))
 
 
-def _resized(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
+def _resize(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
     assert surface.texture is not None
     height, width = surface.texture.shape[:2]
     smaller = cv2.resize(surface.texture, size[::-1], interpolation=cv2.INTER_AREA)
@@ -158,14 +162,14 @@ def _resized(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
     )
 
 
-def _linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def _srgb_to_linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
-def _srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+def _linear_to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 0.0) ** (1 / 2.4) - 0.055)
 
 
-def srgb_of(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn linear light, 0-1, into sRGB, 0-1."""
-    return _srgb(np.clip(linear, 0.0, 1.0))
+    return _linear_to_srgb(np.clip(linear, 0.0, 1.0))

@@ -9,17 +9,16 @@ from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, pipeline_text
+from aerialdojo_gen.imports.command import PIPELINE, check_free, write_pipeline
 from aerialdojo_gen.imports.dem import Dem, read_dem
-from aerialdojo_gen.imports.earth import Bbox, checked_bbox, tiles
+from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
 from aerialdojo_gen.imports.map_recipe import town_recipe
 from aerialdojo_gen.imports.osm import read_maps
-from aerialdojo_gen.imports.relief import ground_of, relief_recipe
+from aerialdojo_gen.imports.relief import ground_sampler, relief_recipe
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
-from aerialdojo_gen.store.layout import check_scene_name
 
 # A map's ways and areas are read a little beyond the box: streets run on, and parts belong to buildings.
 _BEYOND_DEG = 0.0006
@@ -27,14 +26,14 @@ _MOST_SCENES = 100
 
 
 @dataclass(frozen=True)
-class Place:
+class AddedPlace:
     """A scene that was made of a real place."""
 
     name: str  # Of the scene
     scene: Scene  # As its recipe is built
     recipe: Path  # Files of the project
     pipeline: Path
-    said: tuple[str, ...]  # What was done, for people
+    notes: tuple[str, ...]  # What was done, for people
 
 
 def add_map(
@@ -42,38 +41,36 @@ def add_map(
     dem: Path | None = None,
     cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
     drive_on: str = "right", force: bool = False,
-) -> list[Place]:  # fmt: skip
+) -> list[AddedPlace]:  # fmt: skip
     """Make a town a bounding box (degrees, WGS 84) of an OpenStreetMap extract.
 
     Each is built once before it is kept.
     """
     if drive_on not in ("right", "left"):
         raise UsageError(f"--drive-on {drive_on[:20]!r}: right or left")
-    boxes = [checked_bbox(box) for box in bbox]
+    boxes = [check_bbox(box) for box in bbox]
     if not boxes:
         raise UsageError("--bbox WEST SOUTH EAST NORTH is needed: which part of the map, degrees")
     if tile_m is not None:
         if not 20.0 <= tile_m <= 1000.0:
             raise UsageError(f"--tiles {tile_m:g}: a scene is 20 to 1,000 m wide")
-        boxes = [tile for box in boxes for tile in tiles(box, tile_m)]
+        boxes = [tile for box in boxes for tile in tile_bboxes(box, tile_m)]
     if len(boxes) > _MOST_SCENES:
-        raise UsageError(
-            f"{len(boxes):,} scenes are asked for, {_MOST_SCENES} at a time are the most: take larger tiles"
-        )
+        raise UsageError(f"{len(boxes):,} scenes requested, {_MOST_SCENES} at a time are the most: take larger tiles")
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
-    _check_free(names, project, force)
+    check_free(names, project, force)
     model = None if dem is None else read_dem(dem)
-    heights = None if model is None else ground_of(model, cell_m)
+    heights = None if model is None else ground_sampler(model, cell_m)
     texts = []
     wide, high = _BEYOND_DEG, _BEYOND_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
     for one, box, found in zip(names, boxes, maps, strict=True):
-        text, told = town_recipe(
+        text, summary = town_recipe(
             found, box, extract.name, heights=heights, extra_attribution=attribution, seed=seed, ceiling_m=ceiling_m,
             drive_on=drive_on,
         )  # fmt: skip
-        texts.append((one, text, tuple(_counted(dict(told.counts)))))
-    return [_added(one, text, project, said) for one, text, said in texts]
+        texts.append((one, text, tuple(_summary_lines(dict(summary.counts)))))
+    return [_write_place(one, text, project, notes) for one, text, notes in texts]
 
 
 def add_terrain(
@@ -81,25 +78,18 @@ def add_terrain(
     cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None,
     sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
     ceiling_m: float | None = None, force: bool = False,
-) -> Place:  # fmt: skip
+) -> AddedPlace:  # fmt: skip
     """Make open country of a height model, in a project folder."""
-    _check_free([name], project, force)
+    check_free([name], project, force)
     model: Dem = read_dem(dem)
-    text, said = relief_recipe(
-        model, bbox=None if bbox is None else checked_bbox(bbox), size=size_m, cell_m=cell_m, water_m=water_m,
+    text, notes = relief_recipe(
+        model, bbox=None if bbox is None else check_bbox(bbox), size=size_m, cell_m=cell_m, water_m=water_m,
         snow_m=snow_m, sand_m=sand_m, bare=bare, seed=seed, ceiling_m=ceiling_m, attribution=attribution,
     )  # fmt: skip
-    return _added(name, text, project, tuple(said))
+    return _write_place(name, text, project, tuple(notes))
 
 
-def _check_free(names: Sequence[str], project: Path, force: bool) -> None:
-    for name in names:
-        recipe = project / "scenes" / f"{check_scene_name(name)}.toml"
-        if recipe.exists() and not force:
-            raise UsageError(f"{recipe} exists: --force replaces the scene")
-
-
-def _added(name: str, text: str, project: Path, said: tuple[str, ...]) -> Place:
+def _write_place(name: str, text: str, project: Path, notes: tuple[str, ...]) -> AddedPlace:
     """Build a recipe, and keep it if that went well."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.toml"
@@ -113,13 +103,11 @@ def _added(name: str, text: str, project: Path, said: tuple[str, ...]) -> Place:
     with atomic_file(project, f"scenes/{name}.toml") as path:
         path.write_text(text, encoding="utf-8")
     (project / "scenes" / f"{name}.glb").unlink(missing_ok=True)
-    if not (project / PIPELINE).exists():
-        with atomic_file(project, PIPELINE) as path:
-            path.write_text(pipeline_text(project), encoding="utf-8")
-    return Place(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, said)
+    write_pipeline(project)
+    return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)
 
 
-def _counted(counts: dict[str, int]) -> list[str]:
+def _summary_lines(counts: dict[str, int]) -> list[str]:
     """Say what of the map is there, how high buildings are known to be, and what was left out."""
     what = [
         f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))

@@ -36,11 +36,11 @@ class RawSurface:
     @cached_property
     def digest(self) -> str:
         """Of all that is drawn of it, hexadecimal: the same whatever it is called and wherever it stands."""
-        said = hashlib.sha256(repr((self.colour, self.double_sided, self.unlit)).encode())
+        sha = hashlib.sha256(repr((self.colour, self.double_sided, self.unlit)).encode())
         for array in (self.texture, self.mask):
             if array is not None:
-                said.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-        return said.hexdigest()
+                sha.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+        return sha.hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class RawNode:
     corners: NDArray[np.float32] | None = None  # (m, 3, 5) float32 or None
     surfaces: tuple[RawSurface, ...] = ()
 
-    def some(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
+    def select_faces(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
         """Return the node with some of its faces alone, in the order given; vertices stay as they are."""
         return RawNode(
             self.name, self.vertices, self.faces[rows], self.colours[rows],
@@ -63,35 +63,35 @@ class RawNode:
             None if self.corners is None else self.corners[rows], self.surfaces,
         )  # fmt: skip
 
-    def placed(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
+    def with_vertices(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
         """Return the node with other vertices, and where given with other indices into them, face by face."""
         faces = self.faces if faces is None else faces
         return RawNode(self.name, vertices, faces, self.colours, self.surface, self.corners, self.surfaces)
 
 
-def some_of(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
+def extract_faces(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
     """Make a node of some faces of another, with the vertices that they need."""
     used, faces = np.unique(body.faces[rows], return_inverse=True)
-    return body.some(rows).placed(body.vertices[used], faces.reshape(-1, 3))
+    return body.select_faces(rows).with_vertices(body.vertices[used], faces.reshape(-1, 3))
 
 
-def cut_to(body: RawNode, region: Region) -> RawNode:
+def clip_node(body: RawNode, region: Region) -> RawNode:
     """Make a node of what of another lies within a region of the plan; without faces where nothing does."""
     pieces = cut(body.vertices, body.faces, region)
     n = len(pieces.source)
     # What faces have comes from their source; what corners have is mixed by their weights.
-    kept = body.some(pieces.source)
+    kept = body.select_faces(pieces.source)
     if kept.corners is not None:
         kept = replace(kept, corners=np.einsum("kij,kjc->kic", pieces.weights, kept.corners).astype(np.float32))
-    return kept.placed(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
+    return kept.with_vertices(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
-def plain(n: int) -> NDArray[np.uint8]:
+def default_colours(n: int) -> NDArray[np.uint8]:
     """Return the colour of faces whose file has none, (n, 3) uint8."""
     return np.tile(np.array(GREY, dtype=np.uint8), (n, 1))
 
 
-def joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
+def merge_nodes(name: str, bodies: Sequence[RawNode]) -> RawNode:
     """Make one node of several of a file; the same one whatever their order."""
     bodies = sorted(bodies, key=_digest)
     vertices, faces = soup(bodies)
@@ -107,19 +107,19 @@ def joined(name: str, bodies: Sequence[RawNode]) -> RawNode:
         m = len(b.faces)
         own = np.full(m, -1, np.int32) if b.surface is None else b.surface
         surface.append(np.where(own < 0, own, own + first[b.surfaces]).astype(np.int32))
-        corners.append(no_corners(m) if b.corners is None else b.corners)
+        corners.append(empty_corners(m) if b.corners is None else b.corners)
     surfaces = tuple(s for several in first for s in several)
     return RawNode(name, vertices, whole.faces, colours, np.concatenate(surface), np.concatenate(corners), surfaces)
 
 
-def no_corners(n: int) -> NDArray[np.float32]:
+def empty_corners(n: int) -> NDArray[np.float32]:
     """Return what the corners of n faces carry that have neither texture coordinates nor colours, (n, 3, 5)."""
     out = np.full((n, 3, len(CORNER)), np.nan, dtype=np.float32)
     out[..., :2] = 0.0
     return out
 
 
-def in_place_order(bodies: Sequence[RawNode]) -> list[RawNode]:
+def sort_by_position(bodies: Sequence[RawNode]) -> list[RawNode]:
     """Sort nodes by where they are: a file's nodes come in an order that depends on its reader and writer.
 
     West before east, then south before north, then low before high, by their lower corners; nodes of one corner by a

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.imports.dem import Dem, outside
-from aerialdojo_gen.imports.earth import Bbox, LocalFrame, in_words, size_m
+from aerialdojo_gen.imports.dem import Dem, describe_coverage
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.toml_text import recipe_text
 
 Floats = NDArray[np.float64]
@@ -36,35 +36,31 @@ def grid(
     if frame is not None:
         z = dem.at_degrees(*frame.degrees(x, y))
         (west, east), (south, north) = frame.degrees((x[0, 0], x[-1, -1]), (y[0, 0], y[-1, -1]))
-        where = in_words((float(west), float(south), float(east), float(north)))
+        where = format_bbox((float(west), float(south), float(east), float(north)))
     else:
         z = dem.at(x + middle[0], y + middle[1])
         where = f"{size[0]:,.0f} by {size[1]:,.0f} m about ({middle[0]:,.0f}, {middle[1]:,.0f})"
     missing = np.isnan(z)
     if missing.mean() > 1.0 - _LEAST_SHARE:
-        raise UsageError(f"{missing.mean():.0%} of {where} has no height: {outside(dem)}")
+        raise UsageError(f"{missing.mean():.0%} of {where} has no height: {describe_coverage(dem)}")
     if missing.any():
         nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
         z = z[tuple(nearest)]
     return z
 
 
-def cell_for(size: tuple[float, float], wanted_m: float | None, own_m: float) -> float:
+def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float) -> float:
     """Choose the distance of heights: no finer than the model's own, and no more than `MOST_CELLS` of them."""
     least = math.sqrt(size[0] * size[1] / MOST_CELLS)
-    if wanted_m is not None:
-        if (
-            not (math.isfinite(wanted_m) and wanted_m >= _FINEST_M)
-            or wanted_m < least * 0.999
-            or wanted_m > min(size) / 2
-        ):
+    if cell_m is not None:
+        if not (math.isfinite(cell_m) and cell_m >= _FINEST_M) or cell_m < least * 0.999 or cell_m > min(size) / 2:
             raise UsageError(
-                f"--cell {wanted_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of "
+                f"--cell {cell_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of "
                 f"{max(least, _FINEST_M):.2f} m or more ({MOST_CELLS:,} of them at most), "
                 f"and of {min(size) / 2:g} m or less"
             )
-        return wanted_m
-    return max(own_m, least, _FINEST_M * 2)
+        return cell_m
+    return max(native_m, least, _FINEST_M * 2)
 
 
 def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]:
@@ -73,12 +69,12 @@ def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]
     return round(x, 6), round(y, 6)
 
 
-def rounded(z: Floats) -> list[list[float]]:
+def to_centimetres(z: Floats) -> list[list[float]]:
     """Heights as a recipe states them, to the centimetre."""
     return [[round(float(v), 2) for v in row] for row in z]
 
 
-def own_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
+def native_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
     """Distance of a model's own heights, metres, the larger of both ways."""
     if not dem.geographic:
         return max(dem.dx, dem.dy)
@@ -96,9 +92,9 @@ def relief_recipe(
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(
             f"{dem.path.name}: {size[0]:,.0f} by {size[1]:,.0f} m, a scene has {SMALLEST_M:g} to {LARGEST_M:,.0f} m: "
-            f"--size 400 400 takes the middle of it, --bbox a part; {outside(dem)}"
+            f"--size 400 400 crops to its centre, --bbox to a part; {describe_coverage(dem)}"
         )
-    cell = round(cell_for(size, cell_m, own_cell_m(dem, frame)), 4)
+    cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
     size = whole_cells(size, cell)
     z = grid(dem, size, cell, frame, middle)
     datum = round(float(z.min()), 2)
@@ -107,14 +103,14 @@ def relief_recipe(
     parameters: dict[str, Any] = {
         **{key: round(value - datum, 2) for key, value in marks.items() if value is not None},
         **({"bare": True} if bare else {}),
-        "heights": {"cell_m": cell, "rows_m": rounded(z - datum)},
+        "heights": {"cell_m": cell, "rows_m": to_centimetres(z - datum)},
     }
     head = {
         "layout": "relief", "seed": seed, "size_m": list(size),
         "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if ceiling_m is None else ceiling_m,
         **({"attribution": attribution} if attribution else {}), "origin": _origin(frame, middle, datum),
     }  # fmt: skip
-    said = [
+    notes = [
         f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
         f"z = 0 is {datum:g} m, the highest point {top:.1f} m over it",
         "x east, y north, metres about "
@@ -126,11 +122,11 @@ def relief_recipe(
     ]
     missing = int(np.isnan(dem.heights_m).sum())
     if missing:
-        said.append(
-            f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: the nearest stands for them"
+        notes.append(
+            f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: filled with the nearest height"
         )
-    comments = (f"Made by add-terrain of {dem.path.name}: {said[0]}.", said[1] + ".")
-    return recipe_text(head, parameters, comments), said
+    comments = (f"Made by add-terrain of {dem.path.name}: {notes[0]}.", notes[1] + ".")
+    return recipe_text(head, parameters, comments), notes
 
 
 def _place(
@@ -152,15 +148,15 @@ def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float)
     return {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7), "z_m": datum}
 
 
-def ground_of(dem: Dem, cell_m: float | None = None) -> Any:
+def ground_sampler(dem: Dem, cell_m: float | None = None) -> Any:
     """Make what gives a town its ground: ``(frame, size_m) -> table``, the height of z = 0 in `z_m`."""
 
     def heights(frame: LocalFrame, size: tuple[float, float]) -> dict[str, Any]:
-        cell = round(cell_for(size, cell_m, own_cell_m(dem, frame)), 4)
+        cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
         # Whole cells that cover the site: a town keeps the size of its bounding box.
-        around = tuple(math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
-        z = grid(dem, (around[0], around[1]), cell, frame, (0.0, 0.0))
+        cover = tuple(math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
+        z = grid(dem, (cover[0], cover[1]), cell, frame, (0.0, 0.0))
         datum = round(float(z.min()), 2)
-        return {"cell_m": cell, "rows_m": rounded(z - datum), "z_m": datum}
+        return {"cell_m": cell, "rows_m": to_centimetres(z - datum), "z_m": datum}
 
     return heights

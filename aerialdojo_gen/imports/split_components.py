@@ -10,20 +10,20 @@ import scipy.ndimage
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.columns import Plan, lowest_of
-from aerialdojo_gen.imports.cutting import bodies_of
-from aerialdojo_gen.imports.raw import RawNode, joined, some_of
+from aerialdojo_gen.imports.cutting import connected_bodies
+from aerialdojo_gen.imports.raw import RawNode, extract_faces, merge_nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_REACH_M = 0.3
+_TOUCH_M = 0.3
 # A node as wide as this along both axes, in many pieces, is a soup of things; a thing as wide may be several.
 _WIDE_M, _SPREAD_M = 60.0, 100.0
-_MOST_OF = 0.6
+_MAX_PIECE_SHARE = 0.6
 # A body as wide as this share of all that there is, and open, is what the rest stands on.
 _GROUND_SHARE = 0.25
 _CELL_M = 1.0
-_MOST_CELLS = 4_000_000
+_MAX_CELLS = 4_000_000
 # Openings by windows of these many cells take away what is narrower: Zhang et al. 2003, progressive.
 _WINDOWS = (3, 5, 9, 17, 33, 65)
 _SLOPE, _STEP_M, _HIGHEST_STEP_M, _HOUSE_M = 0.35, 0.4, 3.0, 35.0
@@ -31,17 +31,17 @@ _ABOVE_M = 0.4
 # What stands out of the ground is a thing if it is so high, covers so much, and has walls.
 _THING_M, _THING_M2, _WALLS, _STEEP = 1.2, 2.0, 0.2, 0.6
 _MAP_M = 0.5
-_MOST_MAPPED = 20_000
+_MAX_MAPPED = 20_000
 
 
 @dataclass
-class Apart:
+class SplitStats:
     """How often what was taken apart."""
 
     pieces: int = 0  # Connected pieces that soups fell into; what they were gathered to
     things: int = 0
     materials: int = 0  # Pieces of one material that wide connected bodies fell into
-    grown: int = 0  # Things that were one surface with the ground
+    attached: int = 0  # Things that were one surface with the ground
     soups: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
@@ -49,20 +49,18 @@ class Apart:
         if not self.soups:
             return []
         of = "the only node" if self.soups == [""] else f"{len(self.soups):,} node{'s' * (len(self.soups) > 1)}"
-        out = [
-            f"taken apart: {of}, in {self.pieces:,} connected pieces, into {self.things:,} by what belongs together"
-        ]
+        out = [f"taken apart: {of}, in {self.pieces:,} connected pieces, into {self.things:,} things"]
         if self.materials:
-            out.append(f"{self.materials:,} pieces are of wide bodies, taken apart by material")
-        if self.grown:
-            were = "thing was" if self.grown == 1 else "things were"
-            out.append(f"{self.grown:,} {were} one surface with the ground, now separated from it")
+            out.append(f"{self.materials:,} pieces are of wide bodies that were segmented by material")
+        if self.attached:
+            were = "thing was" if self.attached == 1 else "things were"
+            out.append(f"{self.attached:,} {were} one surface with the ground, now separated from it")
         return out
 
 
-def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
+def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitStats]:
     """Segment unstructured meshes (z up, metres) into things; nodes that are things of their own stay whole."""
-    told = Apart()
+    stats = SplitStats()
     low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
     high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
     out: list[RawNode] = []
@@ -71,33 +69,33 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], Apart]:
         if len(bodies) > 1 and not _is_soup(body, pieces):
             out.append(body)
             continue
-        told.soups.append(body.name if len(bodies) > 1 else "")
+        stats.soups.append(body.name if len(bodies) > 1 else "")
         if len(bodies) == 1 and len(pieces) > 1:
             # What a file calls all that it holds is no name of a thing in it.
             pieces = [replace(piece, name="") for piece in pieces]
-        told.pieces += len(pieces)
+        stats.pieces += len(pieces)
         grounds, things = [], []
         for piece in pieces:
-            if _bears(piece, low, high):
-                ground, grown = _ground_and_things(piece)
-                grown = [replace(thing, name="") for thing in grown]
-                told.grown += len(grown)
+            if _is_ground_surface(piece, low, high):
+                ground, attached = _ground_and_things(piece)
+                attached = [replace(thing, name="") for thing in attached]
+                stats.attached += len(attached)
                 grounds += [ground] if len(ground.faces) else []
-                things += grown
+                things += attached
             elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and (_materials(piece) > 0).any():
                 parts = _by_material(piece)
-                told.materials += len(parts)
+                stats.materials += len(parts)
                 things += parts
             else:
                 things.append(piece)
-        gathered = _gathered(things)
-        told.things += len(grounds) + len(gathered)
+        gathered = _group_pieces(things)
+        stats.things += len(grounds) + len(gathered)
         out += [*grounds, *gathered]
-    return out, told
+    return out, stats
 
 
 def _connected(body: RawNode) -> list[RawNode]:
-    label, _ = bodies_of(body.faces, len(body.vertices))
+    label, _ = connected_bodies(body.faces, len(body.vertices))
     return _split(body, label)
 
 
@@ -106,14 +104,14 @@ def _split(body: RawNode, label: Ints) -> list[RawNode]:
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     groups = sorted((np.sort(rows) for rows in np.split(order, cuts) if len(rows)), key=lambda rows: int(rows[0]))
-    return [some_of(body, rows) for rows in groups]
+    return [extract_faces(body, rows) for rows in groups]
 
 
 def _is_soup(body: RawNode, pieces: Sequence[RawNode]) -> bool:
     size = np.ptp(body.vertices[:, :2], axis=0)
     if len(pieces) < 2 or (size < _SPREAD_M).any():
         return False
-    return all((np.ptp(p.vertices[:, :2], axis=0) < _MOST_OF * size).all() for p in pieces)
+    return all((np.ptp(p.vertices[:, :2], axis=0) < _MAX_PIECE_SHARE * size).all() for p in pieces)
 
 
 def _materials(body: RawNode) -> Ints:
@@ -125,15 +123,15 @@ def _materials(body: RawNode) -> Ints:
 
 def _by_material(body: RawNode) -> list[RawNode]:
     kind = _materials(body)
-    return [piece for k in np.unique(kind) for piece in _connected(some_of(body, np.flatnonzero(kind == k)))]
+    return [piece for k in np.unique(kind) for piece in _connected(extract_faces(body, np.flatnonzero(kind == k)))]
 
 
-def _bears(body: RawNode, low: Floats, high: Floats) -> bool:
+def _is_ground_surface(body: RawNode, low: Floats, high: Floats) -> bool:
     """Whether a body is wide enough, and open, to be what others stand on."""
     size = np.ptp(body.vertices[:, :2], axis=0)
     if (size < _GROUND_SHARE * (high - low)[:2]).any() or (size < 10.0).any():
         return False
-    _, closed = bodies_of(body.faces, len(body.vertices))
+    _, closed = connected_bodies(body.faces, len(body.vertices))
     normal = np.cross(
         body.vertices[body.faces[:, 1]] - body.vertices[body.faces[:, 0]],
         body.vertices[body.faces[:, 2]] - body.vertices[body.faces[:, 0]],
@@ -150,7 +148,7 @@ def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
     raised = middle[:, 2] - floor[cell[:, 0], cell[:, 1]] > _ABOVE_M
     if not raised.any():
         return body, []
-    label, _ = bodies_of(body.faces[raised], len(body.vertices))
+    label, _ = connected_bodies(body.faces[raised], len(body.vertices))
     rows = np.flatnonzero(raised)
     things = []
     for k in range(int(label.max()) + 1):
@@ -160,13 +158,13 @@ def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
     taken = np.zeros(len(body.faces), dtype=np.bool_)
     for own in things:
         taken[own] = True
-    return some_of(body, np.flatnonzero(~taken)), [some_of(body, own) for own in things]
+    return extract_faces(body, np.flatnonzero(~taken)), [extract_faces(body, own) for own in things]
 
 
 def _floor(body: RawNode) -> tuple[Floats, Plan]:
     """Height of the bare ground over a lattice: openings take away what is narrow and high."""
     low, high = body.vertices[:, :2].min(axis=0), body.vertices[:, :2].max(axis=0)
-    step = max(_CELL_M, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
+    step = max(_CELL_M, float(np.sqrt(np.prod(high - low) / _MAX_CELLS)))
     plan = Plan.over(low, high, step)
     surface = lowest_of(body.vertices[body.faces].reshape(-1, 9), plan)
     empty = np.isnan(surface)
@@ -201,7 +199,7 @@ def _is_thing(body: RawNode, rows: Ints) -> bool:
     )
 
 
-def _gathered(pieces: Sequence[RawNode]) -> list[RawNode]:
+def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
     """Give what lies within the box of something larger, and over or at it, to the smallest such thing."""
     if not pieces:
         return []
@@ -213,10 +211,10 @@ def _gathered(pieces: Sequence[RawNode]) -> list[RawNode]:
     maps: dict[int, frozenset[tuple[int, int]] | None] = {}
     for rank, k in enumerate(order):
         larger = order[rank + 1 :]
-        around = (low[larger] <= low[k] + _REACH_M).all(axis=1) & (high[larger] >= high[k] - _REACH_M).all(axis=1)
-        around &= size[larger] > 1.5 * size[k]
-        for j in larger[around]:
-            if _holds(pieces, int(j), int(k), maps):
+        encloses = (low[larger] <= low[k] + _TOUCH_M).all(axis=1) & (high[larger] >= high[k] - _TOUCH_M).all(axis=1)
+        encloses &= size[larger] > 1.5 * size[k]
+        for j in larger[encloses]:
+            if _lies_over(pieces, int(j), int(k), maps):
                 owner[k] = j
                 break
     for k in order[::-1]:
@@ -224,10 +222,10 @@ def _gathered(pieces: Sequence[RawNode]) -> list[RawNode]:
     groups: dict[int, list[RawNode]] = {}
     for k, piece in enumerate(pieces):
         groups.setdefault(int(owner[k]), []).append(piece)
-    return [joined(pieces[k].name, members) for k, members in sorted(groups.items())]
+    return [merge_nodes(pieces[k].name, members) for k, members in sorted(groups.items())]
 
 
-def _holds(
+def _lies_over(
     pieces: Sequence[RawNode], larger: int, smaller: int, maps: dict[int, frozenset[tuple[int, int]] | None]
 ) -> bool:
     """Whether half of a piece's plan lies over another's, or beside it: a fence does not hold the house within."""
@@ -243,12 +241,12 @@ def _cells(
     """Squares of the plan that a body's triangles lie over, and those around; None for one of too many."""
     if k not in maps:
         corners = body.vertices[body.faces][:, :, :2]
-        first = np.floor((corners.min(axis=1) - _REACH_M) / _MAP_M).astype(np.int64)
-        last = np.floor((corners.max(axis=1) + _REACH_M) / _MAP_M).astype(np.int64)
+        first = np.floor((corners.min(axis=1) - _TOUCH_M) / _MAP_M).astype(np.int64)
+        last = np.floor((corners.max(axis=1) + _TOUCH_M) / _MAP_M).astype(np.int64)
         spans = np.unique(np.column_stack([first, last]), axis=0)
         n = ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum()
         cells: frozenset[tuple[int, int]] | None = None
-        if n <= _MOST_MAPPED:
+        if n <= _MAX_MAPPED:
             cells = frozenset(
                 (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
             )

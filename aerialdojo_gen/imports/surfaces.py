@@ -33,7 +33,7 @@ _ROOFED = 0.9
 _PROBES = 12
 
 
-def domes_of(bodies: Sequence[RawNode], called: Sequence[str]) -> list[int]:
+def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[int]:
     """Find sky domes, the largest first: large hollow shells that enclose everything else and roof it over."""
     found: list[int] = []
     low = np.array([b.vertices.min(axis=0) for b in bodies])
@@ -43,21 +43,21 @@ def domes_of(bodies: Sequence[RawNode], called: Sequence[str]) -> list[int]:
         if not rest:
             break
         words = [word for word in words_in(bodies[k].name) if word not in _SKY_PERHAPS]
-        sky = called[k] == SKY or (not called[k] and bool(_SKY_WORDS & set(words)))
-        if (called[k] or words) and not sky:
+        sky = table_names[k] == SKY or (not table_names[k] and bool(_SKY_WORDS & set(words)))
+        if (table_names[k] or words) and not sky:
             break
         inner_low, inner_high = low[rest].min(axis=0), high[rest].max(axis=0)
         wider = _WIDER_CALLED if sky else _WIDER
         size, inner = high[k] - low[k], inner_high - inner_low
-        around = (low[k, :2] <= inner_low[:2] + 1e-6).all() and (high[k] >= inner_high - 1e-6).all()
+        encloses = (low[k, :2] <= inner_low[:2] + 1e-6).all() and (high[k] >= inner_high - 1e-6).all()
         large = (size[:2] >= wider * inner[:2]).all() and (sky or size[:2].min() >= _LARGE_M)
-        if not (around and large and _hollow(bodies[k]) and _roofs(bodies[k], inner_low, inner_high)):
+        if not (encloses and large and _is_hollow(bodies[k]) and _covers_above(bodies[k], inner_low, inner_high)):
             break
         found.append(k)
     return found
 
 
-def _hollow(body: RawNode) -> bool:
+def _is_hollow(body: RawNode) -> bool:
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
     centres = body.vertices[body.faces].mean(axis=1)
     middle, reach = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
@@ -67,7 +67,7 @@ def _hollow(body: RawNode) -> bool:
     return bool(max(shares) > _SHELL)
 
 
-def _roofs(body: RawNode, low: Floats, high: Floats) -> bool:
+def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
     """Whether columns over a box meet the body above the box's top."""
     from aerialdojo_gen.geometry.rays import TriangleRayCaster
 
@@ -79,7 +79,7 @@ def _roofs(body: RawNode, low: Floats, high: Floats) -> bool:
     return bool(np.isfinite(hit).mean() >= _ROOFED)
 
 
-def decided(scene: Scene, source_names: dict[str, str]) -> Scene:
+def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
     """Say of every open surface of an imported scene whether it is the ground."""
     unknown = replace(scene, instances=tuple(replace(i, surface="") for i in scene.instances))
     ground = Ground.of(unknown)
@@ -96,7 +96,7 @@ def decided(scene: Scene, source_names: dict[str, str]) -> Scene:
     return replace(scene, instances=tuple(replace(i, surface=surface(i)) for i in scene.instances))
 
 
-def describe(scene: Scene) -> list[str]:
+def describe_surfaces(scene: Scene) -> list[str]:
     """Say what was decided, a line each."""
     from collections import Counter
 
@@ -107,10 +107,8 @@ def describe(scene: Scene) -> list[str]:
     if n["ground"]:
         names = [i.node for i in scene.instances if i.surface == "ground"]
         more = f" and {len(names) - 3:,} more" if len(names) > 3 else ""
-        lines.append(f"nobody flies below the open ground: {', '.join(names[:3])}{more}")
+        lines.append(f"closed to flight below the open ground: {', '.join(names[:3])}{more}")
     if scene.backdrop:
         names = [i.node for i in scene.backdrop]
-        lines.append(
-            f"{', '.join(names)}: drawn as the sky behind everything, and nothing to collide with or look for"
-        )
+        lines.append(f"{', '.join(names)}: drawn as the sky, without collisions, never a target")
     return lines

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, default_colours
 
 _MAIN, _EDITOR, _OBJECT, _MESH = 0x4D4D, 0x3D3D, 0x4000, 0x4100
 _VERTICES, _FACES, _FACE_MATERIAL = 0x4110, 0x4120, 0x4130
@@ -28,7 +28,7 @@ def read_3ds(data: bytes) -> list[RawNode]:
     try:
         chunks = list(_chunks(data, 0, len(data)))
         if not chunks or chunks[0][0] != _MAIN:
-            raise AssetError("is no 3DS file")
+            raise AssetError("is not a 3DS file")
         editor = [c for c in _chunks(data, *chunks[0][1:]) if c[0] == _EDITOR]
         colours: dict[str, tuple[int, int, int]] = {}
         nodes = []
@@ -81,13 +81,13 @@ def _material(data: bytes, start: int, end: int) -> tuple[str, tuple[int, int, i
 def _mesh(data: bytes, name: str, start: int, end: int, colours: dict[str, tuple[int, int, int]]) -> RawNode:
     vertices: NDArray[np.float64] = np.zeros((0, 3))
     faces: NDArray[np.int64] = np.zeros((0, 3), dtype=np.int64)
-    painted = plain(0)
+    painted = default_colours(0)
     for kind, a, b in _chunks(data, start, end):
         if kind == _VERTICES:
             vertices = _records(data, a, b, "<f4", 3).astype(np.float64)
         elif kind == _FACES:
             records = _records(data, a, b, "<u2", 4)
-            faces, painted = records[:, :3].astype(np.int64), plain(len(records))
+            faces, painted = records[:, :3].astype(np.int64), default_colours(len(records))
             for inner, first, last in _chunks(data, a + 2 + 8 * len(records), b):
                 if inner == _FACE_MATERIAL:
                     material, body = _text(data, first, last)

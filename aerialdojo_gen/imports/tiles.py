@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region
-from aerialdojo_gen.imports.import_mesh import LARGEST_M, SMALLEST_M, Place, Repairs, settled
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, SMALLEST_M, Repairs, SourceMesh, make_scene
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
-_MOST_TILES = 400
+_MAX_TILES = 400
 # A tile with less at the place's edge than this share of its plan is none.
-_LEAST_SHARE = 0.02
+_MIN_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +32,9 @@ class Tile:
     repairs: Repairs  # What was mended; its `origin_m` is the same for all tiles
 
 
-def tiles_of(
+def make_tiles(
     name: str,
-    place: Place,
+    source: SourceMesh,
     edge_m: float,
     *,
     ceiling_m: float | None = None,
@@ -47,24 +47,24 @@ def tiles_of(
     """
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
-    low, high = place.low, place.high
+    low, high = source.low, source.high
     columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
-    if columns * rows > _MOST_TILES:
-        raise AssetError(
-            f"--tiles {edge_m:g}: {columns * rows:,} tiles, {_MOST_TILES} are the most: make them larger"
-        )
+    if columns * rows > _MAX_TILES:
+        raise AssetError(f"--tiles {edge_m:g}: {columns * rows:,} tiles, {_MAX_TILES} are the most: make them larger")
     origin = np.array([*(low[:2] + high[:2]) / 2, low[2]])
-    boxes = np.array([[b.vertices[:, :2].min(axis=0), b.vertices[:, :2].max(axis=0)] for b in place.bodies])
+    boxes = np.array([[b.vertices[:, :2].min(axis=0), b.vertices[:, :2].max(axis=0)] for b in source.bodies])
     for row in range(rows):
         for column in range(columns):
             corner = low[:2] + edge_m * np.array([column, row])
             region = Region.box(*corner, *(corner + edge_m))
             near = np.asarray((boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1))
-            part = Place([b for b, n in zip(place.bodies, near, strict=True) if n], place.domes, place.repairs)
-            if not near.any() or not _holds_something(part, region, edge_m):
+            part = SourceMesh(
+                [b for b, n in zip(source.bodies, near, strict=True) if n], source.domes, source.repairs
+            )
+            if not near.any() or not _has_content(part, region, edge_m):
                 continue
             tile = tile_name(name, column, row)
-            scene, repairs = settled(
+            scene, repairs = make_scene(
                 tile, part, region, ceiling_m=ceiling_m, naming=naming, origin_m=origin, light=light
             )
             yield Tile(tile, region, scene, repairs)
@@ -78,11 +78,11 @@ def tile_name(name: str, column: int, row: int) -> str:
     return f"{name}-x{column}y{row}"
 
 
-def _holds_something(place: Place, region: Region, edge_m: float) -> bool:
+def _has_content(source: SourceMesh, region: Region, edge_m: float) -> bool:
     """Whether what lies in a square is wide enough to fly in, and more than a scrap of it."""
     try:
-        part = place.within(region)
+        part = source.within(region)
     except AssetError:
         return False
     size = (part.high - part.low)[:2]
-    return bool(size.max() >= SMALLEST_M and np.prod(size) >= _LEAST_SHARE * edge_m**2)
+    return bool(size.max() >= SMALLEST_M and np.prod(size) >= _MIN_SHARE * edge_m**2)

@@ -19,34 +19,34 @@ MAX_SECONDS = 300
 _OUT_OF_MEMORY = 3
 
 
-def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, mend: str) -> None:
+def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, advice: str) -> None:
     """Run a module that reads a file, and wait for it."""
     # Not multiprocessing, which would run a caller's unguarded script a second time.
     command = [sys.executable, "-m", module, str(max_memory_bytes), str(path.resolve()), *arguments]
     try:
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
+        process = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
     except subprocess.TimeoutExpired:
-        raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: {mend}") from None
-    if ended.returncode:
-        raise AssetError(f"{path}: {_cause(ended, max_memory_bytes, mend)}")
+        raise AssetError(f"{path}: reading takes more than {MAX_SECONDS} s: {advice}") from None
+    if process.returncode:
+        raise AssetError(f"{path}: {_failure_reason(process, max_memory_bytes, advice)}")
 
 
-def _cause(ended: subprocess.CompletedProcess[str], max_memory_bytes: int, mend: str) -> str:
+def _failure_reason(process: subprocess.CompletedProcess[str], max_memory_bytes: int, advice: str) -> str:
     """Say why a reading process ended with another code than 0."""
-    said, failed = (text.strip().splitlines() for text in (ended.stdout, ended.stderr))
-    if ended.returncode == _OUT_OF_MEMORY or environment_errors.is_out_of_memory(ended.stderr):
-        return f"needs more than {_memory(max_memory_bytes) >> 20:,} MB of memory to read: {mend}"
-    number = -ended.returncode
+    out, err = (text.strip().splitlines() for text in (process.stdout, process.stderr))
+    if process.returncode == _OUT_OF_MEMORY or environment_errors.is_out_of_memory(process.stderr):
+        return f"needs more than {_memory_limit(max_memory_bytes) >> 20:,} MB of memory to read: {advice}"
+    number = -process.returncode
     if number == signal.SIGXCPU:
-        return f"reading takes more than {MAX_SECONDS} s: {mend}"
+        return f"reading takes more than {MAX_SECONDS} s: {advice}"
     if number == signal.SIGKILL:
-        return f"its reader was killed (signal 9), by the system if memory ran out: try again, or {mend}"
+        return f"its reader was killed (signal 9), by the system if memory ran out: try again, or {advice}"
     if number > 0:
         return f"its reader crashed (signal {number}, {signal.strsignal(number)}): the file may be damaged"
-    return said[-1] if said else f"its reader failed ({failed[-1][:160] if failed else 'without a reason'})"
+    return out[-1] if out else f"its reader failed ({err[-1][:160] if err else 'without a reason'})"
 
 
-def _memory(most: int) -> int:
+def _memory_limit(most: int) -> int:
     """Return the bound on address space, where the caller's own limit may be lower."""
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     return most if hard == resource.RLIM_INFINITY else min(most, hard)
@@ -55,7 +55,7 @@ def _memory(most: int) -> int:
 def exit_status(read: Callable[[list[str]], str]) -> int:
     """Bound this process as its command line says, read, and print what is wrong with the file."""
     memory, *arguments = sys.argv[1:]
-    resource.setrlimit(resource.RLIMIT_AS, (_memory(int(memory)),) * 2)
+    resource.setrlimit(resource.RLIMIT_AS, (_memory_limit(int(memory)),) * 2)
     # At the hard limit the kernel sends SIGKILL, which does not tell its cause.
     resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS + 5))
     try:
@@ -74,28 +74,28 @@ class SiblingFiles:
 
     def __init__(self, path: Path) -> None:
         self._folder = path.resolve().parent
-        self.given: dict[str, bytes] = {}
+        self.loaded: dict[str, bytes] = {}
         self.missing: list[str] = []
 
     def get(self, name: str) -> bytes:
         """Read a file; FileNotFoundError where there is none, or it is too large or elsewhere."""
-        wanted = self._found(name.strip())
-        if wanted is None or wanted.stat().st_size > _MAX_BYTES:
+        path = self._resolve(name.strip())
+        if path is None or path.stat().st_size > _MAX_BYTES:
             self.missing.append(name)
             raise FileNotFoundError(name)
-        if name not in self.given:
-            self.given[name] = wanted.read_bytes()
-        return self.given[name]
+        if name not in self.loaded:
+            self.loaded[name] = path.read_bytes()
+        return self.loaded[name]
 
-    def _found(self, name: str) -> Path | None:
+    def _resolve(self, name: str) -> Path | None:
         """Look a name up; other machines' full paths by their last part, as exporters write them."""
         plain = name.replace("\\", "/")
         # map_Kd may have options before the name: "-s 1 1 1 wall.png".
-        for told in (plain, PurePosixPath(plain).name, plain.split(" ")[-1]):
+        for candidate in (plain, PurePosixPath(plain).name, plain.split(" ")[-1]):
             try:
-                wanted = (self._folder / told).resolve()
-                if told and wanted.is_relative_to(self._folder) and wanted.is_file():
-                    return wanted
+                path = (self._folder / candidate).resolve()
+                if candidate and path.is_relative_to(self._folder) and path.is_file():
+                    return path
             except (OSError, ValueError):
                 continue
         return None
@@ -115,7 +115,7 @@ class SiblingFiles:
 
 _HEAD = 1024
 # What begins so is this, and what to do about it.
-_OTHERS = (
+_OTHER_TYPES = (
     (b"\x1f\x8b", "is compressed by gzip: unpack it first"),
     (b"7z\xbc\xaf\x27\x1c", "is a 7z archive: unpack it, and give the mesh in it"),
     (b"Rar!", "is a RAR archive: unpack it, and give the mesh in it"),
@@ -155,12 +155,12 @@ def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
         locked = len(head) >= 8 and struct.unpack_from("<H", head, 6)[0] & _ENCRYPTED
         how = "unpack it with its password" if locked else "unpack it"
         return f"is {'an encrypted' if locked else 'a'} ZIP archive: {how}, and give the mesh in it"
-    for begin, said in _OTHERS:
+    for begin, message in _OTHER_TYPES:
         if head.startswith(begin):
-            return said
+            return message
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text.lower().startswith(_PAGES):
-        return "is a web page, not what it was to download: download the file itself"
+        return "is a web page, not a mesh: download the file itself"
     suffix = path.suffix.lower()
     for begin, own in _MESHES:
         if head.startswith(begin) and suffix != own:

@@ -27,8 +27,8 @@ def _at(check, node):
 @pytest.mark.parametrize("node", sorted(GOOD))
 def test_good_descriptions_are_true_and_fit_nothing_else(node):
     check = _street_check()
-    assert check.untruths(_at(check, node), GOOD[node]) == []
-    assert check.rivals(_at(check, node), GOOD[node]) == []
+    assert check.false_claims(_at(check, node), GOOD[node]) == []
+    assert check.distractors(_at(check, node), GOOD[node]) == []
 
 
 @pytest.mark.parametrize(
@@ -45,8 +45,8 @@ def test_good_descriptions_are_true_and_fit_nothing_else(node):
 )
 def test_planted_ambiguities_are_found(text, fits):
     check = _street_check()
-    rivals = check.rivals(_at(check, "delivery_van_000"), text)
-    assert {check.geometry.scene.instances[j].node for j in rivals} == fits
+    distractors = check.distractors(_at(check, "delivery_van_000"), text)
+    assert {check.geometry.scene.instances[j].node for j in distractors} == fits
 
 
 def test_a_rival_that_is_almost_as_near_counts():
@@ -55,8 +55,8 @@ def test_a_rival_that_is_almost_as_near_counts():
     extra = box("mailbox_002", (40, 40 - 1 - 3.4 - 0.3, 0), (0.6, 0.6, 1.2), colour="yellow")
     check = _street_check(dataclasses.replace(scene, instances=(*scene.instances, extra)))
     text = GOOD["delivery_van_000"]
-    assert check.rivals(_at(check, "delivery_van_000"), text) == [_at(check, "delivery_van_001")]
-    assert check.untruths(_at(check, "delivery_van_001"), text) != []
+    assert check.distractors(_at(check, "delivery_van_000"), text) == [_at(check, "delivery_van_001")]
+    assert check.false_claims(_at(check, "delivery_van_001"), text) != []
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_a_rival_that_is_almost_as_near_counts():
 )
 def test_untruths_are_found(node, text):
     check = _street_check()
-    assert len(check.untruths(_at(check, node), text)) == 1
+    assert len(check.false_claims(_at(check, node), text)) == 1
 
 
 def test_colours_of_other_things_are_not_the_subjects():

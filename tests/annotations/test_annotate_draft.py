@@ -10,7 +10,7 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.draft import Choice, draft_annotations, redraft_annotations
+from aerialdojo_gen.annotations.draft import DraftOptions, draft_annotations, redraft_annotations
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.base.errors import AnnotationError
@@ -69,8 +69,10 @@ def test_drafts_are_varied_english(plaza, catalogue):
 
 def test_choice_limits_objects(plaza, catalogue):
     allowed = {i.node for i in plaza.instances if i.category in ("bench", "sedan", "mailbox", "bicycle")}
-    choice = Choice(refuses=lambda node: "" if node in allowed else "not allowed", centre_m=(0.0, 0.0), within_m=25.0)
-    draft = draft_annotations(plaza, catalogue, 1, 8, 0, choice)
+    options = DraftOptions(
+        reject=lambda node: "" if node in allowed else "not allowed", centre_m=(0.0, 0.0), core_radius_m=25.0
+    )
+    draft = draft_annotations(plaza, catalogue, 1, 8, 0, options)
     for entry in draft.objects:
         assert entry.node in allowed
         x, y, _ = plaza[entry.node].centroid
@@ -78,9 +80,9 @@ def test_choice_limits_objects(plaza, catalogue):
 
 
 def test_too_few_things_is_an_error(plaza, catalogue):
-    with pytest.raises(AnnotationError, match="500 objects are wanted"):
+    with pytest.raises(AnnotationError, match="500 objects requested"):
         draft_annotations(plaza, catalogue, 1, 500, 0)
-    with pytest.raises(AnnotationError, match="2 landmarks are wanted"):
+    with pytest.raises(AnnotationError, match="2 landmarks requested"):
         draft_annotations(plaza, catalogue, 2, 5, 0)
 
 
@@ -93,7 +95,7 @@ def test_things_that_cannot_be_told_apart_are_not_drafted(catalogue):
     ]
     materials = {p.material: catalogue.materials[p.material] for i in (tower, *twins) for p in i.parts}
     scene = dataclasses.replace(street(), name="U_Twins_0", instances=(tower, *twins), materials=materials)
-    with pytest.raises(AnnotationError, match="can be chosen and told apart"):
+    with pytest.raises(AnnotationError, match="can be chosen and distinguished"):
         draft_annotations(scene, catalogue, 1, 1, 0)
 
 

@@ -89,7 +89,7 @@ def test_lines_are_those_of_the_values():
         ('{\n"format": "x",,}', 2, "not JSON"),
         ("[1]", 1, "must be an object"),
         ("[" * 100_000, 0, "line 1, column 65: nested more than 64 deep"),
-        ('{"scene": "a",\n "scene": "b"}', 2, "stands twice"),
+        ('{"scene": "a",\n "scene": "b"}', 2, "occurs twice"),
     ],
 )
 def test_faults_of_the_text(text, line, words):

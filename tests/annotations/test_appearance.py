@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from support.annotation_scenes import NAMES, PAINTS, box, street, street_annotations
 
-from aerialdojo_gen.annotations.appearance import colour_shares, uncoloured, unlike
+from aerialdojo_gen.annotations.appearance import colour_shares, false_phrases, unsupported_colours
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.phrases import noun_of, words_of
@@ -37,10 +37,10 @@ def test_a_phrase_of_the_catalogue_must_be_so_of_the_instance(catalogue):
     true = Look("Three lamps, one above the other", has=tuple(list(thing.anatomy.runs)[:1]))
     false = Look("a tent beside it", has=("tent",))
     looks = {"traffic_light": (true, false)}
-    assert list(unlike("It has three lamps one above the other.", thing, looks, materials)) == []
-    (message,) = unlike("A traffic light with a tent beside it.", thing, looks, materials)
+    assert list(false_phrases("It has three lamps one above the other.", thing, looks, materials)) == []
+    (message,) = false_phrases("A traffic light with a tent beside it.", thing, looks, materials)
     assert message.startswith("'a tent beside it' is not so of traffic_light_000: ")
-    assert list(unlike("A traffic light with a tent beside itself.", thing, looks, materials)) == []
+    assert list(false_phrases("A traffic light with a tent beside itself.", thing, looks, materials)) == []
 
 
 def test_what_no_part_is_known_of_bears_no_phrase_out():
@@ -52,14 +52,14 @@ def test_what_no_part_is_known_of_bears_no_phrase_out():
 def test_colours_are_those_of_the_surface():
     red = box("mailbox_000", (0, 0, 0), (1, 1, 1), colour="red")
     assert colour_shares(red, PAINTS) == pytest.approx({"red": 1.0})
-    assert uncoloured("red", red, PAINTS) == []
-    assert uncoloured("dark green", red, PAINTS) == ["green"]
-    assert uncoloured("red and white", red, PAINTS) == ["white"]
+    assert unsupported_colours("red", red, PAINTS) == []
+    assert unsupported_colours("dark green", red, PAINTS) == ["green"]
+    assert unsupported_colours("red and white", red, PAINTS) == ["white"]
     # A twentieth of the surface is a colour of a part, and not that of the whole.
     small = box("mailbox_000", (0, 0, 0), (0.22, 0.22, 0.22), colour="green").parts[0]
     mixed = dataclasses.replace(red, parts=(*red.parts, small))
-    assert uncoloured("green", mixed, PAINTS) == ["green"]
-    assert uncoloured("green handle", mixed, PAINTS) == []
+    assert unsupported_colours("green", mixed, PAINTS) == ["green"]
+    assert unsupported_colours("green handle", mixed, PAINTS) == []
 
 
 def test_stripes_are_two_colours():
@@ -70,8 +70,8 @@ def test_stripes_are_two_colours():
     tile[:8], tile[8:] = (200, 30, 20), (250, 250, 250)
     awning = Material("stripes", (225, 140, 135), tile)
     striped = dataclasses.replace(thing, parts=tuple(Part(p.vertices, p.faces, p.uv, "stripes") for p in thing.parts))
-    assert uncoloured("red and white", striped, {"stripes": awning}) == []
-    assert uncoloured("blue and white", striped, {"stripes": awning}) == ["blue"]
+    assert unsupported_colours("red and white", striped, {"stripes": awning}) == []
+    assert unsupported_colours("blue and white", striped, {"stripes": awning}) == ["blue"]
 
 
 def test_a_colour_that_the_surface_does_not_have_is_a_fault():

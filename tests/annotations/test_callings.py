@@ -8,7 +8,7 @@ import pytest
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.annotations.head_noun import Callings
+from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Instance, Part
@@ -43,7 +43,7 @@ def thing(category, **attributes):
     ],
 )
 def test_a_name_that_the_mesh_contradicts_is_told(text, colour, wrong):
-    found = list(Callings(NAMES).contradictions(text, thing("storefront", colour=colour)))
+    found = list(NounChecker(NAMES).contradictions(text, thing("storefront", colour=colour)))
     assert len(found) == len(wrong)
     assert all(word in message for word, message in zip(wrong, found, strict=True))
 
@@ -54,7 +54,7 @@ def test_a_name_that_the_mesh_contradicts_is_told(text, colour, wrong):
      ("brick building", "building"), ("storefronts", "storefront")],
 )  # fmt: skip
 def test_what_is_only_put_otherwise_is_no_contradiction(text, category):
-    assert list(Callings(NAMES).contradictions(text, thing(category))) == []
+    assert list(NounChecker(NAMES).contradictions(text, thing(category))) == []
 
 
 def test_the_import_refuses_a_red_sedan_that_is_a_wall(project):

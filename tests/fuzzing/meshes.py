@@ -11,7 +11,7 @@ from fuzzing.cases import Case, Target, made, utterable
 from support import foreign, rendered
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.imports.files import read_into, unpack_nodes
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 
@@ -61,7 +61,7 @@ def _read_mesh(folder: Path) -> None:
         fault = "needs too much memory"
     if fault:
         raise AerialDojoError(fault)
-    scene, repairs = import_mesh("U_Mine_0", unpacked(out))
+    scene, repairs = import_mesh("U_Mine_0", unpack_nodes(out))
     utterable(repairs.lines)
     write_glb(scene, folder / "own.glb")
     read_glb(folder / "own.glb")

@@ -10,7 +10,7 @@ from support import maps
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.earth import in_words, size_m, tiles
+from aerialdojo_gen.imports.earth import format_bbox, size_m, tile_bboxes
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -180,7 +180,7 @@ def test_whose_data_it_is_stands_in_the_mesh_and_in_the_table(town, tmp_path):
 
 def test_a_box_is_cut_into_tiles_with_a_shared_frame(extract, tmp_path):
     west, south, east, north = box = maps.box()
-    cut = tiles(box, 60.0)
+    cut = tile_bboxes(box, 60.0)
     assert len(cut) == 4
     assert all(size_m(one) == pytest.approx((60.0, 60.0), abs=0.001) for one in cut)
     assert cut[0][:2] == (west, south)
@@ -224,7 +224,7 @@ def test_a_map_is_read_in_bounded_memory(extract, tmp_path):
 @pytest.mark.parametrize(
     ("box", "said"),
     [
-        ((10.0, 50.0, 10.002, 50.001), "lies outside the extract: town.osm.pbf reaches over 24.89"),
+        ((10.0, 50.0, 10.002, 50.001), "lies outside the extract: town.osm.pbf covers 24.89"),
         ((24.9, 60.3, 24.8, 60.2), "must be WEST SOUTH EAST NORTH"),
         ((60.19, 24.89, 60.2, 124.9), "degrees of longitude"),
         ((24.0, 60.0, 25.0, 61.0), "--tiles 200 cuts a large one"),
@@ -253,9 +253,9 @@ def test_a_file_that_cannot_be_read_is_one_line(extract, tmp_path):
         add_map("X", tmp_path / "none.osm.pbf", tmp_path / "mine", bbox=[maps.box()])
     nowhere = tmp_path / "grid.npz"
     np.savez(nowhere, heights_m=maps.heights(2.0, 60.0), cell_m=2.0)
-    with pytest.raises(UsageError, match="does not say where on earth it is"):
+    with pytest.raises(UsageError, match="has no geographic coordinates"):
         add_map("X", extract, tmp_path / "mine", bbox=[maps.box()], dem=nowhere)
-    assert in_words(maps.box())
+    assert format_bbox(maps.box())
 
 
 def test_without_osmium_it_says_what_to_install(extract, tmp_path, monkeypatch):

@@ -10,13 +10,13 @@ import pytest
 import trimesh
 from support import foreign
 
-from aerialdojo_gen.annotations.draft import Choice
+from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, UsageError
 from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.imports.command import add_scene
-from aerialdojo_gen.imports.files import look_over_glb, read_mesh
+from aerialdojo_gen.imports.files import check_glb, read_mesh
 from aerialdojo_gen.imports.import_mesh import import_mesh
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.glb import read_glb
@@ -25,7 +25,9 @@ from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 
 def raw(mesh: trimesh.Trimesh, name: str = "") -> RawNode:
-    return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), plain(len(mesh.faces)))
+    return RawNode(
+        name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), default_colours(len(mesh.faces))
+    )
 
 
 def things(scene):
@@ -97,7 +99,7 @@ def test_what_has_no_place_is_dropped_and_said():
     box = trimesh.creation.box((10, 10, 4))
     vertices = np.vstack([box.vertices, [[np.nan, 0, 0], [np.inf, 1, 1]]])
     faces = np.vstack([box.faces, [[8, 0, 1], [9, 0, 1], [0, 0, 1]]])
-    scene, repairs = import_mesh("Box", [RawNode("", vertices, faces, plain(len(faces)))])
+    scene, repairs = import_mesh("Box", [RawNode("", vertices, faces, default_colours(len(faces)))])
     assert np.isfinite(np.concatenate([i.vertices for i in scene.instances])).all()
     assert sum(len(i.faces) for i in things(scene)) == 12
     text = "\n".join(repairs.lines)
@@ -106,8 +108,8 @@ def test_what_has_no_place_is_dropped_and_said():
 
 
 def test_nothing_left_is_an_error():
-    empty = RawNode("", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), plain(0))
-    for node in (empty, RawNode("", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))):
+    empty = RawNode("", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), default_colours(0))
+    for node in (empty, RawNode("", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), default_colours(1))):
         with pytest.raises(AssetError, match="empty or degenerate"):
             import_mesh("Nothing", [node])
 
@@ -119,7 +121,7 @@ def test_a_million_degenerate_triangles_take_bounded_memory():
     box = trimesh.creation.box((20, 20, 5))
     vertices[n:] = box.vertices
     faces = np.vstack([np.column_stack([np.arange(n), np.arange(n), np.arange(n)]), box.faces + n])
-    node = RawNode("", vertices, faces, plain(len(faces)))
+    node = RawNode("", vertices, faces, default_colours(len(faces)))
     tracemalloc.start()
     scene, repairs = import_mesh("Slivers", [node])
     peak = tracemalloc.get_traced_memory()[1]
@@ -139,7 +141,7 @@ def test_a_part_can_be_kept(village):
     nodes = read_mesh(village / "village.glb")
     scene, _ = import_mesh("Village", nodes, crop_m=(0.0, 0.0, 12.0))
     assert 1 < len(things(scene)) < 9
-    with pytest.raises(AssetError, match="nothing of the mesh lies there"):
+    with pytest.raises(AssetError, match="contains no part of the mesh"):
         import_mesh("Village", nodes, crop_m=(900.0, 900.0, 5.0))
 
 
@@ -155,7 +157,7 @@ def test_a_glb_that_asks_for_terabytes_is_refused_before_it_gets_them(tmp_path):
     path = tmp_path / "bomb.glb"
     path.write_bytes(foreign.glb(json.dumps(document).encode()))
     with pytest.raises(AssetError, match="asks for"):
-        look_over_glb(path)
+        check_glb(path)
     # One small mesh that a hundred thousand nodes show.
     document["accessors"] = [{"componentType": 5126, "count": 3000, "type": "VEC3"}]
     document["nodes"] = [{"mesh": 0}] * 100_000
@@ -234,7 +236,7 @@ def planned(tmp_path, name, mesh, n_objects, **options):
     project, data = tmp_path / "mine", tmp_path / "data"
     added = add_scene(name, mesh, project, **options)
     pipeline, roots = open_pipeline(added.pipeline, data)
-    draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, choice=Choice(most=30))
+    draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, options=DraftOptions(max_per_category=30))
     run_until("filter", data=data, pipeline=added.pipeline, scene=[name], workers=1, quiet=True)
     return added, store.read_scene(data, "verdicts", name)
 

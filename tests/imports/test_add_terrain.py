@@ -158,7 +158,7 @@ FAULTS = {
     "nothing but nodata": (
         lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0),
         {},
-        "holds no height, every cell is nodata",
+        "contains no heights: every cell is nodata",
     ),
     "no coordinate system": (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
     "feet": (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),
@@ -166,7 +166,7 @@ FAULTS = {
     "elsewhere": (
         lambda d: tif(d),
         {"bbox": (10.0, 50.0, 10.001, 50.001)},
-        "has no height: x.tif reaches over 24.9000",
+        "has no height: x.tif covers 24.9000",
     ),
     "too fine": (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
     "no such file": (lambda d: d / "none.tif", {}, "no such file"),
@@ -191,7 +191,7 @@ def test_a_file_cut_short_is_one_line(tmp_path):
         with pytest.raises(AssetError, match=r"cut\.tif cannot be read as a GeoTIFF, or is cut short"):
             read_dem(tmp_path / "cut.tif")
     (tmp_path / "cut.asc").write_text("ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n")
-    with pytest.raises(AssetError, match="says 4 by 4 heights and has 3: is it cut short"):
+    with pytest.raises(AssetError, match="says 4 by 4 heights and has 3: is it truncated"):
         read_dem(tmp_path / "cut.asc")
     np.savez(tmp_path / "cut.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
     (tmp_path / "cut.npz").write_bytes((tmp_path / "cut.npz").read_bytes()[:80])
@@ -241,7 +241,7 @@ def test_numbers_that_are_none_are_one_line_or_no_height(head, numbers, tmp_path
     if numbers.endswith("nan"):
         assert np.nanmax(read_dem(path).heights_m) == 1.0
         return
-    with pytest.raises(AssetError, match="is no ESRI ASCII grid"):
+    with pytest.raises(AssetError, match="is not an ESRI ASCII grid"):
         read_dem(path)
 
 

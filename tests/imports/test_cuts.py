@@ -17,9 +17,9 @@ from support.hills import hills, standing, write_hills
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
-from aerialdojo_gen.imports.import_mesh import Place, import_mesh
+from aerialdojo_gen.imports.import_mesh import SourceMesh, import_mesh
 from aerialdojo_gen.imports.listing import guess
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.recipe import load_imported
 
@@ -27,7 +27,7 @@ from aerialdojo_gen.scenes.recipe import load_imported
 def raw(mesh: trimesh.Trimesh, name: str = "", up: str = "z") -> RawNode:
     v = np.asarray(mesh.vertices)
     v = np.column_stack([v[:, 0], v[:, 2], -v[:, 1]]) if up == "y" else v
-    return RawNode(name, v, np.asarray(mesh.faces, dtype=np.int64), plain(len(mesh.faces)))
+    return RawNode(name, v, np.asarray(mesh.faces, dtype=np.int64), default_colours(len(mesh.faces)))
 
 
 def city(seed: int = 0, streets: int = 6, up: str = "z") -> list[RawNode]:
@@ -112,9 +112,7 @@ def test_a_crop_cuts_triangles_of_one_large_object_and_closes_its_houses():
 
 def test_a_part_without_anything_says_what_lies_where():
     nodes = city()
-    with pytest.raises(
-        AssetError, match=r"--crop 900 900 5: nothing of the mesh lies there: x is -5 to 185, y -5 to"
-    ):
+    with pytest.raises(AssetError, match=r"--crop 900 900 5: contains no part of the mesh: x is -5 to 185, y -5 to"):
         import_mesh("City", nodes, crop_m=(900.0, 900.0, 5.0))
     with pytest.raises(
         AssetError, match=r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
@@ -167,7 +165,7 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
 )
 def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     (node,) = city(up=up)
-    found = guess([node.placed(node.vertices * scale)])
+    found = guess([node.with_vertices(node.vertices * scale)])
     assert found.up == up
     assert found.up_sure
     # 190 m in millimetres may be 1.9 km in centimetres: the second guess. Metres and centimetres are the first one.
@@ -248,7 +246,7 @@ def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_pat
     nodes = city(streets=4)
     mesh = trimesh.Trimesh(nodes[0].vertices + np.array([4.1e5, 6.6e6, 12.0]), nodes[0].faces, process=False)
     mesh.export(tmp_path / "city.ply", vertex_normal=False)
-    place = Place.of([nodes[0].placed(np.asarray(mesh.vertices))], "z", 1.0)
+    place = SourceMesh.of([nodes[0].with_vertices(np.asarray(mesh.vertices))], "z", 1.0)
     assert place.low == pytest.approx([4.1e5 - 5, 6.6e6 - 5, 11.0])
     added = add_scene("Far", tmp_path / "city.ply", tmp_path / "mine", up="z", crop_m=(410060.0, 6600060.0, 40.0))
     recipe = load_imported(tmp_path / "mine/scenes/Far.toml")

@@ -8,7 +8,7 @@ from support import foreign, maps
 
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
-from aerialdojo_gen.imports.files import read_into, unpacked
+from aerialdojo_gen.imports.files import read_into, unpack_nodes
 from aerialdojo_gen.imports.import_mesh import import_mesh
 
 # A tetrahedron, x east, y north, z up: four edges of different lengths meet in a corner, so that no mirror image and
@@ -73,7 +73,7 @@ def write(path, vertices, up):
 def read(path):
     out = path.with_name("nodes.npz")
     assert read_into(path, out) == ""
-    return unpacked(out)
+    return unpack_nodes(out)
 
 
 def corners_of(scene):

@@ -14,12 +14,12 @@ from support import foreign
 from support.command_line import said
 
 from aerialdojo_gen.annotations.describing import Vocabulary
-from aerialdojo_gen.annotations.draft import AnnotationDrafter, Choice
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import words_in
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 # What stands there without a name: a drum and a box.
@@ -121,7 +121,7 @@ def test_one_thing_beside_a_landmark_is_taken_with_a_warning(place, capsys):
     out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5)), ("Well", box(2, 2, 2), (15, 3, 1))), "Farm")
     code, _, err = said(capsys, *pasted(out, "next: "))
     assert code == 0, err
-    assert "one object makes no task" in err
+    assert "a single object makes no task" in err
     assert "aerialdojo-gen annotate --scene Farm --pipeline 'our scenes/pipeline.toml'" in err
     draft = json.loads((place / "our scenes/annotations/Farm.json").read_text())
     assert {draft["landmarks"][0]["name"], draft["objects"][0]["name"].split()[-1]} == {"barn", "well"}
@@ -178,7 +178,7 @@ def test_drafts_are_true_or_silent(place, capsys):
     assert {entry["category"] for entry in made["objects"]} >= {"truck", "object"}
     shapes = {entry["name"] for entry in made["objects"] if entry["category"] == "object"}
     assert shapes <= {f"{size} {form} grey object" for size in ("low", "medium-sized", "tall") for form in FORMS}
-    assert "needs a person" in err
+    assert "needs review" in err
     for name in (mark["name"] for mark in made["landmarks"]):
         assert name not in ("truck", "grey truck", "object"), name
     # What the crate stands on is not told as under it.
@@ -194,18 +194,18 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     nodes = []
     for name, body, place in (("Tower", box(5, 5, 20), (0, 0, 10)), *crates):
         faces = np.asarray(body.faces, np.int64)
-        nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, plain(len(faces))))
+        nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, default_colours(len(faces))))
     adopted, _ = import_mesh("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
-    drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), 0, Choice(most=30))
+    drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), 0, DraftOptions(max_per_category=30))
     chosen = []
     made = drafter.objects(9, lambda: chosen.append(1))
     assert len(chosen) == len(made) < 9
-    assert len(drafter.confused) == drafter.refused["without anything to tell them from others of their kind"] > 0
+    assert len(drafter.confused) == drafter.refused["indistinguishable from others of their category"] > 0
     for node, others in drafter.confused:
         assert node not in others
         assert set(others) <= {f"crate_{k:04d}" for k in range(9)}
-    assert re.search(r"of their kind \(crate_\d{4} with crate_\d{4}( and \d more)?; ", drafter.why_not())
+    assert re.search(r"of their kind \(crate_\d{4} with crate_\d{4}( and \d more)?; ", drafter.rejection_summary())
 
 
 def test_a_table_says_what_nodes_are_called(place, capsys):
@@ -228,7 +228,7 @@ def test_a_table_says_what_nodes_are_called(place, capsys):
         capsys, "add-scene", "Other", "Garden.glb", "--up", "z", "--project", "our scenes", "--names", "names.csv"
     )
     assert code == 1
-    assert "names.csv: line 2: name 'mesh_7' is no name that a person would say" in err
+    assert "names.csv: line 2: name 'mesh_7' must be letters, spaces and hyphens" in err
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import Naming, NodeName
-from aerialdojo_gen.imports.raw import RawNode, RawSurface, no_corners, plain
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, empty_corners
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -30,7 +30,11 @@ from aerialdojo_gen.scenes.glb import read_glb, write_glb
 
 
 def raw(mesh: trimesh.Trimesh, name: str = "", colour: tuple[int, int, int] | None = None) -> RawNode:
-    colours = plain(len(mesh.faces)) if colour is None else np.tile(np.array(colour, np.uint8), (len(mesh.faces), 1))
+    colours = (
+        default_colours(len(mesh.faces))
+        if colour is None
+        else np.tile(np.array(colour, np.uint8), (len(mesh.faces), 1))
+    )
     return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), colours)
 
 
@@ -87,7 +91,7 @@ def test_the_ground_that_is_stored_is_the_ground_by_form(seed, relief_m, turned)
     nodes = [raw(field.mesh(turned), "Mesh.007"), *(raw(b) for b in standing(field, 3, seed))]
     scene, repairs = import_mesh("Hills", nodes)
     assert sorted(i.surface for i in scene.instances) == ["ground", "solid", "solid", "solid"]
-    assert any(line.startswith("nobody flies below the open ground") for line in repairs.lines)
+    assert any(line.startswith("closed to flight below the open ground") for line in repairs.lines)
     ground = Ground.of(scene)
     assert ground is not None
     p = np.random.default_rng(seed).uniform(scene.bounds[0], scene.bounds[1], (400, 3))
@@ -126,7 +130,7 @@ def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
     a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
     faces = np.concatenate([np.column_stack([a, a + 1, a + n + 1]), np.column_stack([a, a + n + 1, a + n])])
     vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    return RawNode("", vertices, faces, plain(len(faces))), places
+    return RawNode("", vertices, faces, default_colours(len(faces))), places
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -191,7 +195,7 @@ def test_wide_bodies_of_several_colours_or_textures_fall_apart_by_material(by):
         paint = [np.full((8, 8, 3), (200, 40, 40), np.uint8) for _ in range(2)]
         paint[1][::2], paint[1][1::2] = (220, 60, 60), (180, 20, 20)
         surfaces = tuple(RawSurface(f"m{k}", (200, 40, 40), picture) for k, picture in enumerate(paint))
-        node = replace(node, surface=turns.astype(np.int32), corners=no_corners(len(turns)), surfaces=surfaces)
+        node = replace(node, surface=turns.astype(np.int32), corners=empty_corners(len(turns)), surfaces=surfaces)
     bodies, _ = split_components([node])
     assert 8 <= len(bodies) <= 16
     assert sum(len(b.faces) for b in bodies) == 96
@@ -205,7 +209,7 @@ def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
     field = hills(4, cells=12)
     nodes = [raw(field.mesh(), "Terrain"), *(raw(b, f"Hut.{k}") for k, b in enumerate(standing(field, 4, 4)))]
     nodes += [raw(trimesh.creation.icosphere(2, 200.0), "Sky"), *[raw(trimesh.creation.box((3, 3, 3)), "Twin")] * 2]
-    nodes += [RawNode("Hut.9", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), plain(1))]
+    nodes += [RawNode("Hut.9", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), default_colours(1))]
     made = []
     for order in (list(range(len(nodes))), random.sample(range(len(nodes)), len(nodes))):
         scene, repairs = import_mesh("Hills", [nodes[k] for k in order], crop_m=(12.0, 12.0, 10.0))
@@ -284,7 +288,7 @@ def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():
     faces = np.concatenate(
         [np.column_stack([cell, cell + 1, cell + 122]), np.column_stack([cell, cell + 122, cell + 121])]
     )
-    scan = RawNode("Mesh_0", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, plain(len(faces)))
+    scan = RawNode("Mesh_0", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, default_colours(len(faces)))
     scene, _ = import_mesh("Scan", [scan])
     wide = [i for i in scene.instances if np.ptp(i.bounds, axis=0)[:2].min() > 100.0]
     assert [(i.category, i.surface) for i in wide] == [("terrain", "ground")]

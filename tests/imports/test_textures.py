@@ -11,13 +11,13 @@ import pytest
 import trimesh
 from support import textured
 
-from aerialdojo_gen.annotations.appearance import colour_shares, uncoloured
+from aerialdojo_gen.annotations.appearance import colour_shares, unsupported_colours
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.imports.files import read_into, read_mesh, unpacked
+from aerialdojo_gen.imports.files import read_into, read_mesh, unpack_nodes
 from aerialdojo_gen.imports.import_mesh import import_mesh
-from aerialdojo_gen.imports.pictures import Paint, surfaces_of
+from aerialdojo_gen.imports.pictures import SourceMaterial, decode_surfaces
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.gl import GlRenderer
@@ -34,7 +34,7 @@ CAMERA = Camera(256, 256, 90.0)
 
 def nodes_of(path: Path, out: Path, texture_px: int = 8192) -> list[RawNode]:
     assert read_into(path, out, texture_px) == ""
-    return unpacked(out)
+    return unpack_nodes(out)
 
 
 def stored(scene: Scene, path: Path) -> Scene:
@@ -140,8 +140,8 @@ def test_words_for_colours_are_what_textures_show(yard):
     shares = colour_shares(truck, yard.materials)
     assert shares["blue"] == pytest.approx(0.5, abs=0.05)
     assert shares["white"] == pytest.approx(0.5, abs=0.05)
-    assert uncoloured("blue and white", truck, yard.materials) == []
-    assert uncoloured("red", truck, yard.materials) == ["red"]
+    assert unsupported_colours("blue and white", truck, yard.materials) == []
+    assert unsupported_colours("red", truck, yard.materials) == ["red"]
     assert thing(yard, "hedge").attributes["colour"] == "green"
 
 
@@ -354,7 +354,7 @@ def test_gltf_says_more_than_plain_triangles(tmp_path):
     ],
 )
 def test_bad_textures_are_told_and_the_mesh_stays(file, said):
-    (surface,), _ = surfaces_of([Paint("wall", (1.0, 0.0, 0.0), file)])
+    (surface,), _ = decode_surfaces([SourceMaterial("wall", (1.0, 0.0, 0.0), file)])
     assert surface.texture is None
     assert surface.colour == (255, 0, 0)
     assert said in surface.notes[0]

@@ -99,11 +99,11 @@ _FAR = Anchor(position_m=(900.0, 0.0, 1.0), yaw_deg=0.0)
     [
         (1, {"id": 0}, "objects[1].id", "objects[0]"),
         (1, {"node": "delivery_van_000"}, "objects[1].node", "objects[0]"),
-        (1, {"node": "clock_tower_000"}, "objects[1].node", "another thing"),
+        (1, {"node": "clock_tower_000"}, "objects[1].node", "a different node"),
         (1, {"category": "mailbox"}, "objects[1].category", "is a 'delivery_van'"),
         (1, {"category": "delivery_vam"}, "objects[1].category", "did you mean 'delivery_van'"),
         (1, {"name": "  "}, "objects[1].name", "empty"),
-        (1, {"name": "van_03"}, "objects[1].name", "person would say"),
+        (1, {"name": "van_03"}, "objects[1].name", "plain words"),
         (1, {"name": "blue delivery van"}, "objects[1].name", "'blue'"),
         (1, {"description": "\t"}, "objects[1].description", "empty"),
         (2, {"description": "A blue delivery van at 12.5, 3.0."}, "objects[2].description", "coordinates"),

@@ -12,14 +12,14 @@ from support.handmade import box, instance
 from support.hills import Hills, hills, standing, write_hills
 from support.planting import Planted, check, poses
 
-from aerialdojo_gen.annotations.draft import Choice
+from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.import_mesh import import_mesh
-from aerialdojo_gen.imports.raw import RawNode, plain
+from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.model import Material, Scene
@@ -33,7 +33,8 @@ def adopted(field: Hills, *things: trimesh.Trimesh, turned: bool = False) -> tup
     """The field as add-scene takes it in, and what to add to its places to be in the field's own frame."""
     bodies = [("Terrain", field.mesh(turned)), *((f"Thing.{k}", thing) for k, thing in enumerate(things))]
     nodes = [
-        RawNode(n, np.asarray(m.vertices), np.asarray(m.faces, np.int64), plain(len(m.faces))) for n, m in bodies
+        RawNode(n, np.asarray(m.vertices), np.asarray(m.faces, np.int64), default_colours(len(m.faces)))
+        for n, m in bodies
     ]
     scene, _ = import_mesh(NAME, nodes)
     return scene, shift_of(field, things)
@@ -130,7 +131,7 @@ def test_an_overhang_is_open_and_the_rock_above_it_is_not():
     )
     sheet = trimesh.Trimesh(vertices, np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]]), process=False)
     scene, _ = import_mesh(
-        NAME, [RawNode("Cliff", vertices, np.asarray(sheet.faces, np.int64), plain(len(sheet.faces)))]
+        NAME, [RawNode("Cliff", vertices, np.asarray(sheet.faces, np.int64), default_colours(len(sheet.faces)))]
     )
     shift = np.array([15.0, 15.0, 2.0])
     grid = ClearanceGrid.build(scene)
@@ -152,7 +153,8 @@ def test_a_canopy_over_level_ground_that_was_laid_is_not_the_ground():
     posts = [box((x - 0.2, y - 0.2, 0), (x + 0.2, y + 0.2, 4)) for x in (2, 10) for y in (2, 8)]
     halls = [box((20, 12 * k, 0), (34, 12 * k + 9, 6)) for k in range(3)]
     roof = trimesh.Trimesh([[0, 0, 4], [12, 0, 4], [12, 10, 4], [0, 10, 4]], [[0, 1, 2], [0, 2, 3]], process=False)
-    nodes = [RawNode(f"Body.{k}", np.asarray(m.vertices), np.asarray(m.faces, np.int64), plain(len(m.faces)))
+    nodes = [RawNode(f"Body.{k}", np.asarray(m.vertices), np.asarray(m.faces, np.int64),
+                     default_colours(len(m.faces)))
              for k, m in enumerate([*posts, *halls, roof])]  # fmt: skip
     scene, repairs = import_mesh(NAME, nodes)
     assert any("level ground" in line for line in repairs.lines)
@@ -191,7 +193,7 @@ def surveyed(tmp_path_factory):
         mesh = write_hills(field, boxes, root / "hills.glb", turned=bool(seed % 2))
         added = add_scene(NAME, mesh, root / "mine", up="z")
         pipeline, roots = open_pipeline(added.pipeline, root / "data")
-        draft_scene(NAME, pipeline, roots, n_landmarks=2, n_objects=8, choice=Choice(most=30))
+        draft_scene(NAME, pipeline, roots, n_landmarks=2, n_objects=8, options=DraftOptions(max_per_category=30))
         run_until("split", data=root / "data", pipeline=added.pipeline, scene=[NAME], workers=1, quiet=True)
         found[seed] = (root / "data", pipeline, field, shift_of(field, boxes))
     return found

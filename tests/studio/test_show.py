@@ -225,7 +225,7 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
 
 
 def test_a_picture_is_called_png(pictured, tmp_path):
-    with pytest.raises(UsageError, match=r"a\.jpg: the picture is a PNG, call it a\.png"):
+    with pytest.raises(UsageError, match=r"a\.jpg: the output must be a PNG file, for example a\.png"):
         write_png(pictured, tmp_path / "a.jpg")
     (tmp_path / "b.png").mkdir()
     with pytest.raises(StoreError, match=r"cannot write .*b\.png"):

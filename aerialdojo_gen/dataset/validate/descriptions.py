@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import discoloured, unlike
+from aerialdojo_gen.annotations.appearance import false_colours, false_phrases
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.ground import Surface
@@ -70,7 +70,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
         i = index[str(node)]
         for name, column in texts.items():
             text = column[row] or ""
-            wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.untruths(i, text)), "")
+            wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
             wrong = wrong or _unborne(words, i, text) or _recoloured(instances[i], text)
             wrong = wrong or _unlike(words, instances[i], text)
             if wrong:
@@ -84,9 +84,9 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     ambiguity = _words(data).ambiguity
     index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
     for row, (node, text) in enumerate(zip(rows.texts("mesh_node"), rows.texts("description"), strict=True)):
-        rivals = ambiguity.rivals(index[str(node)], text or "") if node in index else []
-        if rivals:
-            others = ", ".join(instances[j].node for j in rivals[:3]) + ("..." if len(rivals) > 3 else "")
+        distractors = ambiguity.distractors(index[str(node)], text or "") if node in index else []
+        if distractors:
+            others = ", ".join(instances[j].node for j in distractors[:3]) + ("..." if len(distractors) > 3 else "")
             yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
 
 
@@ -97,7 +97,9 @@ def object_twins(data: SceneData, rows: Rows) -> Iterator[Finding]:
     index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
     columns = (rows.texts(name) for name in ("mesh_node", "name", "description"))
     for row, (node, name, text) in enumerate(zip(*columns, strict=True)):
-        twins = ambiguity.twins(index[str(node)], name or "", text or "") if node in index else []
+        twins = (
+            ambiguity.first_sentence_distractors(index[str(node)], name or "", text or "") if node in index else []
+        )
         if twins:
             others = ", ".join(instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
             yield Finding(
@@ -127,7 +129,7 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if node not in geometry.index:
             continue
         i, text = geometry.index[str(node)], name or ""
-        wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.untruths(i, text)), "")
+        wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
         wrong = wrong or _unborne(words, i, text) or _recoloured(geometry.scene.instances[i], text)
         wrong = wrong or _other_side(words, data, i, text)
         if first.setdefault(text.lower(), row) != row:
@@ -215,8 +217,10 @@ def _unlike(words: _Words, instance: Instance, text: str) -> str:
     materials = words.ambiguity.geometry.scene.materials
     looks = {key: words.catalogue[key].looks for key in (instance.category,) if key in words.catalogue}
     # What no part is known of, as in a release of an older version, cannot be asked.
-    wrong = list(unlike(text, instance, looks, materials, words.surface)) if instance.anatomy is not None else []
-    return next(iter([*wrong, *discoloured(text, instance, materials)]), "")
+    wrong = (
+        list(false_phrases(text, instance, looks, materials, words.surface)) if instance.anatomy is not None else []
+    )
+    return next(iter([*wrong, *false_colours(text, instance, materials)]), "")
 
 
 def _looks(words: _Words, instance: Instance) -> set[str]:

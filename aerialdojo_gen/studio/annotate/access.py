@@ -50,27 +50,27 @@ class TokenGate:
         wait = self._wait(address)
         if wait > 0.0 and address not in self._known:
             after = [(b"retry-after", str(int(wait) + 1).encode())]
-            await _answer(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
+            await _respond(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
             return
         token = _token_of(scope)
-        if scope["path"] == "/" and self._right(token):
+        if scope["path"] == "/" and self._is_token(token):
             self._known.add(address)
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-            await _answer(send, 303, "", [(b"location", b"/"), (b"set-cookie", kept.encode())])
+            await _respond(send, 303, "", [(b"location", b"/"), (b"set-cookie", kept.encode())])
             return
         cookie = _cookie(headers.get(b"cookie", ""))
-        if not self._right(cookie):
+        if not self._is_token(cookie):
             for given in filter(None, (token, cookie)):
-                self._note(address, given)
-            await _answer(send, 401, "open the address that the command printed: it carries the token")
+                self._record_guess(address, given)
+            await _respond(send, 401, "open the address that the command printed; it contains the token")
             return
         origin = headers.get(b"origin")
         if origin is not None and origin != f"http://{headers.get(b'host', '')}":
-            await _answer(send, 403, "this page takes no requests from other sites")
+            await _respond(send, 403, "requests from other sites are not allowed")
             return
         await self._app(scope, receive, send)
 
-    def _right(self, given: str) -> bool:
+    def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
 
     def _wait(self, address: str) -> float:
@@ -78,7 +78,7 @@ class TokenGate:
         guesses = self._guesses.get(address)
         return 0.0 if guesses is None else guesses.wait(time.monotonic())
 
-    def _note(self, address: str, given: str) -> None:
+    def _record_guess(self, address: str, given: str) -> None:
         guesses = self._guesses.pop(address, None) or _Guesses()
         guesses.add(given, time.monotonic())
         self._guesses[address] = guesses
@@ -122,7 +122,7 @@ def _cookie(header: str) -> str:
     return morsel.value if morsel else ""
 
 
-async def _answer(
+async def _respond(
     send: Callable[[_Message], Awaitable[None]],
     status: int,
     text: str,

@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 _T = TypeVar("_T")
-_MOST_PICTURES = 400
+_MAX_PICTURES = 400
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class View:
     pixels: dict[str, int]  # How many pixels show it
 
 
-class AnchorDesk:
+class AnchorService:
     """Anchors of one scene's objects; the heavy work is done by one thread, one thing after another."""
 
     def __init__(self, scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> None:
@@ -46,7 +46,7 @@ class AnchorDesk:
         # One thread: PyBullet is not made for several, and two cores have the page to serve as well.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="anchors")
         self._world: Future[Any] = self._worker.submit(self._build)
-        self._found: OrderedDict[tuple[int, str], list[dict[str, Any]]] = OrderedDict()
+        self._candidates: OrderedDict[tuple[int, str], list[dict[str, Any]]] = OrderedDict()
         self._views: OrderedDict[tuple[float, ...], View] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -69,7 +69,7 @@ class AnchorDesk:
         """Drop what is waiting to be done."""
         self._worker.shutdown(wait=False, cancel_futures=True)
 
-    def _do(self, work: Callable[[], _T]) -> _T:
+    def _run(self, work: Callable[[], _T]) -> _T:
         return self._worker.submit(work).result()
 
     def candidates(self, entry: Object) -> list[dict[str, Any]]:
@@ -78,11 +78,11 @@ class AnchorDesk:
 
         key = (entry.id, entry.node)
         with self._lock:
-            if key in self._found:
-                return self._found[key]
-        rows, _ = self._do(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
+            if key in self._candidates:
+                return self._candidates[key]
+        rows, _ = self._run(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
         with self._lock:
-            self._found[key] = rows
+            self._candidates[key] = rows
         return rows
 
     def place(self, entry: Object, eye_m: Floats) -> Floats:
@@ -94,7 +94,7 @@ class AnchorDesk:
         away = eye_m - instance.centroid
         length = float(np.linalg.norm(away))
         if length < 1e-3:
-            raise AerialDojoError("one cannot look at an object from its middle")
+            raise AerialDojoError("the viewpoint is at the object's centre")
         surface = Surface.of(instance)
         direction = (away / length)[None]
         place = surface.standoff(instance.centroid, direction, self.config.standoff_m)[0]
@@ -102,7 +102,7 @@ class AnchorDesk:
             place = surface.standoff(surface.nearest_point(instance.centroid), direction, self.config.standoff_m)[0]
         return np.asarray(np.round(place, 3))
 
-    def judge(
+    def check_viewpoint(
         self, entry: Object, position_m: Floats, yaw_rad: float | None = None
     ) -> tuple[dict[str, Any], list[str]]:
         """Check a viewpoint against the rules for anchors; returns its row of ``anchors`` and the list of faults."""
@@ -110,11 +110,11 @@ class AnchorDesk:
 
         yaw = float(yaw_towards(position_m, self.scene[entry.node].centroid)) if yaw_rad is None else yaw_rad
         yaw = math.radians(round(math.degrees(yaw), 2))
-        asked = {**dict(zip(("x_m", "y_m", "z_m"), position_m.tolist(), strict=True)), "yaw_rad": yaw}
+        pose = {**dict(zip(("x_m", "y_m", "z_m"), position_m.tolist(), strict=True)), "yaw_rad": yaw}
         for row in self.candidates(entry):
-            if is_same(row, asked):
+            if is_same(row, pose):
                 return row, []
-        judged = self._do(
+        judged = self._run(
             lambda: judge_anchor(position_m, yaw, self._item(entry), self._world.result(), self._job, self.config)
         )
         return judged.row, list(judged.faults)
@@ -126,14 +126,14 @@ class AnchorDesk:
             if key in self._views:
                 self._views.move_to_end(key)
                 return self._views[key]
-        view = self._do(lambda: self._look(position_m, yaw_rad))
+        view = self._run(lambda: self._render(position_m, yaw_rad))
         with self._lock:
             self._views[key] = view
-            while len(self._views) > _MOST_PICTURES:
+            while len(self._views) > _MAX_PICTURES:
                 self._views.popitem(last=False)
         return view
 
-    def _look(self, position_m: Floats, yaw_rad: float) -> View:
+    def _render(self, position_m: Floats, yaw_rad: float) -> View:
         from aerialdojo_gen.pipeline.stages.work.reference_images import box_of, instance_map
         from aerialdojo_gen.rendering.backend import kept_renderer
         from aerialdojo_gen.rendering.casters import ray_caster

@@ -32,9 +32,7 @@ def nodes(recipe: Path) -> list[str]:
 def with_box(recipe: Path, cut: Cut) -> str:
     """Return a recipe's text with a box more."""
     if load_imported(recipe) is None:
-        raise AerialDojoError(
-            "this scene is built from a recipe, every thing in it has a node: there is nothing to box"
-        )
+        raise AerialDojoError("this scene is built from a recipe, every thing in it has a node: boxes are not needed")
     lines = [
         f"node = {json.dumps(cut.node)}",
         f"category = {json.dumps(cut.category)}",
@@ -49,7 +47,7 @@ def without_box(recipe: Path, node: str) -> str:
     head, *blocks = recipe.read_text(encoding="utf-8").split(_HEAD)
     kept = [block for block in blocks if f"node = {json.dumps(node)}\n" not in block]
     if len(kept) == len(blocks):
-        raise AerialDojoError(f"{node} was not made by a box")
+        raise AerialDojoError(f"{node} was not created by a box")
     return _HEAD.join([head, *kept])
 
 

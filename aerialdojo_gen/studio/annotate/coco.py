@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from aerialdojo_gen.studio.annotate.session import AnnotationSession
 
 # A thing of fewer pixels is nothing to learn a box from.
-LEAST_PIXELS = 16
+MIN_PIXELS = 16
 _DATE = (1980, 1, 1, 0, 0, 0)  # the same annotations give the same bytes
 
 
-def coco_zip(desk: AnnotationSession) -> bytes:
+def coco_zip(session: AnnotationSession) -> bytes:
     """Pack ``instances.json`` and ``images/*.png``."""
-    document, pictures = coco(desk)
+    document, pictures = coco(session)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
@@ -31,13 +31,13 @@ def coco_zip(desk: AnnotationSession) -> bytes:
     return buffer.getvalue()
 
 
-def coco(desk: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
+def coco(session: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Make the COCO document and its pictures, by file name.
 
     Boxes are ``[left, top, width, height]`` in pixels, areas the pixels that show the object, image ids the ids of
     the objects that the images are of.
     """
-    entries = [e for e in desk.storage.load().annotations.objects if e.node in desk.scene]
+    entries = [e for e in session.storage.load().annotations.objects if e.node in session.scene]
     names = sorted({e.category for e in entries})
     number = {name: k for k, name in enumerate(names, start=1)}
     of_node = {e.node: e for e in entries}
@@ -45,19 +45,19 @@ def coco(desk: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
     boxes: list[dict[str, Any]] = []
     pictures: dict[str, bytes] = {}
     for entry in entries:
-        pose = _anchor(desk, entry)
+        pose = _anchor(session, entry)
         if pose is None:
             continue
-        view = desk.anchors.view(*pose)
-        name = f"{desk.scene.name}_{entry.id:04d}.png"
+        view = session.anchors.view(*pose)
+        name = f"{session.scene.name}_{entry.id:04d}.png"
         pictures[name] = view.png
-        width, height = desk.anchors.size
+        width, height = session.anchors.size
         images.append({
             "id": entry.id, "file_name": name, "width": width, "height": height,
             "position_m": pose[0].tolist(), "yaw_rad": pose[1],
         })  # fmt: skip
         for node in sorted(view.boxes):
-            if node not in of_node or view.pixels[node] < LEAST_PIXELS:
+            if node not in of_node or view.pixels[node] < MIN_PIXELS:
                 continue
             u0, v0, u1, v1 = view.boxes[node]
             boxes.append({
@@ -66,7 +66,7 @@ def coco(desk: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
                 "object_id": of_node[node].id, "name": of_node[node].name,
             })  # fmt: skip
     document = {
-        "info": {"description": f"Annotated objects of {desk.scene.name} in the pictures from their anchors"},
+        "info": {"description": f"Annotated objects of {session.scene.name} in the pictures from their anchors"},
         "images": images,
         "annotations": boxes,
         "categories": [{"id": number[name], "name": name} for name in names],
@@ -74,8 +74,8 @@ def coco(desk: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
     return document, pictures
 
 
-def _anchor(desk: AnnotationSession, entry: Object) -> tuple[Any, float] | None:
+def _anchor(session: AnnotationSession, entry: Object) -> tuple[Any, float] | None:
     if entry.anchor is not None:
         return np.array(entry.anchor.position_m), float(np.radians(entry.anchor.yaw_deg))
-    rows = desk.anchors.candidates(entry)
+    rows = session.anchors.candidates(entry)
     return (np.array([rows[0][f"{a}_m"] for a in "xyz"]), rows[0]["yaw_rad"]) if rows else None

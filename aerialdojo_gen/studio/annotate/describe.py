@@ -39,7 +39,7 @@ class Describer:
         general = []
         faulty = check_source(source, self._scene, self._names, self._counts, self._geometry, self._looks)
         for fault in faulty:
-            message = _MENTION.sub(lambda m: _called(annotations, m[1], int(m[2])), fault.message)
+            message = _MENTION.sub(lambda m: _entry_name(annotations, m[1], int(m[2])), fault.message)
             at = _PATH.match(fault.path)
             if at is None:
                 general.append(message)
@@ -82,6 +82,6 @@ class Describer:
         return {"landmark": marks[found.landmark].name, "direction": found.direction}
 
 
-def _called(annotations: Annotations, kind: str, index: int) -> str:
+def _entry_name(annotations: Annotations, kind: str, index: int) -> str:
     entry: Any = getattr(annotations, kind)[index]
     return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")

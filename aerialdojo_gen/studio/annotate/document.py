@@ -23,14 +23,14 @@ class ConflictError(AerialDojoError):
     """An operation does not fit the annotations as they are: somebody else changed them meanwhile."""
 
 
-def _plain(text: str) -> str:
+def _no_control_characters(text: str) -> str:
     if any(ord(c) < 32 or 0x7F <= ord(c) < 0xA0 or 0xD800 <= ord(c) < 0xE000 for c in text):
-        raise ValueError("control characters are not for texts")
+        raise ValueError("control characters are not allowed")
     return text
 
 
 def _line(most: int) -> Any:
-    return Annotated[StrictStr, Field(max_length=most), AfterValidator(_plain)]
+    return Annotated[StrictStr, Field(max_length=most), AfterValidator(_no_control_characters)]
 
 
 _Name, _Node, _Text = _line(120), _line(200), _line(2000)
@@ -50,7 +50,7 @@ class Fields(_Strict):
     node: _Node | None = None  # type: ignore[valid-type]
     anchor: Anchor | None = None
 
-    def given(self) -> dict[str, Any]:
+    def set_values(self) -> dict[str, Any]:
         """The values that were given; of those only an anchor may be None, which takes it away."""
         values = {key: getattr(self, key) for key in self.model_fields_set}
         return {key: value for key, value in values.items() if value is not None or key == "anchor"}
@@ -110,19 +110,17 @@ def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> li
     entries: Sequence[Entry] = getattr(annotations, operation.kind)
     if isinstance(operation, Add):
         if len(entries) >= MOST_ENTRIES:
-            raise AerialDojoError(
-                f"there are {len(entries)} {operation.kind} already, more than anybody searches for"
-            )
+            raise AerialDojoError(f"there are {len(entries)} {operation.kind} already, the maximum")
         empty = {key: "" for key in model.model_fields if key not in ("id", "anchor")}
-        after = _entry(model, empty | {"id": next_id} | operation.fields.given())
+        after = _entry(model, empty | {"id": next_id} | operation.fields.set_values())
         return [Edit(kind=operation.kind, id=next_id, index=len(entries), before=None, after=after)]
     found = find(annotations, operation.kind, operation.id)
     if found is None:
-        raise ConflictError(f"{operation.kind[:-1]} {operation.id} is not there any more")
+        raise ConflictError(f"{operation.kind[:-1]} {operation.id} no longer exists")
     index, before = found
     if isinstance(operation, Remove):
         return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=None)]
-    after = _entry(model, before.model_dump() | operation.fields.given())
+    after = _entry(model, before.model_dump() | operation.fields.set_values())
     if after == before:
         return []
     return [Edit(kind=operation.kind, id=operation.id, index=index, before=before, after=after)]

@@ -11,7 +11,13 @@ from functools import cache
 from pathlib import Path
 
 from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
-from aerialdojo_gen.annotations.draft import MOST, SCENERY, AnnotationDrafter, Choice, redraft_annotations
+from aerialdojo_gen.annotations.draft import (
+    MAX_PER_CATEGORY,
+    SCENERY,
+    AnnotationDrafter,
+    DraftOptions,
+    redraft_annotations,
+)
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.base.cli_context import command
@@ -33,7 +39,7 @@ AUTO = "auto"
 _AUTO_OBJECTS = 20
 _FEW_THINGS = 8
 # A task goes from one object to another.
-LEAST_OBJECTS = 2
+MIN_OBJECTS = 2
 _CAUSES = {
     "no_surface": "no surface 1 m away",
     "out_of_bounds": "outside the flight volume",
@@ -50,7 +56,7 @@ def draft_scene(
     *,
     n_landmarks: int | None = None,
     n_objects: int | str | None = None,
-    choice: Choice | None = None,
+    options: DraftOptions | None = None,
     landmarks: tuple[str, ...] = (),
     seed: int = 0,
     force: bool = False,
@@ -60,9 +66,9 @@ def draft_scene(
     """Draft a scene's annotations and write them to the folder of annotations."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     if keep_objects:
-        return _described_anew(name, path, roots, seed)
+        return _redraft(name, path, roots, seed)
     if path.exists() and not force:
-        raise UsageError(f"{path} exists: --force overwrites it, --keep-objects describes its objects anew")
+        raise UsageError(f"{path} exists: --force overwrites it, --keep-objects redrafts its descriptions")
     counts = paper_counts().get(name)
     exact = counts is not None and n_objects != AUTO
     most = n_objects if isinstance(n_objects, int) else counts[1] if counts and exact else _AUTO_OBJECTS
@@ -71,68 +77,76 @@ def draft_scene(
     vocabulary = Vocabulary(scene, catalogue)
     targets = Counter(i.category for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target)
     if not targets:
-        raise _nothing(name, f"; not taken: {len(scene.instances):,} {SCENERY}")
-    marks = choose_landmarks(
+        raise _nothing_to_draft(name, f"; not taken: {len(scene.instances):,} {SCENERY}")
+    chosen_landmarks = choose_landmarks(
         vocabulary, n_landmarks or (counts[0] if counts else 2 if targets.total() >= _FEW_THINGS else 1), landmarks,
         at_most=n_landmarks is None and counts is None,
     )  # fmt: skip
-    choice = choice or Choice()
-    if choice.most is None and scene.imported:
-        choice = replace(choice, most=max(MOST, math.ceil(most / len(targets))))
-    probe = AnnotationDrafter(vocabulary, marks, seed, choice)
-    proposed = most if exact else min(most, probe.room())
+    options = options or DraftOptions()
+    if options.max_per_category is None and scene.imported:
+        options = replace(options, max_per_category=max(MAX_PER_CATEGORY, math.ceil(most / len(targets))))
+    probe = AnnotationDrafter(vocabulary, chosen_landmarks, seed, options)
+    proposed = most if exact else min(most, probe.capacity())
     kinds = len({scene.instances[k].category for k in probe.things})
     if not proposed:
-        raise _nothing(name, probe.why_not())
+        raise _nothing_to_draft(name, probe.rejection_summary())
     reporter.line(
-        f"{name}: {_many(len(probe.things), 'thing')} of {_many(kinds, 'kind')} to look for; up to "
-        f"{_many(proposed, 'object')} by {_many(len(marks), 'landmark')} can be drafted, if drones can look at them"
+        f"{name}: {_plural(len(probe.things), 'thing')} of {_plural(kinds, 'kind')} to look for; up to "
+        f"{_plural(proposed, 'object')} by {_plural(len(chosen_landmarks), 'landmark')} can be drafted"
     )
-    # Counted is what ends the search: most things are never looked at, and the world is made before the first.
-    looked_at = replace(choice, refuses=refusals(scene, pipeline, roots))
+    # The bar counts objects found: most things are never tried, and the world is built before the first.
+    rejecting = replace(options, reject=make_reject(scene, pipeline, roots))
     with reporter.bar("annotate-draft", proposed, unit="objects") as bar:
-        drafter = AnnotationDrafter(vocabulary, marks, seed, looked_at)
+        drafter = AnnotationDrafter(vocabulary, chosen_landmarks, seed, rejecting)
         objects = drafter.objects(proposed, bar.advance)
-    _check_enough(name, len(objects), proposed, drafter.why_not(), exact=exact)
-    write_annotations(Annotations(name, marks, objects), path)
+    _check_enough(name, len(objects), proposed, drafter.rejection_summary(), exact=exact)
+    write_annotations(Annotations(name, chosen_landmarks, objects), path)
     unknown = sum(entry.category == UNKNOWN for entry in objects)
     if unknown:
         log.warning(
-            "%s: needs a person: nothing is known of %d of %d objects but colour and form; say what they are: %s",
+            "%s: needs review: only colour and shape are known of %d of %d objects; name them: %s",
             name, unknown, len(objects), command("annotate", scene=name),
         )  # fmt: skip
-    reporter.line(f"{name}: {_many(len(marks), 'landmark')}, {_many(len(objects), 'object')}{drafter.why_not()}")
+    counted = f"{_plural(len(chosen_landmarks), 'landmark')}, {_plural(len(objects), 'object')}"
+    reporter.line(f"{name}: {counted}{drafter.rejection_summary()}")
     return path
 
 
-def _check_enough(name: str, found: int, wanted: int, why_not: str, *, exact: bool) -> None:
+def _check_enough(name: str, found: int, expected: int, why: str, *, exact: bool) -> None:
     """Refuse a draft of nothing, or of fewer objects than there must be; warn of one of fewer than were proposed."""
     by_hand = f"add others by hand: {command('annotate', scene=name)}"
     if found == 0:
-        raise _nothing(name, why_not)
-    if found < wanted and exact:
-        fewer = f"--objects {found} takes those, or " if found >= LEAST_OBJECTS else ""
+        raise _nothing_to_draft(name, why)
+    if found < expected and exact:
+        fewer = f"--objects {found} takes those, or " if found >= MIN_OBJECTS else ""
         raise AnnotationError(
-            f"{name}: {wanted} objects are wanted, {found} can be chosen and told apart{why_not}: {fewer}{by_hand}"
+            f"{name}: {expected} objects requested, {found} can be chosen and distinguished{why}: {fewer}{by_hand}"
         )
-    if found < LEAST_OBJECTS:
-        log.warning("%s: one object makes no task, which goes from one to another%s; %s", name, why_not, by_hand)
-    elif found < wanted:
-        log.warning("%s: %d of %d objects can be chosen and told apart%s; %s", name, found, wanted, why_not, by_hand)
+    if found < MIN_OBJECTS:
+        log.warning("%s: a single object makes no task%s; %s", name, why, by_hand)
+    elif found < expected:
+        log.warning(
+            "%s: %d of %d objects can be chosen and distinguished%s; %s",
+            name,
+            found,
+            expected,
+            why,
+            by_hand,
+        )
 
 
-def _nothing(name: str, why_not: str) -> AnnotationError:
+def _nothing_to_draft(name: str, why: str) -> AnnotationError:
     return AnnotationError(
-        f"{name}: nothing in it can be drafted as an object{why_not}. Annotate it by hand, where a box (key B) cuts "
+        f"{name}: nothing in it can be drafted as an object{why}. Annotate it by hand, where a box (key B) cuts "
         f"a thing out of a surface: {command('annotate', scene=name)}"
     )
 
 
-def _many(n: int, what: str) -> str:
+def _plural(n: int, what: str) -> str:
     return f"{n:,} {what}{'' if n == 1 else 's'}"
 
 
-def _described_anew(name: str, path: Path, roots: ProjectPaths, seed: int) -> Path:
+def _redraft(name: str, path: Path, roots: ProjectPaths, seed: int) -> Path:
     if not path.exists():
         raise UsageError(f"{path} does not exist: there are no objects to keep")
     source = parse_annotations(path.read_text(encoding="utf-8"))
@@ -144,14 +158,14 @@ def _described_anew(name: str, path: Path, roots: ProjectPaths, seed: int) -> Pa
     return path
 
 
-def refusals(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[[str], str]:
+def make_reject(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[[str], str]:
     """Make the test why a node cannot be an object: it must have a full shortlist of anchors."""
     config = pipeline.anchor_sample
     world = World.of(scene, pipeline.embodiment.radius_m, config.margin_m)
     job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
 
     @cache
-    def refused(node: str) -> str:
+    def reject_reason(node: str) -> str:
         x, y, z = (float(v) for v in scene[node].centroid)
         item = {"object_id": 0, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
         found, rejected, _ = candidates_of(item, world, job, config)
@@ -163,4 +177,4 @@ def refusals(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[
         cause = max(_CAUSES, key=lambda reason: rejected[reason])
         return f"without {config.shortlist} viewpoints at {config.standoff_m:g} m ({_CAUSES[cause]})"
 
-    return refused
+    return reject_reason

@@ -17,7 +17,7 @@ from aerialdojo_gen.studio.web.serving import open_socket, serve, url_of
 
 
 def serve_session(
-    desk: AnnotationSession, *, port: int, host: str, browser: bool, say: Callable[[str], None]
+    session: AnnotationSession, *, port: int, host: str, browser: bool, say: Callable[[str], None]
 ) -> None:
     """Serve the tool."""
     from aerialdojo_gen.studio.annotate.server import make_app
@@ -27,26 +27,26 @@ def serve_session(
     except ValueError:
         raise UsageError(f"--host {host}: give an IPv4 address of this machine, or 0.0.0.0 for all") from None
     listener = open_socket(port, host)
-    app = make_app(desk, any_host=not loopback)
+    app = make_app(session, any_host=not loopback)
     try:
         if loopback:
-            say(f"annotating {desk.scene.name} at {url_of(listener)}   (Ctrl-C ends; every change is saved at once)")
+            say(f"annotating {session.scene.name} at {url_of(listener)}   (Ctrl-C stops; changes are saved at once)")
         else:
             token = secrets.token_urlsafe(24)
             app.add_middleware(TokenGate, token=token)
             shown = socket.gethostname() if host == "0.0.0.0" else host  # noqa: S104
-            say(f"annotating {desk.scene.name} at http://{shown}:{listener.getsockname()[1]}/?token={token}")
+            say(f"annotating {session.scene.name} at http://{shown}:{listener.getsockname()[1]}/?token={token}")
             say("anybody with this address can change the annotations; the traffic is not encrypted")
-        say(f"annotations: {desk.storage.path}")
+        say(f"annotations: {session.storage.path}")
         serve(app, listener, browser and loopback)
     finally:
-        desk.anchors.close()
+        session.anchors.close()
 
 
-def write_coco(desk: AnnotationSession, path: Path) -> Path:
+def write_coco(session: AnnotationSession, path: Path) -> Path:
     """Write `coco_zip` to a file, whole or not at all."""
-    content = coco_zip(desk)
-    desk.anchors.close()
+    content = coco_zip(session)
+    session.anchors.close()
     with atomic_file(path.parent, path.name) as temporary:
         temporary.write_bytes(content)
     return path

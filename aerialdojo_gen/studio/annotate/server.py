@@ -32,7 +32,7 @@ class _Body(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Signed(_Body):
+class AuthoredRequest(_Body):
     """A request that changes something says who asks for it."""
 
     who: Annotated[StrictStr, Field(max_length=80)] = ""
@@ -49,13 +49,13 @@ class Signed(_Body):
         return Author(self.who or "somebody", self.client)
 
 
-class OperationRequest(Signed):
+class OperationRequest(AuthoredRequest):
     """An operation."""
 
     operation: Operation
 
 
-class Imported(Signed):
+class ImportRequest(AuthoredRequest):
     """The text of an annotation file."""
 
     text: StrictStr
@@ -84,117 +84,117 @@ class Viewpoint(_Body):
     snap: bool = False
 
 
-def make_app(desk: AnnotationSession, *, any_host: bool = False) -> FastAPI:
+def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
     """Make the tool's web application."""
-    app = local_app(str(STATIC / "index.html"), f"annotate {desk.scene.name}", MOST_BYTES, any_host=any_host)
+    app = local_app(str(STATIC / "index.html"), f"annotate {session.scene.name}", MOST_BYTES, any_host=any_host)
 
     @app.exception_handler(ConflictError)
     def conflict(request: Request, error: Exception) -> JSONResponse:
         body: dict[str, Any] = {
             "error": one_line(str(error)),
-            "state": desk.document(request.query_params.get("client", "")[:40]),
+            "state": session.document(request.query_params.get("client", "")[:40]),
         }
         if isinstance(error, StaleError):
-            body["changes"] = desk.changes_since(_version(request.headers.get("if-match")))
+            body["changes"] = session.changes_since(_version(request.headers.get("if-match")))
         return JSONResponse(body, status_code=412 if isinstance(error, StaleError) else 409)
 
     @app.get("/api/scene")
     def scene() -> Response:
-        return Response(desk.payload, media_type="application/octet-stream")
+        return Response(session.payload, media_type="application/octet-stream")
 
     @app.get("/api/facts")
     def facts() -> dict[str, Any]:
-        return desk.facts()
+        return session.facts()
 
     @app.get("/api/document")
     def document(request: Request, client: Annotated[str, Query(max_length=40)] = "") -> Response:
-        if _version(request.headers.get("if-none-match")) == desk.storage.load().version:
+        if _version(request.headers.get("if-none-match")) == session.storage.load().version:
             return Response(status_code=304)
-        return _with_version(desk.document(client))
+        return _with_version(session.document(client))
 
     @app.post("/api/operations")
     def operate(body: OperationRequest, if_match: _Match = None) -> Response:
         version = _required(if_match)
         try:
-            return _with_version(desk.change(version, body.author, body.operation))
+            return _with_version(session.change(version, body.author, body.operation))
         except (StoreError, AnnotationError) as error:
             # A full disk, a file that an editor has left half: no fault of what is asked, which the page sends again.
             return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
     @app.post("/api/undo")
-    def undo(body: Signed, if_match: _Match = None) -> Response:
-        return _with_version(desk.undo(_required(if_match), body.author))
+    def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
+        return _with_version(session.undo(_required(if_match), body.author))
 
     @app.post("/api/redo")
-    def redo(body: Signed, if_match: _Match = None) -> Response:
-        return _with_version(desk.redo(_required(if_match), body.author))
+    def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
+        return _with_version(session.redo(_required(if_match), body.author))
 
     @app.post("/api/import")
-    def take_over(body: Imported, if_match: _Match = None) -> Response:
-        return _with_version(desk.replace(_required(if_match), body.author, body.text.encode("utf-8", "replace")))
+    def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
+        return _with_version(session.replace(_required(if_match), body.author, body.text.encode("utf-8", "replace")))
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:
-        return desk.draft(body.operation)
+        return session.draft(body.operation)
 
     @app.post("/api/pick")
     def pick(body: Ray) -> dict[str, Any] | None:
-        return desk.pick(body.origin_m, body.direction)
+        return session.pick(body.origin_m, body.direction)
 
     @app.get("/api/nodes/{node}")
     def about(node: str) -> dict[str, Any]:
-        return desk.about(node) if node in desk.scene else {}
+        return session.about(node) if node in session.scene else {}
 
     @app.post("/api/boxes")
     def cut(body: Box) -> dict[str, Any]:
-        return desk.cut(body.low_m, body.high_m, body.category)
+        return session.cut(body.low_m, body.high_m, body.category)
 
     @app.delete("/api/boxes/{node}")
     def uncut(node: str) -> dict[str, Any]:
-        desk.uncut(node)
+        session.uncut(node)
         return {}
 
     @app.get("/api/objects/{object_id}/anchors")
     def anchors(object_id: _Object) -> list[dict[str, Any]]:
-        entry = desk.object(object_id)
-        return [_viewpoint_json(desk, entry.node, row, []) for row in desk.anchors.candidates(entry)]
+        entry = session.object(object_id)
+        return [_viewpoint_json(session, entry.node, row, []) for row in session.anchors.candidates(entry)]
 
     @app.post("/api/objects/{object_id}/viewpoint")
     def viewpoint(object_id: _Object, body: Viewpoint) -> dict[str, Any]:
-        entry = desk.object(object_id)
+        entry = session.object(object_id)
         place = np.array(body.position_m)
         if body.snap:
-            place = desk.anchors.place(entry, place)
+            place = session.anchors.place(entry, place)
         yaw = None if body.yaw_deg is None else math.radians(body.yaw_deg)
-        return _viewpoint_json(desk, entry.node, *desk.anchors.judge(entry, place, yaw))
+        return _viewpoint_json(session, entry.node, *session.anchors.check_viewpoint(entry, place, yaw))
 
     @app.get("/api/picture")
     def picture(x: float, y: float, z: float, yaw_deg: float) -> Response:
         place, yaw = np.array([x, y, z]), math.radians(yaw_deg)
-        low, high = desk.scene.bounds
+        low, high = session.scene.bounds
         if not (np.isfinite([*place, yaw]).all() and (place >= low - 5).all() and (place <= high + 5).all()):
             raise AerialDojoError("no picture from outside the scene")
-        return Response(desk.anchors.view(place, yaw).png, media_type="image/png")
+        return Response(session.anchors.view(place, yaw).png, media_type="image/png")
 
     @app.get("/api/history")
     def history() -> list[dict[str, Any]]:
-        return desk.history()
+        return session.history()
 
     @app.get("/api/export")
     def export() -> Response:
-        return _download(desk.export(), "application/json", desk.storage.path.name)
+        return _download(session.export(), "application/json", session.storage.path.name)
 
     @app.get("/api/coco")
     def coco() -> Response:
-        return _download(coco_zip(desk), "application/zip", f"{desk.scene.name}-coco.zip")
+        return _download(coco_zip(session), "application/zip", f"{session.scene.name}-coco.zip")
 
     app.mount("/annotate", StaticFiles(directory=STATIC, follow_symlink=False), name="annotate")
     return app
 
 
-def _viewpoint_json(desk: AnnotationSession, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:
+def _viewpoint_json(session: AnnotationSession, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:
     place = np.array([row["x_m"], row["y_m"], row["z_m"]])
-    view = desk.anchors.view(place, row["yaw_rad"]) if _near(desk, place) else None
+    view = session.anchors.view(place, row["yaw_rad"]) if _near(session, place) else None
     box = view.boxes.get(node) if view else None
     return {
         "position_m": place.round(3).tolist(),
@@ -204,13 +204,13 @@ def _viewpoint_json(desk: AnnotationSession, node: str, row: dict[str, Any], fau
         "visible_fraction": row["visible_fraction"],
         "score": row["score"],
         "box_px": box,
-        "share": (view.pixels.get(node, 0) / desk.anchors.n_pixels) if view else 0.0,
+        "share": (view.pixels.get(node, 0) / session.anchors.n_pixels) if view else 0.0,
         "faults": faults,
     }
 
 
-def _near(desk: AnnotationSession, place: Any) -> bool:
-    low, high = desk.scene.bounds
+def _near(session: AnnotationSession, place: Any) -> bool:
+    low, high = session.scene.bounds
     return bool((place >= low - 5).all() and (place <= high + 5).all())
 
 
@@ -220,7 +220,7 @@ def _version(header: str | None) -> str:
 
 def _required(header: str | None) -> str:
     if not header:
-        raise AerialDojoError("say which version is to be changed: If-Match")
+        raise AerialDojoError("the If-Match header with the version is missing")
     return _version(header)
 
 

@@ -23,7 +23,7 @@ from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.studio.annotate import boxes
-from aerialdojo_gen.studio.annotate.anchors import AnchorDesk
+from aerialdojo_gen.studio.annotate.anchors import AnchorService
 from aerialdojo_gen.studio.annotate.describe import Describer
 from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
 from aerialdojo_gen.studio.annotate.history import Record
@@ -57,7 +57,7 @@ class AnnotationSession:
         self.scene: Scene = scene
         self.payload, self._describer, self._rays = payload, describer, rays
         self._described: tuple[str, dict[str, Any]] | None = None
-        self.anchors = AnchorDesk(scene, pipeline, self._roots)
+        self.anchors = AnchorService(scene, pipeline, self._roots)
 
     # What the page shows.
 
@@ -109,7 +109,7 @@ class AnnotationSession:
 
     def change(self, version: str, author: Author, operation: Operation) -> dict[str, Any]:
         """Do an operation and save it; see `Storage.change`."""
-        fields = {} if operation.do == "remove" else operation.fields.given()
+        fields = {} if operation.do == "remove" else operation.fields.set_values()
         if fields.get("node", "") and fields["node"] not in self.scene:
             raise AerialDojoError(f"no node {fields['node']!r} in the scene")
         if fields.get("anchor") is not None and isinstance(operation, Change):
@@ -187,7 +187,7 @@ class AnnotationSession:
         """Make a node of what lies in a box (corners in world metres); only imported scenes can be cut."""
         slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
         if not slug:
-            raise AerialDojoError("give the thing a category")
+            raise AerialDojoError("a category is required")
         low, high = np.minimum(low_m, high_m).round(3), np.maximum(low_m, high_m).round(3)
         with self._lock, self.storage.locked():
             node = next(n for k in itertools.count() if (n := f"{slug}_{k:03d}") not in self.scene)
@@ -220,9 +220,11 @@ class AnnotationSession:
             entry = self.object(object_id)
         except UsageError as error:
             raise ConflictError(str(error)) from None
-        _, faults = self.anchors.judge(entry, np.array(anchor.position_m), float(np.radians(anchor.yaw_deg)))
+        _, faults = self.anchors.check_viewpoint(
+            entry, np.array(anchor.position_m), float(np.radians(anchor.yaw_deg))
+        )
         if faults:
-            raise AerialDojoError(f"this anchor will not do: {'; '.join(faults)}")
+            raise AerialDojoError(f"invalid anchor: {'; '.join(faults)}")
 
     def export(self) -> bytes:
         """The annotation file, byte for byte; that of a scene without one."""

@@ -53,7 +53,7 @@ class StaleError(ConflictError):
     """A change was made for another version of the file than the one on disk."""
 
     def __init__(self, state: State) -> None:
-        super().__init__("somebody else has changed these annotations since")
+        super().__init__("these annotations have been changed by another client")
         self.state = state
 
 
@@ -146,11 +146,12 @@ class Storage:
                 before=state.version, after=digest, edits=edits,
             )  # fmt: skip
             lines = [record]
-            known = self.history.records[-1].after if self.history.records else state.version
-            if known != state.version:
+            last_version = self.history.records[-1].after if self.history.records else state.version
+            if last_version != state.version:
                 outside = {"action": "outside", "what": "changed outside of this tool", "client": "", "who": ""}
                 lines.insert(
-                    0, record.model_copy(update=outside | {"before": known, "after": state.version, "edits": ()})
+                    0,
+                    record.model_copy(update=outside | {"before": last_version, "after": state.version, "edits": ()}),
                 )
             try:
                 self._write(raw, lines)
@@ -220,5 +221,5 @@ def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
     for kind in ("landmarks", "objects"):
         ids = [entry.id for entry in getattr(source.annotations, kind)]
         if len(set(ids)) < len(ids):
-            raise AnnotationError(f"{name}: an id stands twice among the {kind}: mend it in an editor first")
+            raise AnnotationError(f"{name}: duplicate id in {kind}: mend it in an editor first")
     return source.annotations

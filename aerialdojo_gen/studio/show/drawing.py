@@ -28,7 +28,7 @@ CLEARANCE_SCALE = LogNorm(TIGHT_M, OPEN_M, clip=True)
 _START, _GOAL, _TARGET = "#0284c7", "#16a34a", "#facc15"
 _HALO = (withStroke(linewidth=3, foreground="black"),)
 _HALO_OF_BAR = (withStroke(linewidth=5, foreground="black"),)
-_AROUND_M, _LEAST_M, _ABOVE_M = 7.0, 26.0, 3.0
+_MARGIN_M, _LEAST_M, _ABOVE_M = 7.0, 26.0, 3.0
 # As wide as the words at a route's ends, of a picture's width.
 _LABEL_SHARE = 0.09
 
@@ -40,7 +40,7 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
     with_landmark = np.vstack([corners, landmark[:2]])
     # A far landmark would make the route small: then an arrow at the edge shows the way to it.
     near = np.ptp(with_landmark, axis=0).max() <= max(1.7 * np.ptp(corners, axis=0).max(), 45.0)
-    extent = _framed(with_landmark if near else corners, aspect)
+    extent = _frame(with_landmark if near else corners, aspect)
     height = max(way[:, 2].max(), _box(task.target)[1][2]) + _ABOVE_M
     plane = Plane.above(height, extent)
     _picture(axes, task, plane)
@@ -55,7 +55,7 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
             "", (x + reach * math.cos(yaw), y + reach * math.sin(yaw)), (x, y), zorder=7,
             arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.4, "path_effects": list(_HALO)},
         )  # fmt: skip
-    _ends(axes, task, plane)
+    _endpoints(axes, task, plane)
     _landmark(axes, task, extent)
     _compass(axes)
     _scale_bar(axes, extent)
@@ -77,7 +77,7 @@ def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
     origin = forward * (float((points @ forward).min()) - 1.0)
     flat = Plane(origin, right, up, (0.0, 1.0, 0.0, 1.0)).project(points)
     ground = np.nanmin(np.append(task.below_m, points[:, 2].min()))
-    extent = _framed(np.vstack([flat, [flat[0, 0], ground]]), aspect, around_m=3.0, least_m=4.0)
+    extent = _frame(np.vstack([flat, [flat[0, 0], ground]]), aspect, around_m=3.0, least_m=4.0)
     # Room that is left over belongs above: below there is only earth.
     height = extent[3] - extent[2]
     bottom = min(extent[2] + 0.4 * height, min(ground, float(flat[:, 1].min())) - 0.12 * height)
@@ -85,7 +85,7 @@ def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
     plane = Plane(origin, right, up, extent)
     _picture(axes, task, plane)
     _route(axes, task, plane)
-    _ends(axes, task, plane)
+    _endpoints(axes, task, plane)
     axes.set_ylabel("height z, m", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.set_xticks([])
@@ -103,7 +103,7 @@ def draw_profile(axes: Axes, task: PicturedTask) -> None:
     floor = np.nanmin(np.append(task.below_m, z.min())) - 0.06 * max(2.0, float(np.ptp(z)))
     below = np.where(np.isnan(task.below_m), floor, task.below_m)
     axes.fill_between(s, floor, below, color="#94a3b8", lw=0, label="surface below")
-    axes.add_collection(_coloured(np.column_stack([s, z]), task.clearance_m, 3.4))
+    axes.add_collection(_clearance_line(np.column_stack([s, z]), task.clearance_m, 3.4))
     axes.set_xlim(0.0, max(float(s[-1]), 1.0))
     axes.set_ylim(floor, max(float(z.max()), float(below.max())) + 0.12 * max(2.0, float(np.ptp(z))))
     axes.set_xlabel("distance flown, m", fontsize=8)
@@ -129,8 +129,8 @@ def _box(row: dict[str, float]) -> Floats:
     return np.stack([_centre(row) - half, _centre(row) + half])
 
 
-def _framed(
-    points: Floats, aspect: float, around_m: float = _AROUND_M, least_m: float = _LEAST_M
+def _frame(
+    points: Floats, aspect: float, around_m: float = _MARGIN_M, least_m: float = _LEAST_M
 ) -> tuple[float, float, float, float]:
     """Frame points (n, 2) with room around them, in a rectangle of an aspect."""
     low, high = points.min(axis=0) - around_m, points.max(axis=0) + around_m
@@ -154,7 +154,7 @@ def _picture(axes: Axes, task: PicturedTask, plane: Plane) -> None:
         axes.set_yticks([])
 
 
-def _coloured(points: Floats, clearance_m: Floats, width: float) -> LineCollection:
+def _clearance_line(points: Floats, clearance_m: Floats, width: float) -> LineCollection:
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     return LineCollection(
         list(pieces), array=np.minimum(clearance_m[:-1], clearance_m[1:]), cmap=CLEARANCE_COLOURS,
@@ -165,20 +165,20 @@ def _coloured(points: Floats, clearance_m: Floats, width: float) -> LineCollecti
 def _route(axes: Axes, task: PicturedTask, plane: Plane) -> None:
     flat = plane.project(task.way)
     axes.plot(flat[:, 0], flat[:, 1], color="black", lw=5.4, solid_capstyle="round", zorder=3)
-    axes.add_collection(_coloured(flat, task.clearance_m, 3.6))
+    axes.add_collection(_clearance_line(flat, task.clearance_m, 3.6))
 
 
-def _ends(axes: Axes, task: PicturedTask, plane: Plane) -> None:
+def _endpoints(axes: Axes, task: PicturedTask, plane: Plane) -> None:
     ends = plane.project(task.way[[0, -1]])
     low, high = sorted(axes.get_xlim())
     for (a, b), other, text, colour in zip(ends, ends[::-1], ("start", "goal"), (_START, _GOAL), strict=True):
         axes.plot([a], [b], "o", ms=10, mfc=colour, mec="white", mew=1.6, zorder=8)
         # Away from the other end, unless the picture ends there.
         side = -1 if a < other[0] else 1
-        beside = (a - low if side < 0 else high - a) > _LABEL_SHARE * (high - low)
+        has_room = (a - low if side < 0 else high - a) > _LABEL_SHARE * (high - low)
         axes.annotate(
-            text, (a, b), (10 * side, 0) if beside else (0, 8), textcoords="offset points",
-            ha=("right" if side < 0 else "left") if beside else "center", va="center" if beside else "bottom",
+            text, (a, b), (10 * side, 0) if has_room else (0, 8), textcoords="offset points",
+            ha=("right" if side < 0 else "left") if has_room else "center", va="center" if has_room else "bottom",
             fontsize=10, weight="bold", color="white", path_effects=_HALO, zorder=9, clip_on=True,
         )  # fmt: skip
 

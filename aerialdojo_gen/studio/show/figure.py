@@ -104,7 +104,7 @@ def _frames(sheet: _Sheet, task: PicturedTask) -> None:
 def write_png(task: PicturedTask, path: Path) -> Path:
     """Write the picture of a task, whole or not at all."""
     if path.suffix.lower() != ".png":
-        raise UsageError(f"{path}: the picture is a PNG, call it {path.with_suffix('.png').name}")
+        raise UsageError(f"{path}: the output must be a PNG file, for example {path.with_suffix('.png').name}")
     with atomic_file(path.parent, path.name) as temporary:
         task_figure(task).savefig(temporary, format="png", metadata={"Software": None})
     return path

@@ -75,17 +75,17 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
         first[step] = min(frame, first.get(step, frame))
     if any(step not in first for step in steps):
         return None
-    video = open_view(_copy(root, path), "front", "rgb")
+    video = open_view(_local_video(root, path), "front", "rgb")
     return [
         np.asarray(cv2.resize(video[first[step]], (SIZE_PX, SIZE_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         for step in steps
     ]
 
 
-def _copy(root: DataRoot, told: str) -> Path:
-    if is_outside(root, told):
-        raise StoreError(f"recordings: path {told!r} leads out of {root}")
+def _local_video(root: DataRoot, path: str) -> Path:
+    if is_outside(root, path):
+        raise StoreError(f"recordings: path {path!r} leads out of {root}")
     try:
-        return root.local_copy(told)
+        return root.local_copy(path)
     except FileNotFoundError:
-        raise StoreError(f"the recording {root.at(told)} is missing: run {command('render')}") from None
+        raise StoreError(f"the recording {root.at(path)} is missing: run {command('render')}") from None

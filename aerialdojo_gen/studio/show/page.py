@@ -33,9 +33,9 @@ def render_page(task: PicturedTask) -> str:
     return template.render(
         task=task,
         route=route,
-        map=_drawn(lambda axes: draw_map(axes, task, 1.6), 9.6, 6.0),
-        side=_drawn(lambda axes: draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
-        profile=_drawn(lambda axes: draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
+        map=_to_data_url(lambda axes: draw_map(axes, task, 1.6), 9.6, 6.0),
+        side=_to_data_url(lambda axes: draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
+        profile=_to_data_url(lambda axes: draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
         reference=None if task.reference is None else data_url(encode_png(task.reference)),
         frames=[(frame, data_url(encode_jpeg(frame.rgb, PAGE_JPEG))) for frame in task.frames],
         poses=[
@@ -46,7 +46,9 @@ def render_page(task: PicturedTask) -> str:
     )
 
 
-def _drawn(draw: Callable[[Axes], None], width: float, height: float, left: float = 0.0, bottom: float = 0.0) -> str:
+def _to_data_url(
+    draw: Callable[[Axes], None], width: float, height: float, left: float = 0.0, bottom: float = 0.0
+) -> str:
     figure = Figure(figsize=(width, height), dpi=120)
     FigureCanvasAgg(figure)
     draw(figure.add_axes((left, bottom, 1.0 - left, 1.0 - bottom - (0.03 if bottom else 0.0))))

@@ -68,7 +68,7 @@ class PicturedTask:
         )
 
     @property
-    def told(self) -> str:
+    def terminal_goal(self) -> str:
         """The goal for a terminal, which shows no picture: which one it is, and what the twin in words says."""
         row = self.instance
         if row["modality"] != "image" or self.reference is None:

@@ -25,12 +25,12 @@ from aerialdojo_gen.studio.web.payload import scene_payload
 
 _T = TypeVar("_T")
 # A payload is some 20 MB, a scene's objects with their pictures as much.
-_MOST_OPEN = 4
+_MAX_OPEN = 4
 _WIDTH_PX, _HEIGHT_PX, _FOV_DEG = 480, 300, 60.0
 THUMB_PX = 224
 
 
-class ShownScene:
+class SceneData:
     """One scene with what the page asks for; what takes its mesh is made when it is first asked for."""
 
     def __init__(self, released: ReleasedScene) -> None:
@@ -63,52 +63,52 @@ class ShownScene:
         return image
 
 
-class ShownScenes:
+class SceneCache:
     """The scenes of a release, opened when they are asked for."""
 
     def __init__(self, root: DataRoot, names: Sequence[str]) -> None:
         self.root, self.names = root, tuple(names)
-        self._open: OrderedDict[str, ShownScene] = OrderedDict()
-        self._small: dict[tuple[str, int], bytes] = {}
+        self._open: OrderedDict[str, SceneData] = OrderedDict()
+        self._thumbs: dict[tuple[str, int], bytes] = {}
         self._pictures: dict[str, bytes] = {}
         self._lock = threading.Lock()
         # A renderer belongs to the thread that has made it, FCL's manager is no thing for two, and scenes that are
         # let go of close both: all that touches a mesh is done by one thread.
         self._worker = ThreadPoolExecutor(1, "scenes")
-        self._drawing, self._reading = threading.Lock(), threading.Lock()
-        self._images = lru_cache(maxsize=_MOST_OPEN)(self._read_images)
+        self._render_lock, self._read_lock = threading.Lock(), threading.Lock()
+        self._images = lru_cache(maxsize=_MAX_OPEN)(self._read_images)
 
     def require(self, name: str) -> None:
         """UsageError where there is no scene of the name."""
         if name not in self.names:
             raise UsageError(unknown("no scene", name, self.names, most=3))
 
-    def do(self, name: str, what: Callable[[ShownScene], _T]) -> _T:
+    def run(self, name: str, what: Callable[[SceneData], _T]) -> _T:
         """Do something with a scene; UsageError where there is none of the name."""
         self.require(name)
-        return self._worker.submit(lambda: what(self._opened(name))).result()
+        return self._worker.submit(lambda: what(self._load(name))).result()
 
-    def _opened(self, name: str) -> ShownScene:
+    def _load(self, name: str) -> SceneData:
         with self._lock:
-            shown = self._open.pop(name, None) or ShownScene(ReleasedScene(self.root, name))
-            self._open[name] = shown
-            while len(self._open) > _MOST_OPEN:
+            data = self._open.pop(name, None) or SceneData(ReleasedScene(self.root, name))
+            self._open[name] = data
+            while len(self._open) > _MAX_OPEN:
                 self._open.popitem(last=False)
-            return shown
+            return data
 
     def thumb(self, name: str, object_id: int) -> bytes:
         """Return an object's reference image made small, JPEG; UsageError where it has none."""
         self.require(name)
-        with self._reading:
+        with self._read_lock:
             key = (name, object_id)
-            if key not in self._small:
+            if key not in self._thumbs:
                 image = decode_rgb(self._images(name).get(object_id))
                 if image is None:
                     raise UsageError(f"object {object_id} of {name} has no reference image")
                 scale = THUMB_PX / max(image.shape[:2])
                 small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-                self._small[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
-            return self._small[key]
+                self._thumbs[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
+            return self._thumbs[key]
 
     def _read_images(self, name: str) -> dict[int, bytes | None]:
         table = store.read_scene(self.root, "release/objects", name, ["object_id", "reference_image"])
@@ -117,9 +117,9 @@ class ShownScenes:
     def picture(self, name: str) -> bytes:
         """Return a picture of a scene from its south-west, JPEG, as the page of the scene begins."""
         # One at a time: the start page asks for many, and who opens a scene is not to wait for them all.
-        with self._drawing:
+        with self._render_lock:
             if name not in self._pictures:
-                self._pictures[name] = self.do(name, lambda shown: _picture(shown.released.model))
+                self._pictures[name] = self.run(name, lambda data: _picture(data.released.model))
             return self._pictures[name]
 
 

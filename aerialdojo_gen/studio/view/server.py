@@ -12,7 +12,7 @@ from aerialdojo_gen.dataset.release import open_release
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
-from aerialdojo_gen.studio.view.scenes import ShownScenes
+from aerialdojo_gen.studio.view.scenes import SceneCache
 from aerialdojo_gen.studio.view.tasks import TaskList
 from aerialdojo_gen.studio.web.serving import STATIC, local_app
 
@@ -24,10 +24,10 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
     root = open_root(data)
     names = chosen_scenes(root, scenes)
     app = local_app("start.html", f"aerialdojo-gen view {root}", also=("view.html",))
-    shown, release = ShownScenes(root, names), open_release(root)
+    cache, release = SceneCache(root, names), open_release(root)
     tasks = TaskList(release, names)
     if len(names) == 1:
-        shown.do(names[0], lambda scene: (scene.payload, scene.index, scene.points))
+        cache.run(names[0], lambda scene: (scene.payload, scene.index, scene.points))
 
     @app.get("/api/release")
     def get_release() -> dict[str, Any]:
@@ -46,43 +46,45 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
         most: Annotated[int, Query(ge=0, le=_MOST_TASKS)] = 48,
     ) -> dict[str, Any]:  # fmt: skip
         for name in scene or ():
-            shown.require(name)
-        wanted = [name for name in names if not scene or name in scene]
-        return tasks.find(wanted, setting=setting, split=split, words=words[:200], order=order, descending=descending,
-                          offset=offset, most=most)  # fmt: skip
+            cache.require(name)
+        selected = [name for name in names if not scene or name in scene]
+        return tasks.find(
+            selected, setting=setting, split=split, words=words[:200], order=order, descending=descending,
+            offset=offset, most=most,
+        )  # fmt: skip
 
     @app.get("/scenes/{name}/", response_model=None)
     def page(name: str) -> Response:
-        shown.require(name)
+        cache.require(name)
         return Response((STATIC / "view.html").read_bytes(), media_type="text/html")
 
     @app.get("/scenes/{name}/picture", response_model=None)
     def get_picture(name: str) -> Response:
-        return Response(shown.picture(name), media_type="image/jpeg")
+        return Response(cache.picture(name), media_type="image/jpeg")
 
     @app.get("/scenes/{name}/api/scene", response_model=None)
     def get_scene(name: str) -> Response:
-        return Response(shown.do(name, lambda scene: scene.payload), media_type="application/octet-stream")
+        return Response(cache.run(name, lambda scene: scene.payload), media_type="application/octet-stream")
 
     @app.get("/scenes/{name}/api/index")
     def get_index(name: str) -> dict[str, Any]:
-        return shown.do(name, lambda scene: scene.index)
+        return cache.run(name, lambda scene: scene.index)
 
     @app.get("/scenes/{name}/api/routes/points", response_model=None)
     def get_points(name: str) -> Response:
-        return Response(shown.do(name, lambda scene: scene.points), media_type="application/octet-stream")
+        return Response(cache.run(name, lambda scene: scene.points), media_type="application/octet-stream")
 
     @app.get("/scenes/{name}/api/routes/{nav_id}")
     def get_route(name: str, nav_id: str) -> dict[str, Any]:
-        return shown.do(name, lambda scene: scene.detail(nav_id))
+        return cache.run(name, lambda scene: scene.detail(nav_id))
 
     @app.get("/scenes/{name}/api/objects/{object_id}/image", response_model=None)
     def get_image(name: str, object_id: int) -> Response:
-        return Response(shown.do(name, lambda scene: scene.image(object_id)), media_type="image/png")
+        return Response(cache.run(name, lambda scene: scene.image(object_id)), media_type="image/png")
 
     @app.get("/scenes/{name}/api/objects/{object_id}/thumb", response_model=None)
     def get_thumb(name: str, object_id: int) -> Response:
-        return Response(shown.thumb(name, object_id), media_type="image/jpeg")
+        return Response(cache.thumb(name, object_id), media_type="image/jpeg")
 
     return app
 

@@ -29,7 +29,7 @@ class TaskList:
         self._read: dict[str, pa.Table] = {}
         self._lock = threading.Lock()
 
-    def _of(self, scene: str) -> pa.Table:
+    def _table(self, scene: str) -> pa.Table:
         with self._lock:
             if scene not in self._read:
                 routes = self._release.table("routes", scene=scene, columns=_ROUTES)
@@ -52,7 +52,9 @@ class TaskList:
         """Find tasks by words, setting and split, in an order: ``total`` and the rows of a page."""
         if order not in ORDERS:
             raise UsageError(f"tasks are ordered by {', '.join(ORDERS)}")
-        parts = [_fitting(self._of(scene), setting, split, words.lower().split()) for scene in scenes or self._names]
+        parts = [
+            _filter(self._table(scene), setting, split, words.lower().split()) for scene in scenes or self._names
+        ]
         found = pa.concat_tables(parts, promote_options="default").unify_dictionaries()
         key = pc.utf8_slice_codeunits(found[order], -12) if order == "nav_id" else found[order]
         sort = pa.table({"key": key, "id": found["nav_id"]})
@@ -61,11 +63,11 @@ class TaskList:
         return {"total": found.num_rows, "tasks": [_to_json(row) for row in rows]}
 
 
-def _fitting(table: pa.Table, setting: str, split: str, words: Sequence[str]) -> pa.Table:
+def _filter(table: pa.Table, setting: str, split: str, words: Sequence[str]) -> pa.Table:
     keep = np.ones(table.num_rows, dtype=np.bool_)
-    for column, wanted in (("setting", setting), ("split", split)):
-        if wanted:
-            keep &= pc.equal(table[column], wanted).to_numpy(zero_copy_only=False)
+    for column, value in (("setting", setting), ("split", split)):
+        if value:
+            keep &= pc.equal(table[column], value).to_numpy(zero_copy_only=False)
     for word in words:
         # A task's id is its route's and a letter more.
         holds = pc.match_substring(table["nav_id"], re.sub("-[si]$", "", word), ignore_case=True)
@@ -79,5 +81,5 @@ def _fitting(table: pa.Table, setting: str, split: str, words: Sequence[str]) ->
 
 
 def _to_json(row: dict[str, Any]) -> dict[str, Any]:
-    told = {key: round(value, 3) if isinstance(value, float) else value for key, value in row.items()}
-    return {"object_id" if key == "target_object_id" else key: value for key, value in told.items()}
+    rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in row.items()}
+    return {"object_id" if key == "target_object_id" else key: value for key, value in rounded.items()}

@@ -91,9 +91,9 @@ def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: d
     vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
     size, (holes, both_sides, unlit, behind) = look[:2], look[2:]
-    told = {"holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": behind}
+    flags = {"holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": behind}
     group: dict[str, Any] = {
-        **{key: True for key, value in told.items() if value},
+        **{key: True for key, value in flags.items() if value},
         "size": list(size),
         "position": body.add(vertices.astype("<f4").tobytes()),
         "index": body.add(index.astype("<u4").tobytes()),

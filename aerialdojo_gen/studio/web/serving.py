@@ -81,11 +81,11 @@ class _LocalOnly:
         if self._any_host:
             hosts |= {host.lower() for host in found}
         if len(found) != 1 or found[0].lower() not in hosts:
-            return 403, "this page answers to 127.0.0.1 and localhost alone"
+            return 403, "only 127.0.0.1 and localhost are allowed"
         if any(origin.lower() not in {b"http://" + host for host in hosts} for origin in headers.get(b"origin", [])):
-            return 403, "this page takes no requests from other sites"
+            return 403, "requests from other sites are not allowed"
         if headers.get(b"sec-fetch-site", [b"none"])[0] in (b"cross-site", b"same-site"):
-            return 403, "this page takes no requests from other sites"
+            return 403, "requests from other sites are not allowed"
         if b"transfer-encoding" in headers:
             return 411, "send a Content-Length"
         length = headers.get(b"content-length", [b"0"])[0]
@@ -141,21 +141,21 @@ def local_app(
 
     @app.exception_handler(AerialDojoError)
     def expected(_: Request, error: Exception) -> JSONResponse:
-        return said(error, 404 if isinstance(error, UsageError) else 400)
+        return error_response(error, 404 if isinstance(error, UsageError) else 400)
 
     @app.exception_handler(RequestValidationError)
     def malformed(_: Request, error: Exception) -> JSONResponse:
         assert isinstance(error, RequestValidationError)
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        return said(f"malformed request: {where}: {first['msg']}", 422)
+        return error_response(f"malformed request: {where}: {first['msg']}", 422)
 
     @app.exception_handler(HTTPException)
     def refused(_: Request, error: Exception) -> JSONResponse:
         assert isinstance(error, HTTPException)
-        return said(error.detail, error.status_code)
+        return error_response(error.detail, error.status_code)
 
-    def said(what: object, status: int) -> JSONResponse:
+    def error_response(what: object, status: int) -> JSONResponse:
         return JSONResponse({"error": one_line(str(what))}, status_code=status)
 
     app.mount("/static", StaticFiles(directory=STATIC, follow_symlink=False), name="static")
