@@ -1,9 +1,9 @@
-"""Whether a description fits anything but its own object.
+"""Check whether a description fits anything but its own object.
 
-Two objects are told apart by the landmark nearest to them, the compass direction from it, and what the description
-asserts (`claims`). Rivals of an object are all instances of its category that share its landmark and direction,
-whether they are annotated or not: whoever searches the scene sees them all. A rival that every assertion fits, with
-the slack `claims.DISTRACTOR_SLACK` on distances and angles, makes the description ambiguous.
+Objects are located by their nearest landmark, the compass direction from it, and the claims of the description
+(`claims`). The distractors of an object are all instances of its category with the same landmark and direction,
+annotated or not: an agent in the scene sees them all. A description is ambiguous if all its claims hold for a
+distractor, with the slack `claims.DISTRACTOR_SLACK` on distances and angles.
 """
 
 from __future__ import annotations
@@ -23,33 +23,30 @@ from aerialdojo_gen.geometry.frames import compass_direction
 
 @dataclass(frozen=True)
 class Bearing:
-    """The nearest landmark in the plane, by its place in the list of landmarks, and the direction from it."""
+    """Index of the nearest landmark in the plane, and the compass direction from it."""
 
     landmark: int
     direction: str
 
 
 def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.float64]) -> Bearing | None:
-    """Find the nearest landmark in the plan (paper, section on goals).
-
-    Centres in world metres, None if there is no direction.
-    """
+    """Find the nearest landmark in the plane (centres in world metres); None where there is no direction."""
     if len(landmarks_m) == 0:
         return None
     offset = np.asarray(centre_m)[:2] - np.asarray(landmarks_m)[:, :2]
-    # Millimetres: which landmark is nearest must not hang on the last bit of a square root.
+    # Rounded to millimetres, so that the result does not depend on floating-point noise.
     nearest = int(np.argmin(np.round(np.hypot(offset[:, 0], offset[:, 1]), 3)))
     dx, dy = float(offset[nearest, 0]), float(offset[nearest, 1])
     return None if dx == 0.0 and dy == 0.0 else Bearing(nearest, compass_direction(dx, dy))
 
 
 def first_sentence(text: str) -> str:
-    """Cut a text behind its first sentence."""
+    """Return the first sentence of a text."""
     return re.split(r"(?<=[.!?])\s", text.strip(), maxsplit=1)[0]
 
 
 class Ambiguity:
-    """The check of descriptions against one scene."""
+    """Checks descriptions for ambiguity in one scene."""
 
     def __init__(self, geometry: SceneGeometry, lexicon: Lexicon, landmarks: Sequence[int]) -> None:
         self.geometry = geometry
@@ -93,15 +90,12 @@ class Ambiguity:
         ]
 
     def _place_fault(self, i: int, place: str, slack: float = 1.0) -> str:
-        """Say which condition of a place is not so of an instance; empty for what nothing is known of."""
+        """Return the first condition of a place phrase that an instance violates; empty if there is none."""
         places = self.lexicon.places
         return places.fault(i, place, slack) if places is not None and place in places else ""
 
     def first_sentence_distractors(self, i: int, name: str, description: str) -> list[int]:
-        """Instances that the name and the first sentence of a description of `i` fit as well.
-
-        Who looks for a thing may have read no farther.
-        """
+        """Instances that the name and first sentence of a description of `i` fit: a reader may stop there."""
         return self.distractors(i, f"The {name}: {first_sentence(description)}")
 
     def false_claims(self, i: int, text: str) -> list[str]:

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
 from aerialdojo_gen.scenes.sampling import shown_colours
 
-# What people call a colour, and what `colour_name` may call it: one word is a shade of several.
+# Colour words and the results of `colour_name` that each may stand for.
 SHADES: Mapping[str, frozenset[str]] = {
     word: frozenset(names.split())
     for word, names in {
@@ -36,16 +36,16 @@ SHADES: Mapping[str, frozenset[str]] = {
     }.items()
 }  # fmt: skip
 _DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
-# Of the surface: of one colour that stands alone; of each of several, and of a part's.
+# Minimum share of the surface: for a colour named alone, and for one of several or of a part.
 _ALONE, _AMONG = 0.1, 0.03
 
 
 def colour_shares(instance: Instance, materials: Mapping[str, Material]) -> dict[str, float]:
-    """Sum the surface of an instance by what a person may call its colours."""
+    """Return the share of an instance's surface by colour name."""
     shares: dict[str, float] = {}
     whole = 0.0
     if any(materials[part.material].atlas for part in instance.parts):
-        # A foreign texture's place counts, and not the whole of it, which may be a city's.
+        # Only the part of an atlas texture that the instance shows counts, not the whole image.
         return _pixel_shares(*shown_colours(instance.parts, materials))
     for part in instance.parts:
         area = float(areas(part.vertices, part.faces).sum())
@@ -65,7 +65,7 @@ def _pixel_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> d
 
 
 def _material_shares(material: Material) -> dict[str, float]:
-    """Share of a material by colour: stripes are two colours, and not their mean alone."""
+    """Return a material's share by colour name: stripes count as two colours, not as their mean."""
     pixels = np.array([material.colour])
     if material.texture is not None:
         step = max(1, material.texture.shape[0] // 16)
@@ -82,18 +82,18 @@ def _colour_names(rgb: NDArray[np.integer]) -> set[str]:
     names = {colour_name(rgb)}
     middle = (float(rgb.max()) + float(rgb.min())) / 2.0
     if names == {"grey"} and float(np.ptp(rgb)) >= 0.2 * middle:
-        # A dark green is a grey to a formula and a green to whoever looks.
+        # Dark saturated colours are classified as grey, but people see the hue.
         names.add(colour_name(np.clip(middle + 3.0 * (rgb - middle), 0, 255)))
     return names
 
 
 def colour_words(text: str) -> list[str]:
-    """List the words of a text that are colours, in its order."""
+    """List the colour words of a text, in order."""
     return [word for word in re.findall(r"[a-z]+", text.lower()) if word in SHADES]
 
 
 def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> list[str]:
-    """List the colours of a text that an instance's surface does not bear out."""
+    """List the colours of a text that the instance's surface does not have."""
     words = colour_words(text)
     shares = colour_shares(instance, materials)
     alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in _DEGREES] == words[:1]
@@ -102,7 +102,7 @@ def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, M
 
 
 Looks = Mapping[str, tuple[Look, ...]]
-# Attributes that name no part: a phrase that holds the colour's word speaks of that part.
+# Attributes that do not name a part.
 _NOT_PARTS = frozenset({"colour", "size", "material", "place"})
 _STEM = 4
 _STOP_WORDS = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
@@ -111,7 +111,7 @@ _STOP_WORDS = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and",
 def false_phrases(
     text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material], surface: Surface | None = None
 ) -> Iterator[str]:
-    """Say which of the catalogue's phrases stand in a text and are not so of its instance, or not to be seen."""
+    """Yield the catalogue's phrases in a text that are false for its instance, or about hidden parts."""
     normalized = _normalize(text)
     for look in looks.get(instance.category, ()):
         if f" {_normalize(look.say).strip()} " in normalized:
@@ -123,7 +123,7 @@ def false_phrases(
 
 
 def false_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
-    """Say which of its colours a text says of an instance whose surface does not have it."""
+    """Yield the colours of an instance's attribute in a text that its surface does not have."""
     value = instance.attributes.get("colour", "")
     if value and f" {_normalize(value).strip()} " in _normalize(text):
         for word in unsupported_colours(value, instance, materials):
@@ -131,7 +131,7 @@ def false_colours(text: str, instance: Instance, materials: Mapping[str, Materia
 
 
 def repeats(say: str, instance: Instance) -> bool:
-    """Whether a phrase says again what an attribute of its instance says."""
+    """Whether a phrase repeats an attribute of its instance."""
     stems = _stems(say)
     for key, value in instance.attributes.items():
         own = _stems(value)

@@ -1,4 +1,4 @@
-"""Every check that an annotation file must pass, each fault by JSON path and line."""
+"""All checks of an annotation file; faults are reported by JSON path and line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Scene
 
-# What a mesh or a map says and a person does not: node names, decimals, number pairs, measured lengths.
+# Not allowed in names and descriptions: node names, decimals, number pairs, measured lengths.
 _UNSPOKEN = re.compile(
     r"[A-Za-z0-9]+_[A-Za-z0-9_]+|\d+\.\d+|-?\d+\s*,\s*-?\d+|\b\d+\s*(?:m|metres?|meters?|cm|km)\b|\b[xyz]\s*=",
     re.IGNORECASE,
@@ -36,7 +36,7 @@ def check_source(
     geometry: SceneGeometry | None = None,
     looks: Looks | None = None,
 ) -> list[Fault]:
-    """Check an annotation file against its scene and return every fault, in the order of the file's lines."""
+    """Check an annotation file against its scene and return all faults, in line order."""
     faults = list(source.faults)
     if source.document.value is not None:
         if source.scene and source.scene != scene.name:
@@ -109,7 +109,7 @@ def _object(
 def _nouns(
     source: Source, scene: Scene, noun_checker: NounChecker, path: tuple[str | int, ...], entry: Object
 ) -> Iterable[Fault]:
-    """What the object is called, where the mesh is no guess at it: an imported one's names are."""
+    """Check the nouns of name and description; not for imported scenes, whose categories are guesses."""
     if scene.imported or entry.node not in scene:
         return
     for key in ("name", "description"):
@@ -169,7 +169,7 @@ def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], n
 
 
 def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry) -> Iterable[Fault]:
-    """Directions, and descriptions held against the mesh; only where all landmarks are right."""
+    """Check directions and descriptions against the mesh; only if all landmarks are valid."""
     nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
     raw = source.document.value.get("landmarks") if isinstance(source.document.value, dict) else None
     if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
@@ -228,7 +228,7 @@ def make_ambiguity(
     order: Sequence[str],
     geometry: SceneGeometry | None = None,
 ) -> Ambiguity:
-    """Make the check of ambiguity of a scene."""
+    """Make the ambiguity check of a scene."""
     geometry = geometry or SceneGeometry(scene)
     bound = None if scene.imported else places_of(scene.name)
     places = None if bound is None else Places(geometry, bound)

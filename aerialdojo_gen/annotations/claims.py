@@ -1,10 +1,9 @@
-"""What a description asserts, read out of its English by a small grammar.
+"""Parse the claims of an English description by a small grammar.
 
-The reader knows three kinds of phrase: *things* (the names of the scene's categories and landmarks), *values* (of
-the instances' attributes: red, open, in the car park) and *relations* (beside, under, north of, between ... and).
-Values before a thing, or with no thing after them in the clause, belong to it or to the subject; a relation and the
-things after it make a claim. Whatever it does not know it passes over: a claim that is missed makes a description
-say less, so that the check of ambiguity is stricter for it, never laxer.
+It knows three kinds of phrase: *things* (names of the scene's categories and landmarks), *values* (of the instances'
+attributes: red, open, in the car park) and *relations* (beside, under, north of, between ... and). Values before a
+thing, or with no thing after them in the clause, belong to it or to the subject; a relation and the things after it
+make a claim. Unknown words are skipped: a missed claim makes the ambiguity check stricter, never laxer.
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 DISTRACTOR_SLACK = 1.35
-GROUP = "group"  # what makes one thing of a plural: no value
-PLACE = "place"  # the attribute by which a layout says where a thing is
+GROUP = "group"  # the determiner of a plural name ("a row of"): not a value
+PLACE = "place"  # the attribute with the phrase of place from the layout
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
-# A corner of the compass is one word, as the tables spell it; people write it in two.
+# Compass corners are one word in the tables; people write two.
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _STOPS = frozenset(".;:!?")
 _VERBS = frozenset(
@@ -85,7 +84,7 @@ class Claim:
 
     relation: str
     things: tuple[frozenset[int], ...]
-    text: str  # The words, for messages
+    text: str  # The matched words, for messages
 
     def holds(self, geometry: SceneGeometry, i: int, slack: float = 1.0) -> bool:
         """Whether the claim is true of instance `i`; see `relations` for `slack`."""
@@ -110,13 +109,13 @@ _TESTS: Mapping[str, Callable[[SceneGeometry, int, int, float], bool]] = {
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read out of a text."""
+    """The result of parsing a text."""
 
-    values: tuple[str, ...]  # Attribute values said of the subject, anywhere
-    named: tuple[str, ...]  # Those that stand directly before the subject's own name: what it is called
+    values: tuple[str, ...]  # Attribute values asserted of the subject, anywhere
+    named: tuple[str, ...]  # Those directly before the subject's own name
     claims: tuple[Claim, ...]  # Relations asserted of the subject
-    subjects: tuple[str, ...] = ()  # Names of things that stand in no relation: what the text calls the subject
-    places: tuple[str, ...] = ()  # Phrases of place, in lower case, bound to conditions or not
+    subjects: tuple[str, ...] = ()  # Names of things outside any relation: what the text calls the subject
+    places: tuple[str, ...] = ()  # Phrases of place, lower case, bound to conditions or not
 
 
 @dataclass
@@ -133,13 +132,13 @@ class _State:
     places: list[str] = field(default_factory=list)
 
     def end_clause(self) -> None:
-        # After "beside a bench with ..." values are the bench's: said of the subject they would be guesswork.
+        # After "beside a bench with ..." the values belong to the bench, not to the subject.
         self.values += [] if self.relation else self.pending
         self.pending, self.relation, self.words, self.first = [], "", [], None
 
 
 class Lexicon:
-    """The phrases that descriptions of a scene can be made of."""
+    """The phrases that descriptions of a scene are parsed with."""
 
     def __init__(
         self,
@@ -180,11 +179,7 @@ class Lexicon:
         self._general: frozenset[str] = frozenset()
 
     def add_values(self, key: str, words: Iterable[str]) -> None:
-        """Know words as values of an attribute though no instance has them.
-
-        Such a word is denied of an instance whose attribute says something else, unless it is a part of what it
-        says: a dark green van is green.
-        """
+        """Add words as values of an attribute; they match any word of a value ("green" in "dark green")."""
         new = {word for word in words if (word,) not in self._phrases}
         for word in new:
             self._add(word, "value", word)
@@ -193,7 +188,7 @@ class Lexicon:
         self._longest = max(self._longest, 1)
 
     def members(self, name: str) -> frozenset[int]:
-        """Instances that answer to the name of a thing."""
+        """Return the instances with a name."""
         return self._things.get(name, frozenset())
 
     def _add(self, phrase: str, kind: str, meaning: str) -> None:
@@ -202,7 +197,7 @@ class Lexicon:
             self._phrases[tokens] = (kind, meaning)
 
     def read(self, text: str, subject: int) -> Reading:
-        """Read a description or a name."""
+        """Parse a description or a name."""
         tokens = _tokens(text)
         state, at = _State(), 0
         while at < len(tokens):
@@ -260,11 +255,11 @@ class Lexicon:
         state.pending = []
 
     def fits(self, i: int, values: Iterable[str]) -> bool:
-        """Whether values can be said of an instance; one of a kind that it does not have is passed over."""
+        """Whether an instance can have these values; values of attributes that it lacks are ignored."""
         return not any(self.denied(i, value) for value in values)
 
     def denied(self, i: int, value: str) -> bool:
-        """Whether an instance has attributes of that value's kind, and none of them is that value."""
+        """Whether an instance has attributes of this value's kind, but not this value."""
         attributes = self._attributes[i]
         own = [attributes[key].lower() for key in self._keys_of.get(value, ()) if key in attributes]
         if value in self._general:
@@ -277,12 +272,12 @@ class Lexicon:
 
 
 def spoken(category: str) -> str:
-    """Say a category in words: ``delivery_van`` is a delivery van."""
+    """Return a category as words: ``delivery_van`` is a delivery van."""
     return category.replace("_", " ")
 
 
 def plural(name: str) -> str:
-    """Make the plural of a name, by the regular rules."""
+    """Return the regular plural of a name."""
     if name.endswith(("s", "x", "ch", "sh")):
         return name + "es"
     if name.endswith("y") and name[-2:-1] not in "aeiou":

@@ -8,8 +8,8 @@ import numpy as np
 
 from aerialdojo_gen.annotations.phrases import Noun, Words
 
-# With a look; those with "with {look}" are not for nouns that end in "with ..." already.
-# The first sentence always says what and where: somebody may read no farther.
+# Templates with a look; those with "with {look}" are not for nouns that end in "with ...".
+# The first sentence must identify the object by itself.
 FULL = (
     "{A} with {look}, {ing} {rel}.",
     "{A} {ing} {rel}. It has {look}.",
@@ -29,7 +29,7 @@ FULL = (
     "{A} {verb} {rel}. You will notice {look}.",
     "Go to the {bare} {rel}, the one with {look}.",
 )
-# For what no look is true of.
+# For objects without a true look.
 PLAIN = (
     "{A} {ing} {rel}.",
     "This {bare} {verb} {rel}.",
@@ -39,7 +39,7 @@ PLAIN = (
     "The {bare} {verb} {rel}.",
     "It is {a}, {ing} {rel}.",
 )
-# For what is worth saying besides.
+# For an additional fact.
 MORE = ("It is also {rel}.",)
 RELATIONS = {
     "beside": ("beside {}", "next to {}", "right beside {}", "right next to {}"),
@@ -63,7 +63,7 @@ def compose(
     rng: np.random.Generator,
     used: dict[str, int],
 ) -> tuple[str, str]:
-    """Compose a description of one to three sentences; returns it and the template that it was made from."""
+    """Compose a description of one to three sentences; returns it and its template."""
     if place and needed and place.split()[0] == needed[0].split()[0] == "beside":
         needed = [needed[0].replace("beside", "next to", 1), *needed[1:]]
     look = _least_used(words.looks, rng, used) if words.looks else ""

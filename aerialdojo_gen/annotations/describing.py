@@ -1,4 +1,4 @@
-"""Describes things of a scene one by one, in words that are so of the mesh and of nothing else."""
+"""Write descriptions that are true of an instance's mesh and unambiguous in its scene."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from aerialdojo_gen.scenes.claims import true_looks
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 STAGE = "annotate-draft"
-# What an imported mesh has and nobody looks for.
+# Categories of imported meshes that are never objects.
 NON_OBJECTS = frozenset({"ground", "clutter", "slab", "terrain"})
-# The category of what is imported without a name: a person has to say what it is.
+# Category of imported nodes without a meaningful name; a person has to set it.
 UNKNOWN = "object"
 _MAX_FACTS = 4
 _TRIES = 18
@@ -33,7 +33,7 @@ _MIN_EXTRA_WEIGHT = 0.35
 
 
 class Vocabulary:
-    """Words and nouns of a scene's instances."""
+    """Words and noun phrases of a scene's instances."""
 
     def __init__(self, scene: Scene, catalogue: Catalogue) -> None:
         self.scene = scene
@@ -45,7 +45,7 @@ class Vocabulary:
         by_category: dict[str, Words] = {}
         for i in scene.instances:
             if scene.imported and i.category not in NON_OBJECTS:
-                # A mesh of another make has categories of its own, and all of them may be asked for.
+                # Imported meshes have categories of their own, all of which may be targets.
                 self.names.setdefault(i.category, spoken(i.category))
                 targets |= {i.category}
             if i.category not in by_category:
@@ -61,14 +61,14 @@ class Vocabulary:
         self.noun_checker = NounChecker(self.names)
 
     def _drop_false_colour(self, instance: Instance) -> Instance:
-        """Leave out a colour that the surface does not bear out."""
+        """Remove a colour attribute that the surface does not support."""
         colour = instance.attributes.get("colour", "")
         if not colour or self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials):
             return instance
         return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
 
     def looks(self, instance: Instance) -> tuple[str, ...]:
-        """Phrases that are so of an instance, can be seen, and say more than its attributes do."""
+        """Phrases that are true of an instance, visible, and not repeated by its attributes."""
         looks = self._looks.get(instance.category, ())
         true = true_looks(looks, instance, self.scene.materials)
         visible = tuple(look.say for look in true if self._surface.shows(look, instance))
@@ -76,7 +76,7 @@ class Vocabulary:
         return new if len(new) >= LEAST_TRUE else visible
 
     def faults(self, instance: Instance, text: str) -> list[str]:
-        """What a text says of an instance's looks that is not so."""
+        """Return the false statements of a text about an instance's appearance."""
         if self.scene.imported:
             return []
         return [
@@ -87,7 +87,7 @@ class Vocabulary:
 
 
 class DescriptionWriter:
-    """Describes instances of one scene."""
+    """Writes descriptions of the instances of one scene."""
 
     def __init__(self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], seed: int) -> None:
         self._vocabulary, self._scene, self._seed = vocabulary, vocabulary.scene, seed
@@ -100,13 +100,13 @@ class DescriptionWriter:
         self._used: dict[str, int] = {}
 
     def is_true_name(self, i: int, name: str) -> bool:
-        """Whether a name says nothing that is not so of instance `i`."""
+        """Whether a name says nothing false of instance `i`."""
         return not self._vocabulary.faults(self._scene.instances[i], name) and not self.ambiguity.false_claims(
             i, name
         )
 
     def describe(self, i: int, others: Collection[str], name: str = "") -> str | None:
-        """Describe an instance."""
+        """Describe an instance; None if no true and unambiguous text is found."""
         instance, noun = self._scene.instances[i], self._vocabulary.nouns[i]
         words = replace(self._vocabulary.words[i], looks=self._vocabulary.looks(instance))
         rng = generator(self._seed, STAGE, self._scene.name, instance.node)
@@ -118,7 +118,7 @@ class DescriptionWriter:
             needed, extra = self._choose(i, f"It is {noun.a()} {place}.", usable, talkative)
             if not needed and not (place and attempt >= _TRIES // 3):
                 continue
-            plain = attempt % 6 >= 4  # a look may hold a word that reads as a claim
+            plain = attempt % 6 >= 4  # a look may contain words that parse as a claim
             phrasing = replace(words, looks=()) if plain else words
             text, template = compose(
                 phrasing, noun, place, [f.text for f in needed], [f.text for f in extra], rng, self._used
@@ -131,7 +131,7 @@ class DescriptionWriter:
         return self._describe_alone(i, name, others) if self._scene.imported else None
 
     def _describe_alone(self, i: int, name: str, others: Collection[str]) -> str | None:
-        """Describe what nothing can be said of but what it is, where that tells it from all of its kind."""
+        """Describe an instance by its noun alone, where that is unambiguous."""
         noun, words = self._vocabulary.nouns[i], self._vocabulary.words[i]
         alone = not any(self._scene.instances[j].category not in NON_OBJECTS for j in self._finder.near(i))
         texts = [f"Look for {noun.a()}, {words.participle} by itself."] if alone else []
@@ -149,7 +149,7 @@ class DescriptionWriter:
         )
 
     def _place(self, i: int) -> str:
-        """Where its layout says that it is, if that can be checked and is so."""
+        """Return the phrase of place from the layout, if its conditions are known and hold."""
         place, places = place_of(self._scene.instances[i]), self.ambiguity.lexicon.places
         if not place or places is None:
             return place
@@ -157,12 +157,12 @@ class DescriptionWriter:
         return place if bound else ""
 
     def _mentions(self, fact: Fact, place: str) -> bool:
-        """Whether the place speaks of the same thing already."""
+        """Whether the phrase of place already mentions the fact's things."""
         spoken_of = set(place.replace("'s", "").split())
         return any(self._vocabulary.nouns[j].name.split()[-1] in spoken_of for j in fact.things)
 
     def _choose(self, i: int, base: str, facts: list[Fact], talkative: bool) -> tuple[list[Fact], list[Fact]]:
-        """Take the most natural fact, then what rules out most of the rivals, then one more that is worth saying."""
+        """Choose the most natural fact, then those that exclude most distractors, then one optional extra."""
         needed: list[Fact] = []
         extra: list[Fact] = []
         distractors = set(self.ambiguity.distractors(i, base))

@@ -32,15 +32,15 @@ _NO_DIRECTION = "at a landmark's position, or outside the bounds"
 
 @dataclass(frozen=True)
 class DraftOptions:
-    """Which instances may become objects, and how many of a kind."""
+    """Which instances may become objects, and how many per category."""
 
     reject: Callable[[str], str] | None = None
     centre_m: tuple[float, float] | None = None
-    core_radius_m: float | None = None  # Radius of the core; None for the whole scene. How long tasks are hangs on it
-    core_share: float = 1.0  # Share of the objects that come from the core; the others may stand anywhere
+    core_radius_m: float | None = None  # Radius of the core area, which limits the length of tasks; None: whole scene
+    core_share: float = 1.0  # Share of the objects from the core area
     elevated_share: float = 0.0
-    max_vegetation: int = 3  # Most objects of one category of vegetation
-    max_per_category: int | None = None  # Most objects of any other category; 5 where absent
+    max_vegetation: int = 3  # Maximum objects per vegetation category
+    max_per_category: int | None = None  # Maximum objects per other category; default 5
 
 
 def draft_annotations(
@@ -85,17 +85,17 @@ class AnnotationDrafter:
         self.rejections.update({_NO_DIRECTION: len(candidates) - len(self.things), SCENERY: scenery})
 
     def capacity(self) -> int:
-        """How many objects there can be at the most, by the numbers of each kind, before anything is looked at."""
+        """Upper bound on the number of objects, by the limits per category."""
         kinds = Counter(self._scene.instances[k].category for k in self.things)
         return sum(min(n, self._limit(kind)) for kind, n in kinds.items())
 
     def rejection_summary(self) -> str:
-        """Say what was not taken, and why: ``"; not taken: 7 ..., 2 ..."``; empty where all were."""
+        """Return why instances were rejected: ``"; not taken: 7 ..., 2 ..."``; empty if none were."""
         text = ", ".join(f"{n:,} {why}{self._confusion_text(why)}" for why, n in self.rejections.most_common() if n)
         return f"; not taken: {text}" if text else ""
 
     def _confusion_text(self, why: str) -> str:
-        """Say with what the first of what could not be told apart were confused."""
+        """Return what the first indistinguishable instances were confused with."""
         if why != _INDISTINGUISHABLE:
             return ""
         pairs = [(node, others) for node, others in self.confusions if others][:_SHOWN]
@@ -106,7 +106,7 @@ class AnnotationDrafter:
         return f" ({text})" if text else ""
 
     def objects(self, n: int, on_chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
-        """Choose and describe up to `n` objects, a category at a time in turn; `on_chosen` is called once each."""
+        """Choose and describe up to `n` objects, round-robin over categories; calls `on_chosen` for each."""
         ambiguity = self._writer.ambiguity
         taken: dict[int, str] = {}
         everywhere = self._queues()
@@ -125,7 +125,7 @@ class AnnotationDrafter:
         for queues, upto in phases:
             while len(taken) < upto:
                 before = len(taken)
-                # What the core has none of comes first.
+                # Categories that the core lacks come first.
                 for category, queue in sorted(queues.items(), key=lambda item: self._count(item[0], taken) > 0):
                     open_slot = len(taken) < upto and not self._is_full(category, taken)
                     if open_slot and self._take_next(queue, taken):
@@ -154,7 +154,7 @@ class AnnotationDrafter:
         return self._count(category, taken) >= self._limit(category)
 
     def _queues(self) -> dict[str, list[int]]:
-        """What may become an object, by category; categories in a random but fixed order."""
+        """Candidates by category; categories in a random but fixed order."""
         queues: dict[str, list[int]] = {}
         for i in self.things:
             queues.setdefault(self._scene.instances[i].category, []).append(i)
@@ -179,10 +179,7 @@ class AnnotationDrafter:
         return float(np.hypot(*away)) <= self._options.core_radius_m
 
     def _take_next(self, queue: list[int], taken: dict[int, str]) -> bool:
-        """Move one instance from its category's queue to the objects; those that will not do are dropped.
-
-        Tells whether there was one.
-        """
+        """Move one instance from a category's queue to the objects, dropping invalid ones; False if none is left."""
         instances = self._scene.instances
         while queue:
             alike = [instances[j] for j in taken if instances[j].category == instances[queue[0]].category]
@@ -222,7 +219,7 @@ class AnnotationDrafter:
 
 
 def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
-    """Describe the objects of annotations anew; which they are, their ids and their names stay."""
+    """Redraft the descriptions of existing objects; their ids, nodes and valid names stay."""
     for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
         if node not in scene:
             raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file again")
@@ -233,7 +230,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
     for entry in annotations.objects:
         i = index[entry.node]
         own, kind = vocabulary.nouns[i].short, scene[entry.node].category
-        # A layout that has changed may have put the yellow one where the green one was.
+        # A changed layout may have swapped instances: a name that fits another one is replaced.
         others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
         valid = entry.name not in others - {own} and writer.is_true_name(i, entry.name)
         name = entry.name if valid else own

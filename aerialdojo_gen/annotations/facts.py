@@ -1,4 +1,4 @@
-"""What can truly be said of where an instance stands: the material that drafts choose from."""
+"""Find true spatial relations of an instance, for drafts to choose from."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.compose import RELATIONS
 from aerialdojo_gen.annotations.phrases import Noun, Words
 from aerialdojo_gen.geometry.frames import compass_direction
 
-# Well within what the check takes for true, so that a drafted text stays true when the scene is touched up.
+# Stricter than the check, so that drafted texts stay true after small changes of the scene.
 _TIGHT = 0.9
 _REACH_M = 9.0
 _MAX_THINGS = 10
@@ -22,16 +22,16 @@ _MIN_SIZE_M = 0.3
 
 @dataclass(frozen=True)
 class Fact:
-    """A relation of an instance to others, in words."""
+    """A spatial relation of an instance to others, in words."""
 
     text: str  # ``"beside a red mailbox"``
-    claims: tuple[Claim, ...]  # The same as the check reads it
-    weight: float  # How natural it is to say; higher first
-    things: frozenset[int]  # Indices of what it speaks of
+    claims: tuple[Claim, ...]  # As parsed by the check
+    weight: float  # How natural the phrase is; higher first
+    things: frozenset[int]  # Indices of the instances that it mentions
 
 
 class FactFinder:
-    """Finds facts about the instances of one scene."""
+    """Finds spatial relations of the instances of one scene."""
 
     def __init__(
         self, ambiguity: Ambiguity, words: list[Words], nouns: list[Noun], landmarks: dict[int, str]
@@ -64,7 +64,7 @@ class FactFinder:
         return [fact for _, _, fact in sorted(keyed, key=lambda item: item[:2])]
 
     def near(self, i: int) -> list[int]:
-        """List the instances within the reach of facts about instance `i`, by index."""
+        """List the instances within reach of instance `i`."""
         return self._geometry.neighbours(i, _REACH_M)
 
     def _may_refer(self, i: int, j: int) -> bool:
@@ -86,7 +86,7 @@ class FactFinder:
         touching = geometry.support(i) == j or j in geometry.covers(i)
         imported = geometry.scene.imported
         if imported and not touching and geometry.gap_m(i, j) == 0.0:
-            return []  # one goes through the other, or is a part of it: nobody says where that stands by it
+            return []  # one intersects the other or is a part of it: no relation applies
         if geometry.support(i) == j and (not imported or geometry.rests_on(i, j)):
             found += self._verified(i, self._phrase("on", rng).format(thing), 3.0 * weight, (j,))
         if j in geometry.covers(i) and not (imported and geometry.support(j) == i):
@@ -104,7 +104,7 @@ class FactFinder:
         return found
 
     def _verified(self, i: int, text: str, weight: float, things: tuple[int, ...]) -> list[Fact]:
-        # The check must read the words as they were meant: names may hold words that mean something else to it.
+        # Names may contain words that parse differently: keep only facts that parse as intended.
         reading = self._ambiguity.lexicon.read(f"it stands {text}", i)
         claims = reading.claims
         meant = len(claims) == 1 and all(j in members for j, members in zip(things, claims[0].things, strict=False))

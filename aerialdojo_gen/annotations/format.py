@@ -63,13 +63,13 @@ class Annotations:
 
 @dataclass(frozen=True)
 class Source:
-    """An annotation file as far as it could be read."""
+    """The readable part of an annotation file."""
 
     document: Document  # The JSON with the line of every value
-    scene: str  # What the file says, empty where it says nothing of the kind
+    scene: str  # Empty if missing
     landmarks: dict[int, Landmark]  # The well-formed entries by their index in the file
     objects: dict[int, Object]
-    faults: tuple[Fault, ...]  # What is wrong with the form; an entry at fault is in neither dict
+    faults: tuple[Fault, ...]  # Faults of form; faulty entries are in neither dict
 
     @property
     def annotations(self) -> Annotations:
@@ -120,7 +120,7 @@ def format_annotations(annotations: Annotations) -> str:
 
 
 def write_annotations(annotations: Annotations, path: Path) -> None:
-    """Write an annotation file, replacing one that is there only when the whole text is on disk."""
+    """Write an annotation file atomically."""
     with atomic_file(path.parent, path.name) as temporary:
         temporary.write_text(format_annotations(annotations), encoding="utf-8")
 

@@ -25,7 +25,7 @@ class GroundMaterials:
         self._trees: dict[str, tuple[shapely.STRtree, np.ndarray]] = {}
 
     def within(self, i: int, pattern: str, most_m: float) -> bool:
-        """Whether ground of a material comes within `most_m` metres of an instance's outline."""
+        """Whether ground of a material is within `most_m` metres of an instance's outline."""
         tree, heights = self._tree(pattern)
         hits = tree.query(self._geometry.outline(i), predicate="dwithin", distance=most_m)
         low = float(self._geometry.boxes[i, 0, 2])
@@ -55,7 +55,7 @@ _MOST_HIDDEN = 0.5
 
 
 class Surface:
-    """The upper side of a scene's ground and water."""
+    """The upper surface of a scene's ground and water."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -75,15 +75,12 @@ class Surface:
         return shapely.STRtree(shapes[solid]), corners[solid]
 
     def hidden(self, instance: Instance, faces: NDArray[np.int64]) -> float:
-        """Share, 0 to 1, of the area of `faces`, (k,) indices into the instance's faces.
-
-        That lies under the surface.
-        """
+        """Share, 0 to 1, of the area of `faces` (indices into the instance's faces) that lies below the surface."""
         under, areas = self._under(instance)
         return float(areas[faces][under[faces]].sum() / max(areas[faces].sum(), 1e-12))
 
     def _under(self, instance: Instance) -> tuple[NDArray[np.bool_], Floats]:
-        """Which of all faces' middles lie under the surface, and the faces' areas."""
+        """Return which face centres lie below the surface, and the faces' areas."""
         if self._last is None or self._last[0] is not instance:
             corners = instance.vertices[instance.faces]
             a, b, c = np.moveaxis(corners, 1, 0)
@@ -98,7 +95,7 @@ class Surface:
         return self._last[1:]
 
     def shows(self, look: Look, instance: Instance) -> bool:
-        """Whether what a phrase speaks of can be seen: half of each part, and of each copy where it counts them."""
+        """Whether at least half of each part that a phrase mentions, and of each counted copy, is visible."""
         pieces = [faces for name in look.count for faces in instance.copies_of(name)]
         pieces += [faces for name in look.parts if len(faces := instance.faces_of(name))]
         return all(self.hidden(instance, faces) <= _MOST_HIDDEN for faces in pieces)

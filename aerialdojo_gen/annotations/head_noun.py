@@ -1,7 +1,7 @@
-"""What a text calls its object, held against what the mesh says that it is: the head of its first noun phrase.
+"""Check the head of a text's first noun phrase against the category and colours of its mesh.
 
-`claims` reads values that stand before the object's own name; a "red sedan" that is a teal storefront names another
-thing, and says nothing that it would read. Of words that it does not know this says nothing either.
+`claims` reads only values before the object's own name: it finds nothing wrong with "a red sedan" for a teal
+storefront. Unknown words are ignored.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.claims import plural, spoken
 from aerialdojo_gen.scenes.model import Instance
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
-# What ends the noun phrase that a text begins with; "-ing" does unless the catalogue has it, like a building.
+# Tokens that end the first noun phrase; words in "-ing" too, unless the catalogue has them, like a building.
 _END = re.compile(
     r"[,.;:!?()]|with|of|in|on|at|by|near|next|beside|behind|under|above|over|from|to|and|or|for|between|without|along|"
     r"against|is|are|stands|lies|sits|has|have|that|which|who|where|.*ing"
@@ -21,7 +21,7 @@ _END = re.compile(
 _COLOUR = re.compile(
     r"white|black|grey|red|orange|yellow|green|turquoise|blue|purple|pink|brown|beige|teal|cream|silver|gold"
 )
-# Colours that one person calls this and another one that.
+# Colours that people confuse.
 _NEAR = {
     "teal": {"turquoise", "green", "blue"},
     "turquoise": {"teal", "green", "blue"},
@@ -39,7 +39,7 @@ _SPELT = {"gray": "grey", "golden": "gold", "silvery": "silver", "aqua": "turquo
 
 
 class NounChecker:
-    """The things and colours that a name can speak of."""
+    """Checks the head noun and colours of a text against the mesh."""
 
     def __init__(self, names: Mapping[str, str]) -> None:
         self._categories: dict[tuple[str, ...], set[str]] = {}
@@ -51,10 +51,10 @@ class NounChecker:
         self._longest = max(map(len, self._categories), default=0)
 
     def contradictions(self, text: str, instance: Instance) -> Iterator[str]:
-        """Say what a name or a description calls an instance that the mesh says it is not."""
+        """Yield where a name or description contradicts the mesh."""
         thing, colours = self._head(text)
         if thing and instance.category not in self._categories[thing]:
-            # A stone wall may be the catalogue's garden wall: words in common are no contradiction.
+            # Words in common with the own category ("stone wall", "garden wall") are no contradiction.
             own = self._own.get(instance.category, set(_words(spoken(instance.category))))
             if not own & set(thing):
                 called = " ".join(thing)
@@ -67,7 +67,7 @@ class NounChecker:
                 yield f"it is called {colour!r}, and the mesh is not"
 
     def _head(self, text: str) -> tuple[tuple[str, ...], list[str]]:
-        """The last thing that the first noun phrase names, and the colours before it."""
+        """Return the last known thing of the first noun phrase, and the colours before it."""
         tokens, at = _words(text), 0
         thing: tuple[str, ...] = ()
         colours: list[str] = []

@@ -1,4 +1,4 @@
-"""Landmarks for drafts: far apart, easy to see, and each with a name that nothing else in the scene answers to."""
+"""Choose landmarks for drafts: far apart, prominent, each with a unique name."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 
-# By so much the tallest must be taller than the next, and the northernmost farther north, to be called so.
+# Margins by which the tallest is called tallest, and the northernmost northernmost.
 _TALLER = 1.1
 _FARTHER_M = 1.0
 _LARGE_M = 3.0
@@ -21,7 +21,7 @@ _SIDES = (("northernmost", 1, 1.0), ("southernmost", 1, -1.0), ("easternmost", 0
 def choose_landmarks(
     vocabulary: Vocabulary, n: int, requested: Sequence[str] = (), at_most: bool = False
 ) -> tuple[Landmark, ...]:
-    """Choose landmarks: the wanted, then the tallest, then whatever is farthest from the chosen."""
+    """Choose landmarks: the requested ones, then the tallest, then whichever is farthest from those chosen."""
     scene = vocabulary.scene
     missing = [node for node in requested if node not in scene]
     if missing:
@@ -40,12 +40,12 @@ def choose_landmarks(
         prominent = [i for i in _prominent(vocabulary) if i not in chosen]
         rest = [i for i in prominent[: 8 * n] if names.of(i)]
         if len(chosen) + len(rest) < n:
-            # Where little is known by name, what is farthest to a side has one, however low it is.
+            # Few names: the extreme one in each direction has a unique name, however low it is.
             rest = [i for i in prominent if names.of(i)][:n]
     else:
         rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
         if len(chosen) + len(rest) < n and at_most:
-            # A town of a map has no landmark of the catalogue as often as not: its tallest buildings will do.
+            # Mapped towns often have no landmark of the catalogue: use the tallest buildings.
             named = _UniqueNames(vocabulary)
             large = [i for i in _prominent(vocabulary) if _is_large(i)][: 8 * n]
             own = {i.node: named.of(i) for i in large if i not in (*chosen, *rest) and named.of(i)}
@@ -55,7 +55,7 @@ def choose_landmarks(
         chosen.append(best)
         rest.remove(best)
         if at_most and not scene.imported:
-            # Of statues that look alike one will do: a landmark has its name to itself.
+            # A landmark's name must be unique: keep only one of identical statues.
             rest = [i for i in rest if nouns[i.node].short != nouns[best.node].short]
     if len(chosen) < n and not (at_most and chosen):
         raise AnnotationError(
@@ -70,24 +70,24 @@ def choose_landmarks(
 
 
 def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
-    """Distance in the plane to the nearest of the chosen, metres; a kilometre where there is none."""
+    """Distance in the plane to the nearest chosen instance, metres; 1000 if none is chosen."""
     gaps = [float(np.hypot(*(instance.centroid[:2] - other.centroid[:2]))) for other in chosen]
     return min(gaps, default=1000.0)
 
 
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
-    """The things of a mesh of another make, the highest first."""
+    """The things of an imported mesh, highest first."""
     things = [i for i in vocabulary.scene.instances if i.category not in NON_OBJECTS]
     return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
 
 
 def _is_large(instance: Instance) -> bool:
-    """Whether a thing is large: what stands on a tall roof is high, and no landmark."""
+    """Whether an instance itself is large, not only high up on a roof."""
     return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
 
 
 def _catalogue_names(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
-    """Name landmarks as the catalogue does; what it has no landmark's name for, by what it has of its own."""
+    """Name landmarks as the catalogue does, or by `own` where it has no name."""
     noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
     plain = [noun[i.node].name for i in chosen]
     return [own.get(i.node) or (noun[i.node].short if plain.count(p) > 1 else p)
@@ -95,7 +95,7 @@ def _catalogue_names(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Ma
 
 
 class _UniqueNames:
-    """Names that are so of one thing of a scene alone, by what a mesh of another make tells."""
+    """Unique names for the things of an imported mesh."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self._nouns = dict(zip((i.node for i in vocabulary.scene.instances), vocabulary.nouns, strict=True))
@@ -104,10 +104,10 @@ class _UniqueNames:
             self._alike.setdefault(noun.name, []).append(instance)
 
     def of(self, instance: Instance) -> str:
-        """Name a thing; empty where nothing tells it from others of its name."""
+        """Return a unique name; empty if there is none."""
         noun = self._nouns[instance.node]
         others = [other for other in self._alike[noun.name] if other is not instance]
-        # An office building is a building, too.
+        # An office building is also a building.
         kinds = (name for name in self._alike if name.endswith(f" {noun.name}"))
         others += [other for name in kinds for other in self._alike[name]]
         if not others:

@@ -1,4 +1,4 @@
-"""Noun phrases of instances, how each category is spoken of (`phrases/*.toml`), and grammatical number."""
+"""Noun phrases of instances: words by category (`phrases/*.toml`), adjectives, grammatical number."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.model import Instance
 
-# Of one thing, though they end like plurals.
+# Singular words that end like plurals.
 _SINGULAR = frozenset({"lens", "series", "species", "chaos", "cosmos", "news", "premises", "headquarters", "gallows"})
 _SINGULAR_ENDS = ("ss", "us", "is", "as")
 _PLURAL = frozenset({"people", "men", "women", "children", "cattle", "geese", "oxen", "sheep"})
@@ -26,7 +26,7 @@ _GROUPS = {word: group for group, words in _STUFF.items() for word in words}
 
 
 def group_of(name: str) -> str:
-    """Say what makes one thing of a name."""
+    """Return the determiner for a plural or mass noun ("a group of"); empty for a singular."""
     word = name.lower().split()[-1] if name.split() else ""
     if word in _GROUPS:
         return _GROUPS[word]
@@ -34,10 +34,10 @@ def group_of(name: str) -> str:
     return "a group of" if many or word in _PLURAL else ""
 
 
-# Said before the noun, in the order of English: a small rotten brown wooden bench.
+# Attributes before the noun, in English order: a small rotten brown wooden bench.
 _ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
 _PLACE = "place"
-# How an imported thing is called (see `aerialdojo_gen.imports.naming`): no adjectives.
+# Naming attributes of imported nodes (see `aerialdojo_gen.imports.naming`), not adjectives.
 _NAMING = frozenset({"called", "group"})
 _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
 _OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
@@ -49,15 +49,15 @@ _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")
 
 @dataclass(frozen=True)
 class Words:
-    """What drafts say of a category."""
+    """Words that drafts use for a category."""
 
-    name: str  # What a person calls it
+    name: str  # Common name
     looks: tuple[str, ...] = ()  # Noun phrases to follow "with" or "it has"
-    verb: str = "stands"  # ``"stands"`` and ``"standing"``, or what suits the thing better
+    verb: str = "stands"  # Verb and participle: ``"stands"`` and ``"standing"`` by default
     participle: str = "standing"
-    group: str = ""  # For plural names, what makes one thing of them: ``"a patch of"``; else empty
-    reference: bool = True  # Whether a description of something else may refer to it
-    target: bool = True  # Whether a draft may make it an object
+    group: str = ""  # Determiner of plural names: ``"a patch of"``; else empty
+    reference: bool = True  # Whether descriptions of other objects may refer to it
+    target: bool = True  # Whether it may become an object
 
 
 @cache
@@ -84,7 +84,7 @@ def _colours() -> frozenset[str]:
 
 
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
-    """Look up what drafts say of a category."""
+    """Look up the words for a category."""
     entry = _tables()[0].get(category, {})
     verb, participle = _VERBS.get(kind, ("stands", "standing"))
     in_catalogue = name is not None
@@ -101,7 +101,7 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
 
 @dataclass(frozen=True)
 class Noun:
-    """A noun phrase in its pieces."""
+    """A noun phrase in parts."""
 
     adjectives: tuple[str, ...]  # Before the name
     name: str  # The category's
@@ -115,7 +115,7 @@ class Noun:
 
     @property
     def short(self) -> str:
-        """Without article and without what follows the name, unless there would be nothing but the name."""
+        """Without article and without the tail, unless only the name would remain."""
         return " ".join([*self.adjectives, self.name]) if self.adjectives or not self.after else self.bare
 
     def a(self, short: bool = False) -> str:
@@ -129,7 +129,7 @@ class Noun:
 
 
 def noun_of(instance: Instance, words: Words) -> Noun:
-    """Make the noun phrase that says an instance's attributes."""
+    """Make the noun phrase from an instance's attributes."""
     called, group = (instance.attributes.get(key, "") for key in ("called", "group"))
     if called or group:
         words = replace(words, name=called or words.name, group=group or words.group)
@@ -155,12 +155,12 @@ def noun_of(instance: Instance, words: Words) -> Noun:
 
 
 def place_of(instance: Instance) -> str:
-    """Where its layout says that an instance is: ``"in the car park"``; may be empty."""
+    """Return an instance's phrase of place from its layout: ``"in the car park"``; may be empty."""
     return instance.attributes.get(_PLACE, "")
 
 
 def _phrase_value(key: str, value: str) -> str:
-    """Say one value: ``+`` before an adjective, else the words that follow the noun."""
+    """Phrase one value: with the prefix ``+`` if it goes before the noun, else after it."""
     table = _tables()[1]
     pattern = table.get(f"{key}={value}") or table.get(f"{key}=*", "")
     if pattern:
@@ -199,7 +199,7 @@ def _join(parts: list[str]) -> str:
 
 
 def article(text: str) -> str:
-    """Choose between a and an by the sound that the text begins with."""
+    """Choose between a and an by the initial sound."""
     first = text.split()[0].lower() if text else ""
     if first in ("suv", "atm", "led", "hour", "mp3", "x-shaped"):
         return "an"

@@ -30,9 +30,9 @@ from aerialdojo_gen.base.safe_parse import read_toml
 
 Conditions = Mapping[str, Any]
 
-# Patterns of things.
+# Conditions on things, by pattern.
 THINGS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside", "at", "near", "over"})
-# Beyond the middle of things, by the compass.
+# Beyond the centre of things, by compass direction.
 SIDES = frozenset({"north_of", "south_of", "east_of", "west_of"})
 _FOLDER = Path(__file__).parent / "places"
 _PARTS = frozenset(f"{a}{b}" for a in ("", "north", "south") for b in ("", "east", "west")) - {""} | {"middle"}
@@ -52,7 +52,7 @@ def places_of(scene: str) -> Mapping[str, Conditions] | None:
 
 
 def check_conditions(where: str, conditions: Any) -> None:
-    """Refuse what is no binding of a phrase; an `AnnotationError` begins with `where`."""
+    """Raise an `AnnotationError` that begins with `where` if the conditions are invalid."""
     if not isinstance(conditions, dict) or not conditions:
         raise AnnotationError(f"{where}: must be a table of at least one condition")
     for key, value in conditions.items():
@@ -91,7 +91,7 @@ _FORMS: Mapping[str, Callable[[Any], bool]] = {
 TOUCHING_M, BESIDE_M, AT_M, NEAR_M = 0.3, 5.0, 8.0, 15.0
 _REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
 _STEP_M = 0.4
-_SLAB_SHARE = 0.06  # of the outline: a smaller level surface is a sill or a stair
+_SLAB_SHARE = 0.06  # of the outline: smaller level surfaces are sills or stairs
 _STOREY_M = 1.6
 _CORNERS: Mapping[str, tuple[int, int]] = {
     "north": (0, 1), "south": (0, -1), "east": (1, 0), "west": (-1, 0),
@@ -119,7 +119,7 @@ class Places:
         return sorted(self._phrases)
 
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
-        """Say which condition of a phrase is not so of instance `i`."""
+        """Return the first condition of a phrase that does not hold for instance `i`; empty if all hold."""
         key = i, phrase, slack
         if key not in self._found:
             conditions = self._phrases[phrase].items()
@@ -145,7 +145,7 @@ class Places:
 
     def _within(self, i: int, pattern: str, most_m: float) -> bool:
         if most_m >= AT_M and i in self._match(pattern):
-            return True  # what makes the place is there itself
+            return True  # it is itself one of the things that make the place
         close = set(self._geometry.neighbours(i, most_m))
         return any(self._geometry.gap_m(i, j) <= most_m for j in sorted(self._match(pattern) & close))
 
@@ -157,7 +157,7 @@ class Places:
         return float((self._geometry.centres[i, :2] - middle) @ _CORNERS[direction]) > 0.0
 
     def _stack(self, i: int) -> list[int]:
-        """What an instance stands on, and what that stands on, and so on."""
+        """Return the chain of instances below an instance that support it."""
         chain: list[int] = []
         at = self._geometry.support(i)
         if at is None:
@@ -168,7 +168,7 @@ class Places:
         return chain
 
     def _uneven_support(self, i: int) -> int | None:
-        """What an instance stands on where its feet are not level: a slope, a rock."""
+        """Return the support of an instance on uneven ground: a slope, a rock."""
         low = float(self._geometry.boxes[i, 0, 2])
         found = [
             (float(heights[heights <= low + 2.0 * _STEP_M].max()), j)
@@ -183,7 +183,7 @@ class Places:
         return bool(self._match(pattern) & set(self._stack(i)))
 
     def _roof(self, i: int, pattern: str, slack: float) -> bool:
-        """On it, aloft, and under no part of it."""
+        """On it, above ground level, and not under any part of it."""
         mine = self._match(pattern) & set(self._stack(i))
         return bool(mine) and not mine & self._overhead(i) and self._high(i, 1.8, slack)
 
@@ -216,7 +216,7 @@ class Places:
         return bool(shapely.contains_xy(hull, x, y))
 
     def _between(self, i: int, patterns: list[str], slack: float) -> bool:
-        """In the gap between one thing and another, neither of them farther than `NEAR_M`."""
+        """Between two things that are at most `NEAR_M` away."""
         geometry = self._geometry
         x, y = (float(c) for c in geometry.centres[i, :2])
         close = set(geometry.neighbours(i, NEAR_M * slack))
@@ -231,7 +231,7 @@ class Places:
         return False
 
     def _over(self, i: int, pattern: str, _slack: float) -> bool:
-        """Above a thing, or above ground of that material."""
+        """Above a thing, or above ground of a material."""
         geometry = self._geometry
         low = float(geometry.boxes[i, 0, 2])
         for j in sorted(self._match(pattern) - {i}):
@@ -242,7 +242,7 @@ class Places:
         return any(self._named(material, pattern) for material in below)
 
     def _surface(self, i: int, pattern: str, slack: float) -> bool:
-        """At least half of it stands on that material, or floats in it."""
+        """At least half of it stands on the material, or floats in it."""
         low, high = (float(z) for z in self._geometry.boxes[i, :, 2])
         points = self._geometry.probes(i)
         dry = self._materials(i, points, lambda z: (z >= low - 0.8) & (z <= low + _STEP_M))
@@ -252,7 +252,7 @@ class Places:
         return good >= (1 if slack > 1.0 else (len([m for m in found if m]) + 1) // 2) and good > 0
 
     def _by(self, i: int, pattern: str, slack: float) -> bool:
-        """Ground of that material is no farther than what one stands beside."""
+        """Ground of the material is within `BESIDE_M`."""
         return self._ground_materials.within(i, pattern, BESIDE_M * slack)
 
     @staticmethod
@@ -270,7 +270,7 @@ class Places:
         fits: Callable[[NDArray[np.float64]], Any],
         ground: bool = False,
     ) -> list[str]:
-        """Material of the highest fitting surface at each point; empty where there is none."""
+        """Material of the highest matching surface at each point; empty if there is none."""
         found = []
         for x, y in points:
             best, name = -math.inf, ""
@@ -285,7 +285,7 @@ class Places:
         return found
 
     def _high(self, i: int, least_m: float, _slack: float) -> bool:
-        """So far above the ground below, if there is ground below."""
+        """At least that high above the ground below, if there is any."""
         geometry = self._geometry
         low = float(geometry.boxes[i, 0, 2])
         x, y = (float(c) for c in geometry.centres[i, :2])
@@ -300,18 +300,18 @@ class Places:
         return ends[0] <= float(self._geometry.boxes[i, 0, 2]) <= ends[1]
 
     def _floor(self, i: int, value: list[Any], _slack: float) -> bool:
-        """On that floor of a thing: so many of its slabs lie above its ground floor and not above the foot."""
+        """On that floor: the number of slabs above the ground floor and not above its bottom."""
         number, pattern = value
         low = float(self._geometry.boxes[i, 0, 2])
         for j in sorted(self._match(pattern) & set(self._stack(i))):
             slabs = self._slab_heights(j)
             if len(slabs) and int((slabs[1:] <= low + _STEP_M).sum()) == number:
                 return True
-        # On a ground floor one may stand on the ground itself.
+        # The ground floor may be the ground itself.
         return number == 0 and self._inside(i, pattern, 1.0) and not self._high(i, 1.0, 1.0)
 
     def _slab_heights(self, j: int) -> NDArray[np.float64]:
-        """Heights of a thing's floors, the ground floor's first, metres."""
+        """Heights of a building's floors, ground floor first, metres."""
         if j not in self._slabs:
             instance = self._geometry.scene.instances[j]
             a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
@@ -329,7 +329,7 @@ class Places:
         return self._slabs[j]
 
     def _ground_under(self, j: int) -> float:
-        """Height of the ground around a thing: of its outline's lowest corner, metres."""
+        """Median ground height at the corners of a thing's box, metres."""
         geometry = self._geometry
         (x0, y0, low), (x1, y1, _) = geometry.boxes[j]
         heights = []
@@ -346,7 +346,7 @@ class Places:
         return sum(self._geometry.gap_m(i, j) <= most_m * slack for j in near) >= least
 
     def _part(self, i: int, part: str, slack: float) -> bool:
-        """In that part of the scene: a third of the way from its middle to the edge or farther."""
+        """In that part of the scene: at least 0.2 of the way from centre to edge."""
         (x0, y0, _), (x1, y1, _) = self._geometry.scene.bounds
         x, y = self._geometry.centres[i, :2]
         u, v = (x - (x0 + x1) / 2) / ((x1 - x0) / 2), (y - (y0 + y1) / 2) / ((y1 - y0) / 2)

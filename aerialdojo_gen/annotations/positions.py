@@ -1,4 +1,4 @@
-"""JSON with the line of every value, so that a fault can be named by path and line."""
+"""JSON with the line of every value, to report faults by path and line."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _HALF = re.compile("[\ud800-\udfff]")
 
 @dataclass(frozen=True)
 class Fault:
-    """Something wrong in an annotation file."""
+    """A fault in an annotation file."""
 
-    line: int  # Counted from 1; 0 where no line can be named
+    line: int  # 1-based; 0 if unknown
     path: str  # JSON path, e.g. ``"objects[3].node"``; empty for the file itself
-    message: str  # What is wrong, and the mend where one can be guessed
+    message: str  # What is wrong, and a suggestion if there is one
 
     def __str__(self) -> str:
         where = f"line {self.line}: " if self.line else ""
@@ -36,10 +36,10 @@ class Document:
 
     value: Any  # What `json.loads` would return; None where the text is not JSON
     lines: dict[JsonPath, int]  # Line of every value, counted from 1; the path ``()`` is the whole document
-    faults: tuple[Fault, ...]  # Syntax error, or keys that stand twice in one object
+    faults: tuple[Fault, ...]  # Syntax error, or duplicate keys
 
     def fault(self, path: JsonPath, message: str) -> Fault:
-        """Make a fault of the value at a path; where no such value stands, of the nearest one around it."""
+        """Make a fault at a path, or at its nearest existing ancestor."""
         known = path
         while known and known not in self.lines:
             known = known[:-1]
@@ -61,7 +61,7 @@ class _Located:
 
 
 class _Decoder(json.JSONDecoder):
-    """The standard library's own decoder, in its Python form, with the offset of every value kept."""
+    """The standard library's decoder, in its Python form, keeping the offset of every value."""
 
     def __init__(self) -> None:
         super().__init__(object_pairs_hook=_Pairs)
@@ -71,7 +71,7 @@ class _Decoder(json.JSONDecoder):
             value, end = scan(text, start)
             return _Located(value, start), end
 
-        # The scanner hands its own inner function to these two: put ours in its place.
+        # The scanner passes its inner function to these two: replace it by ours.
         module = cast(Any, json.decoder)
         vars(self)["parse_object"] = lambda at, strict, _, *rest: module.JSONObject(at, strict, located, *rest)
         vars(self)["parse_array"] = lambda at, _: module.JSONArray(at, located)
@@ -80,11 +80,11 @@ class _Decoder(json.JSONDecoder):
 
 
 class _Pairs(list[tuple[str, _Located]]):
-    """Keys and values of an object, in order, duplicates included."""
+    """Keys and values of an object, in order, with duplicates."""
 
 
 def read_json(text: str) -> Document:
-    """Parse a JSON text and note where every value stands."""
+    """Parse a JSON text and record the line of every value."""
     if text.count(",") + text.count("[") + text.count("{") > MAX_VALUES:
         return Document(None, {}, (Fault(0, "", f"holds more than {MAX_VALUES} values"),))
     try:
@@ -102,7 +102,7 @@ def read_json(text: str) -> Document:
     value = _unwrap(root, (), starts, lines, faults)
     found = find_violation(value, finite=False, integers=False)
     if found is not None:
-        # What holds such a text can be neither shown nor written: nothing of the file is used.
+        # Such texts can be neither shown nor written: use nothing of the file.
         path, why = found
         return Document(None, lines, (Document(None, lines, ()).fault(path, why),))
     return Document(value, lines, tuple(faults))
@@ -128,7 +128,7 @@ def _unwrap(
 
 
 def _clean_text(text: str, path: JsonPath, lines: dict[JsonPath, int], faults: list[Fault]) -> str:
-    """Pass a text on that can be written as UTF-8: JSON can spell half of a surrogate pair, UTF-8 cannot."""
+    """Replace half surrogate pairs, which JSON can encode and UTF-8 cannot."""
     half = _HALF.search(text)
     if half is None:
         return text

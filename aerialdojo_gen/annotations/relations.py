@@ -1,7 +1,7 @@
-"""How the things of a scene stand to one another, computed from their meshes.
+"""Spatial relations between the instances of a scene, computed from their meshes.
 
-The relations are those that descriptions speak of. Each takes a `slack`: with 1 it says whether a person could
-truly say so; with more it asks whether somebody might still think so, which is what a rival of a description gets.
+Each relation takes a `slack`: with 1 it holds if a person could truly say so, with more if somebody might still think
+so, as for the distractors of a description.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ AT_M = 5.0
 NEAR_M = 8.0
 SIDE_M = 12.0
 BETWEEN_M = 6.0
-LEVEL_M = 1.5  # less than a storey: who is a floor above is not beside
+LEVEL_M = 1.5  # less than a storey: things on different floors are not beside each other
 COVER_M = 12.0
 BETWEEN_DEG = 120.0
 FRONT_DEG = 60.0
-_LARGE_M = 10.0  # above it a thing's outline is its projected mesh; below, the convex hull is as good and cheaper
+_LARGE_M = 10.0  # larger things use the projected mesh as outline, smaller ones the convex hull
 _MANY_FACES = 20_000
 _GRID_M = 1e-3
-# An outline on the grid may reach so far beyond its box, and so may the other one.
+# Outlines on the grid may exceed their boxes by this much, both of them.
 _GRID_SLACK_M = 2.0 * _GRID_M
 _TOUCH_M = 0.35
-_HELD = 3  # of five places below a thing
+_HELD = 3  # of five probes below a thing
 
 
 class SceneGeometry:
-    """Distances and relations between the instances of a scene, each computed when first asked for."""
+    """Distances and relations between the instances of a scene, computed lazily."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -75,7 +75,7 @@ class SceneGeometry:
         return self._outlines[i]
 
     def _within(self, i: int, j: int, reach_m: float) -> bool:
-        """Whether two instances are at most so far apart: their boxes tell it of most, without an outline."""
+        """Whether two instances are at most `reach_m` apart; boxes decide most cases without outlines."""
         (low_i, high_i), (low_j, high_j) = self.boxes[i].tolist(), self.boxes[j].tolist()
         apart = [max(low_j[k] - high_i[k], low_i[k] - high_j[k], 0.0) for k in (0, 1)]
         return math.hypot(*apart) <= reach_m + _GRID_SLACK_M and self.gap_m(i, j) <= reach_m
@@ -93,7 +93,7 @@ class SceneGeometry:
         return max(0.0, float(low_j - high_i), float(low_i - high_j))
 
     def neighbours(self, i: int, radius_m: float) -> list[int]:
-        """Instances whose box comes within a distance of an instance's box, by index, itself left out."""
+        """Other instances whose boxes are within a distance of an instance's box."""
         (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
         r = radius_m
         hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
@@ -101,7 +101,7 @@ class SceneGeometry:
         return [int(j) for j in hits[level] if j != i]
 
     def support(self, i: int) -> int | None:
-        """The instance that an instance stands on: the highest surface within a hand's breadth of its bottom."""
+        """The supporting instance: the highest surface close to the bottom."""
         if i not in self._supports:
             low = float(self.boxes[i, 0, 2])
             best: tuple[float, int] | None = None
@@ -114,7 +114,7 @@ class SceneGeometry:
         return self._supports[i]
 
     def rests_on(self, i: int, j: int) -> bool:
-        """Whether `j` carries `i` from below over an area, and does not rise beside it: a truck is not on a tower."""
+        """Whether `j` supports `i` over an area and does not rise next to it: a truck is not on a tower."""
         low = float(self.boxes[i, 0, 2])
         if float(self.boxes[j, 1, 2]) > low + LEVEL_M:
             return False
@@ -126,7 +126,7 @@ class SceneGeometry:
         return held >= _HELD
 
     def covers(self, i: int) -> frozenset[int]:
-        """The instances that have a surface overhead, at most `COVER_M` above an instance's top."""
+        """Instances with a surface overhead, at most `COVER_M` above the instance's top."""
         if i not in self._covers:
             high = float(self.boxes[i, 1, 2])
             x, y = self.centres[i, :2]
@@ -135,18 +135,18 @@ class SceneGeometry:
                 overhead = heights[(heights >= high - 0.05) & (heights <= high + COVER_M)]
                 if len(overhead):
                     lowest[j] = float(overhead.min())
-            # What lies on the ceiling above is not what one stands under.
+            # Things on top of the ceiling do not count.
             limit = min(lowest.values(), default=0.0) + 1.0
             self._covers[i] = frozenset(j for j, z in lowest.items() if z <= limit)
         return self._covers[i]
 
     def probes(self, i: int) -> list[tuple[float, float]]:
-        """Places below an instance where what it stands on is looked for: its middle, and four around it."""
+        """Points at which to look for the support: the centre and four around it."""
         (x, y), (rx, ry) = self.centres[i, :2], 0.3 * (self.boxes[i, 1, :2] - self.boxes[i, 0, :2])
         return [(x, y), (x - rx, y - ry), (x + rx, y - ry), (x - rx, y + ry), (x + rx, y + ry)]
 
     def columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
-        """Every other instance with surfaces above or below a place, and the heights of those."""
+        """Other instances with surfaces above or below a point, and their heights."""
         found = []
         for j in np.sort(self._tree.query(shapely.Point(x, y))):
             if j != i:
@@ -156,7 +156,7 @@ class SceneGeometry:
         return found
 
     def surfaces(self, j: int, x: float, y: float) -> list[tuple[str, Floats]]:
-        """Materials of an instance above or below a place, and the heights of each, metres."""
+        """Materials of an instance above or below a point, and their heights, metres."""
         heights, faces = self._crossed(j, x, y)
         if not len(heights):
             return []
@@ -169,13 +169,13 @@ class SceneGeometry:
         return self._crossed(j, x, y)[0]
 
     def _crossed(self, j: int, x: float, y: float) -> tuple[Floats, NDArray[np.intp]]:
-        """Heights of an instance's triangles at a place, and which of its faces they are."""
+        """Heights of an instance's triangles at a point, and their face indices."""
         triangles = self._triangles(j)
         z, which = _heights_at(triangles, x, y)
         return z, self._level_faces[j][which]
 
     def _triangles(self, j: int) -> Floats:
-        """Corners of the triangles that are not upright and twice their signed areas from above, (n, 10)."""
+        """Corners of the non-vertical triangles and twice their signed areas from above, (n, 10)."""
         if j not in self._corners:
             instance = self.scene.instances[j]
             a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
@@ -186,7 +186,7 @@ class SceneGeometry:
         return self._corners[j]
 
     def bearing_rad(self, i: int, j: int) -> float | None:
-        """Direction from the nearest point of `j`'s outline to the middle of `i`; None within the outline."""
+        """Direction from the nearest point of `j`'s outline to the centre of `i`; None inside the outline."""
         x, y = self.centres[i, :2]
         here = shapely.Point(x, y)
         line = shapely.shortest_line(self.outline(j), here)
@@ -196,7 +196,7 @@ class SceneGeometry:
         return math.atan2(y - py, x - px)
 
     def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` stands within arm's reach of `j`, and not on, under or over it."""
+        """`i` is close to `j`, not on, under or over it."""
         if (
             not self._level(i, j, slack)
             or not self._within(i, j, BESIDE_M * slack)
@@ -209,7 +209,7 @@ class SceneGeometry:
         return not stacked and not within
 
     def near(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` stands a few steps from `j`, about level with it."""
+        """`i` is a few steps from `j`, at about the same level."""
         return self._level(i, j, slack) and self._within(i, j, NEAR_M * slack)
 
     def against(self, i: int, j: int, slack: float = 1.0) -> bool:
@@ -221,11 +221,11 @@ class SceneGeometry:
         return self._level(i, j, slack) and self._within(i, j, AT_M * slack)
 
     def front(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` stands before a front of `j`, of a thing without a front close by it."""
+        """`i` is in front of `j`; for things without a front, close to it."""
         return self._before(i, j, slack, 0.0)
 
     def behind(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` stands before the back of `j`, of a thing without a front close by it."""
+        """`i` is behind `j`; for things without a front, close to it."""
         return self._before(i, j, slack, math.pi)
 
     def _before(self, i: int, j: int, slack: float, turn_rad: float) -> bool:
@@ -233,7 +233,7 @@ class SceneGeometry:
             return False
         anatomy = self.scene.instances[j].anatomy
         fronts = anatomy.fronts_rad if anatomy is not None else ()
-        # What has two faces has no back: its two sides are as good.
+        # Things with two fronts have no back: both other sides count.
         if not fronts or (turn_rad and len(fronts) > 1):
             return True
         bearing = self.bearing_rad(i, j)
@@ -248,15 +248,15 @@ class SceneGeometry:
         return self.support(i) == j
 
     def under(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`j` has a surface overhead of `i`."""
+        """`j` has a surface above `i`."""
         return j in self.covers(i)
 
     def above(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` is overhead of `j`, or on it."""
+        """`i` is above `j`, or on it."""
         return i in self.covers(j) or self.support(i) == j
 
     def side(self, i: int, j: int, direction: str, slack: float = 1.0) -> bool:
-        """`i` stands in that compass direction of `j`, not far away."""
+        """`i` is in that compass direction of `j`, not far away."""
         if not (self._level(i, j, slack) and self._within(i, j, SIDE_M * slack)):
             return False
         bearing = self.bearing_rad(i, j)
@@ -266,7 +266,7 @@ class SceneGeometry:
         return abs(float(wrap_angle_rad(bearing - middle))) <= math.radians(22.5) * slack
 
     def between(self, i: int, j: int, k: int, slack: float = 1.0) -> bool:
-        """`i` stands between `j` and `k`: both close by and on opposite sides."""
+        """`i` is between `j` and `k`: close to both, on opposite sides."""
         if not (self._level(i, j, slack) and self._level(i, k, slack)):
             return False
         if j == k or not all(self._within(i, other, BETWEEN_M * slack) for other in (j, k)):
@@ -279,7 +279,7 @@ class SceneGeometry:
 
 @njit(cache=True, error_model="numpy")
 def _heights_at(triangles: Floats, x: float, y: float) -> tuple[Floats, NDArray[np.int64]]:
-    """Heights over a place of those triangles that lie over or under it, and which of them they are."""
+    """Heights of the triangles above or below a point, and their indices."""
     z, which = np.empty(len(triangles)), np.empty(len(triangles), dtype=np.int64)
     n = 0
     for k in range(len(triangles)):

@@ -1,1 +1,1 @@
-"""Meshes that nobody here made: read within bounds, repaired with a word on it, and turned into scenes."""
+"""Import of meshes, maps and height models: bounded reading, repair, conversion to scenes."""

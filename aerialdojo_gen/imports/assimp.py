@@ -1,4 +1,4 @@
-"""Collada and FBX, by Assimp (the extra ``formats``)."""
+"""Collada and FBX by Assimp (the extra ``formats``)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from aerialdojo_gen.imports.raw import RawNode, empty_corners, merge_nodes
 
 
 def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read a Collada or FBX file: one RawNode a mesh node, in the order of the tree, transforms applied."""
+    """Read a Collada or FBX file: one RawNode per mesh node, in tree order, transforms applied."""
     try:
         assimp: Any = importlib.import_module("assimp_py")
     except ImportError:
@@ -56,10 +56,10 @@ def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = T
 
 
 def _mesh(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32]]:
-    """Vertices (n, 3), faces (m, 3), and what a corner at each vertex carries, (n, 5)."""
+    """Vertices (n, 3), faces (m, 3), and corner attributes at each vertex, (n, 5)."""
     vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     flat = np.asarray(mesh.indices, dtype=np.int64).ravel()
-    # Lines and points are meshes of their own, and no triangles.
+    # Lines and points are separate meshes without triangles.
     faces = flat.reshape(-1, 3) if len(flat) == 3 * mesh.num_faces else np.zeros((0, 3), dtype=np.int64)
     corners = empty_corners(len(vertices))[:, 0]
     if mesh.texcoords:

@@ -1,4 +1,4 @@
-"""The twin of ``add-scene``: a folder of a user's own scenes, which every other command takes by its pipeline."""
+"""``add-scene`` as functions: a project folder with the user's own scenes and a pipeline file."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ PIPELINE = "pipeline.toml"
 
 @dataclass(frozen=True)
 class AddedScene:
-    """What `add_scene` made."""
+    """The result of `add_scene`."""
 
     scene: Scene  # The scene
-    repairs: Repairs  # What was mended in the mesh
+    repairs: Repairs  # Repairs of the mesh
     pipeline: Path  # The project's pipeline file, for ``--pipeline``
-    annotations: Path  # Where the scene's annotations stand, or belong
+    annotations: Path  # Path of the scene's annotations, existing or not
 
 
 def add_scene(
@@ -53,7 +53,7 @@ def add_scene(
     texture_px: int = TEXTURE_PX,
     force: bool = False,
 ) -> AddedScene:
-    """Make a scene of a mesh file in a project folder; nothing else in the folder is touched."""
+    """Make a scene from a mesh file in a project folder."""
     check_free([name], project, force)
     check_options(up, scale, light)
     make_region(crop_m, box_m)
@@ -87,10 +87,7 @@ def add_tiles(
     force: bool = False,
     on_added: Callable[[AddedScene], None] = lambda added: None,
 ) -> list[AddedScene]:
-    """Make scenes of a large mesh, a square of `edge_m` metres each, in one frame.
-
-    All or none of them are written.
-    """
+    """Make scenes of a large mesh, one per square of `edge_m` metres, in one frame; all or none are written."""
     check_scene_name(tile_name(name, 99, 99))
     check_options(up, scale, light)
     region = make_region(crop_m, box_m)
@@ -99,7 +96,7 @@ def add_tiles(
         source = SourceMesh.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
         if region is not None:
             source = source.within(region)
-        # Every tile is made before one is written, so that what cannot be made leaves nothing behind.
+        # Build all tiles before writing any, so that a failure leaves nothing behind.
         tiles = list(make_tiles(name, source, edge_m, ceiling_m=ceiling_m, naming=naming, light=light))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
@@ -122,7 +119,7 @@ def list_mesh(
     names: Path | None = None,
     width: int | None = None,
 ) -> list[str]:
-    """Say what a mesh file holds, in lines for a terminal (`aerialdojo_gen.imports.listing.describe_mesh`)."""
+    """Describe the content of a mesh file, in lines for a terminal."""
     check_options(up, scale)
     naming = None if names is None else read_names(names)
     with _prefix_errors(mesh):
@@ -130,7 +127,7 @@ def list_mesh(
 
 
 def check_free(names: Sequence[str], project: Path, force: bool) -> None:
-    """Refuse names of scenes that the project has already, unless `force` replaces them."""
+    """Raise a `UsageError` if the project already has one of the scenes, unless `force`."""
     for name in names:
         check_scene_name(name)
         recipe = project / "scenes" / f"{name}.toml"
@@ -140,7 +137,7 @@ def check_free(names: Sequence[str], project: Path, force: bool) -> None:
 
 @contextmanager
 def _prefix_errors(mesh: Path) -> Iterator[None]:
-    """Put the file before what is wrong with it."""
+    """Prefix error messages with the mesh's path."""
     try:
         yield
     except AssetError as error:
@@ -149,7 +146,7 @@ def _prefix_errors(mesh: Path) -> Iterator[None]:
 
 
 def _write_scene(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str | None) -> AddedScene:
-    """Write a scene into a project, its recipe after its mesh, so that what is killed half-way is no scene."""
+    """Write a scene into a project: the recipe last, so that an interrupted write leaves no scene."""
     name = scene.name
     for folder in ("scenes", "annotations"):
         make_folder(project / folder)
@@ -210,7 +207,7 @@ def _recipe(
 
 
 def write_pipeline(project: Path) -> None:
-    """Write the pipeline file of a project that has none."""
+    """Write the project's pipeline file, if it has none."""
     if (project / PIPELINE).exists():
         return
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"

@@ -1,4 +1,4 @@
-"""Cut triangles along upright planes: a part of a large place, closed where closed bodies are cut open."""
+"""Clip triangles to a convex region of the plan; closed bodies stay closed."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _GRID_M = 1e-6
 
 @dataclass(frozen=True)
 class Region:
-    """A convex part of the plan, with what a user calls it."""
+    """A convex region of the plan."""
 
     corners: tuple[tuple[float, float], ...]  # tuple of (x, y); metres, counter-clockwise
-    option: str  # ``"--crop 10 20 100"``
+    option: str  # As the user typed it: ``"--crop 10 20 100"``
 
     @classmethod
     def circle(cls, x: float, y: float, radius: float) -> Region:
-        """Make a polygon of 64 sides that lies within a circle and touches it at its corners; metres."""
+        """Make a 64-sided polygon inscribed in a circle; metres."""
         angles = [2 * math.pi * k / _SIDES for k in range(_SIDES)]
         corners = tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)
         return cls(corners, f"--crop {x:g} {y:g} {radius:g}")
@@ -43,17 +43,17 @@ class Region:
 
     @property
     def low(self) -> Floats:
-        """Lower corner of the rectangle around it, (2,) float64."""
+        """Lower corner of its bounding rectangle, (2,) float64."""
         return np.min(self.corners, axis=0)
 
     @property
     def high(self) -> Floats:
-        """Upper corner of the rectangle around it, (2,) float64."""
+        """Upper corner of its bounding rectangle, (2,) float64."""
         return np.max(self.corners, axis=0)
 
     @property
     def planes(self) -> list[tuple[Floats, float]]:
-        """Sides as (outward normal, offset): a point p lies within where normal · p <= offset for all of them."""
+        """Sides as (outward normal, offset): a point p is inside if normal · p <= offset for all."""
         out = []
         for (x0, y0), (x1, y1) in zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True):
             normal = np.array([y1 - y0, x0 - x1]) / math.hypot(x1 - x0, y1 - y0)
@@ -63,11 +63,11 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """What is left of triangles."""
+    """Clipped triangles."""
 
     corners: Floats  # (k, 3, 3) float64; metres
-    source: Ints  # (k,) int64; the triangle that each was; for one that closes a cut, a triangle of the cut's rim
-    weights: Floats  # What each corner is made of: shares of the source's three corners, for whatever is interpolated
+    source: Ints  # (k,) int64; index of the original triangle; for caps, of a triangle at the cut's rim
+    weights: Floats  # Barycentric weights of each corner in its source triangle, for interpolation
 
 
 def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
@@ -75,7 +75,7 @@ def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     corners = vertices[faces]
     body, closed = connected_bodies(faces, len(vertices))
     pieces = Pieces(corners, np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3)))
-    # A closed body must come to the planes whole, for what each of them cuts away tells where it is to be closed.
+    # Closed bodies must reach the planes whole: the clipped rims show where to add caps.
     low, high = np.full((len(closed), 2), np.inf), np.full((len(closed), 2), -np.inf)
     np.minimum.at(low, body, corners[:, :, :2].min(axis=1))
     np.maximum.at(high, body, corners[:, :, :2].max(axis=1))
@@ -101,16 +101,16 @@ def _concatenate(parts: Sequence[Pieces]) -> Pieces:
 
 
 def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float) -> Pieces:
-    """Keep what lies on the inner side of an upright plane, and close what was closed."""
+    """Keep the inner side of a vertical plane, and cap closed bodies."""
     away = pieces.corners[:, :, :2] @ normal - offset
-    # What lies in the plane is within, so that every surface is cut alike however often its corners meet it.
+    # Points in the plane are inside, so that a surface is cut the same however it is triangulated.
     outside = away > 0.0
     n = outside.sum(axis=1)
     inner = n == 0
     if inner.all():
         return pieces
     keep, one, two = _select(pieces, inner), np.flatnonzero(n == 1), np.flatnonzero(n == 2)
-    # The odd corner first, so that the two cases are cut alike.
+    # Rotate the odd corner to the front, so that both cases share the code.
     first = np.concatenate([np.argmax(outside[one], axis=1), np.argmin(outside[two], axis=1)])
     rows = np.concatenate([one, two])
     turn = (first[:, None] + np.arange(3)) % 3
@@ -120,7 +120,7 @@ def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal
     k = len(one)
     at_border, weights = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 3))
     for j in (0, 1):
-        # From the inner corner outwards, so that both triangles of an edge are cut at the same place to the bit.
+        # Interpolate from the inner corner outwards, so that both triangles of an edge give identical points.
         ends = np.concatenate([np.full(k, j + 1), np.zeros(len(two), np.int64)])
         beyond = np.concatenate([np.zeros(k, np.int64), np.full(len(two), j + 1)])
         i = np.arange(len(rows))
@@ -144,7 +144,7 @@ def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal
 def _caps(
     segments: Floats, source: Ints, body: Ints, closed: NDArray[np.bool_], normal: Floats, offset: float
 ) -> list[Pieces]:
-    """Triangles in a plane that close the closed bodies whose rims there are `segments`, (n, 2, 3)."""
+    """Cap triangles in a plane for closed bodies with the rims `segments`, (n, 2, 3)."""
     out = []
     along = np.array([-normal[1], normal[0]])
     origin = normal * offset
@@ -169,7 +169,7 @@ def _caps(
         corners = np.empty((len(uz), 3, 3))
         corners[:, :, :2] = origin + uz[:, :, :1] * along
         corners[:, :, 2] = uz[:, :, 1]
-        # The very places of the rim, so that nothing gapes.
+        # Use the exact rim points, so that there are no gaps.
         ends = dict(zip(map(tuple, grid.reshape(-1, 2).tolist()), segments[rows].reshape(-1, 3), strict=True))
         keys = np.round(uz / _GRID_M).reshape(-1, 2).tolist()
         corners = np.array(
@@ -182,14 +182,14 @@ def _caps(
 
 
 def _merge_close_points(ends: Floats) -> Ints:
-    """Number the places of points, (n, 2): those no farther apart than the grid are one, which rounding may part."""
+    """Label points, (n, 2): points closer than the grid share a label, even if rounding separates them."""
     pairs = cKDTree(ends).query_pairs(_GRID_M, output_type="ndarray")
     near = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(len(ends), len(ends)))
     return connected_components(near, directed=False)[1].astype(np.int64)
 
 
 def _polygons_inside(lines: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Polygons within closed outlines, holes left out: what a line to the far side crosses an odd number of times."""
+    """Polygons within closed outlines, without holes, by the even-odd rule."""
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
     inner = shapely.get_coordinates(shapely.point_on_surface(faces))
     ends = shapely.get_coordinates(lines).reshape(-1, 2, 2)
@@ -204,7 +204,7 @@ def _polygons_inside(lines: NDArray[np.object_]) -> NDArray[np.object_]:
 
 
 def connected_bodies(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
-    """Edge-connected bodies of faces (m, 3): body of each face, and which bodies are closed."""
+    """Edge-connected bodies of faces (m, 3): label of each face, and which bodies are closed."""
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros(0, np.bool_)
     own = np.sort(faces, axis=1)
@@ -228,7 +228,7 @@ def connected_bodies(faces: Ints, n: int) -> tuple[Ints, NDArray[np.bool_]]:
 
 
 def unique_rows(*columns: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Unique rows of columns of numbers, as `numpy.unique(axis=0)`, several times as fast."""
+    """Unique rows of number columns, like `numpy.unique(axis=0)` but several times faster."""
     order = np.lexsort(columns[::-1])
     new = np.zeros(len(order), dtype=np.bool_)
     new[:1] = True

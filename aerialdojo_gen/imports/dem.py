@@ -17,7 +17,7 @@ from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, c
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
 
 Floats = NDArray[np.float64]
-# What a survey flies over has far fewer; a continent's model is cut first.
+# Surveys have far fewer; crop a continental model first.
 _MAX_CELLS = 100_000_000
 _MAX_TEXT_BYTES = 512 << 20
 _MAX_HEIGHT_M = 1e5
@@ -29,25 +29,25 @@ _SUFFIXES = (".tif", ".tiff", ".asc", ".npz")
 
 @dataclass(frozen=True, eq=False)
 class Dem:
-    """Heights on a grid."""
+    """A grid of heights."""
 
     path: Path  # The file
-    heights_m: Floats  # Metres; rows run south from the northernmost, NaN where there is none
-    x0: float  # Of the north-western height, in the grid's own coordinates
+    heights_m: Floats  # Metres; rows run from north to south, NaN for nodata
+    x0: float  # Position of the north-western height, in the grid's coordinates
     y0: float
-    dx: float  # From one to the next, eastwards and southwards; both above 0
+    dx: float  # Cell size eastwards and southwards, positive
     dy: float
     geographic: bool | None
     to_grid: Callable[[Floats, Floats], tuple[Floats, Floats]] | None
 
     @property
     def extent(self) -> Bbox:
-        """Least x and y, greatest x and y of its heights, own coordinates."""
+        """West, south, east, north, in the grid's coordinates."""
         rows, columns = self.heights_m.shape
         return self.x0, self.y0 - (rows - 1) * self.dy, self.x0 + (columns - 1) * self.dx, self.y0
 
     def at(self, x: Floats, y: Floats) -> Floats:
-        """Heights by bilinear interpolation at points of its own coordinates; NaN beyond it and next to no height."""
+        """Bilinear heights at points in the grid's coordinates; NaN outside and next to nodata."""
         rows, columns = self.heights_m.shape
         u, v = (x - self.x0) / self.dx, (self.y0 - y) / self.dy
         near = (u > -_EDGE) & (v > -_EDGE) & (u < columns - 1 + _EDGE) & (v < rows - 1 + _EDGE)
@@ -57,12 +57,12 @@ class Dem:
         h = self.heights_m
         total = np.zeros(np.shape(x))
         for a, b, weight in ((0, 0, (1 - u) * (1 - v)), (0, 1, u * (1 - v)), (1, 0, (1 - u) * v), (1, 1, u * v)):
-            # A height that is not there matters only where it has a say.
+            # Nodata matters only where its weight is not zero.
             total += np.where(weight > 1e-9, weight * h[i + a, j + b], 0.0)
         return np.where(near, total, np.nan)
 
     def at_degrees(self, lon: Floats, lat: Floats) -> Floats:
-        """Heights at points on earth; a `UsageError` where the file does not say where it is."""
+        """Heights at longitudes and latitudes; `UsageError` without a geographic reference."""
         if self.to_grid is None:
             raise UsageError(f"{self.path} has no geographic coordinates: use a GeoTIFF or a grid in degrees")
         return self.at(*self.to_grid(lon, lat))
@@ -94,7 +94,7 @@ def _geotiff(path: Path) -> Dem:
     except ImportError:
         raise MissingPackage(lacks(f"{path}, a GeoTIFF,", "rasterio", "maps")) from None
     try:
-        # By its own driver alone: others follow what a file says to other files, and to the net.
+        # GTiff driver only: other drivers follow references to files and URLs.
         with rasterio.open(path, driver="GTiff") as file:
             if file.width * file.height > _MAX_CELLS:
                 raise AssetError(
@@ -123,7 +123,7 @@ def _geotiff(path: Path) -> Dem:
         return np.reshape(x, shape), np.reshape(y, shape)
 
     z[~(np.abs(z) < _MAX_HEIGHT_M)] = np.nan
-    # A GeoTIFF's heights are those of the middles of its cells.
+    # GeoTIFF heights are at cell centres.
     return Dem(path, z, t.c + t.a / 2, t.f + t.e / 2, t.a, -t.e, bool(crs.is_geographic), to_grid)
 
 
@@ -192,7 +192,7 @@ def _npz(path: Path) -> Dem:
 
 
 def _check_npz_sizes(path: Path) -> None:
-    """Refuse an NPZ whose arrays are larger than any height model: some kilobytes may ask for terabytes."""
+    """Refuse an NPZ with oversized arrays: a few kilobytes can expand to terabytes."""
     with zipfile.ZipFile(path) as archive:
         for name in ("heights_m.npy", "cell_m.npy", "bbox_deg.npy"):
             if name not in archive.namelist():
@@ -216,7 +216,7 @@ def _one_line(error: BaseException) -> str:
 
 
 def describe_coverage(dem: Dem) -> str:
-    """Say over what a height model reaches, for a message."""
+    """Describe the extent of a height model, for messages."""
     west, south, east, north = dem.extent
     if dem.geographic:
         return f"{dem.path.name} covers {format_bbox(dem.extent)}"

@@ -1,4 +1,4 @@
-"""From longitude and latitude to metres about a point, and back."""
+"""Conversion between longitude and latitude and local metres."""
 
 from __future__ import annotations
 
@@ -14,24 +14,21 @@ Floats = NDArray[np.float64]
 Bbox = tuple[float, float, float, float]
 """West, south, east, north, degrees, WGS 84."""
 
-# Of the ellipsoid WGS 84.
+# WGS 84 ellipsoid.
 _A_M, _E2 = 6_378_137.0, 0.00669437999014
 _POLE_DEG = 85.0
 
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Metres east and north of a point.
-
-    The plane that touches the ellipsoid there, true to a millimetre over 1 km.
-    """
+    """Metres east and north of an origin, in the tangent plane; accurate to a millimetre within 1 km."""
 
     lon_deg: float  # The origin, WGS 84
     lat_deg: float
 
     @classmethod
     def about(cls, bbox: Bbox) -> LocalFrame:
-        """Make the frame about a bounding box's middle."""
+        """Make the frame at a bounding box's centre."""
         west, south, east, north = bbox
         return cls((west + east) / 2, (south + north) / 2)
 
@@ -58,7 +55,7 @@ class LocalFrame:
 
 
 def check_bbox(bbox: Bbox) -> Bbox:
-    """Refuse what is no bounding box; a `UsageError` says what it should be."""
+    """Raise a `UsageError` if a bounding box is invalid."""
     west, south, east, north = bbox
     text = " ".join(f"{v:g}" for v in bbox)
     if not all(math.isfinite(v) for v in bbox) or not (west < east and south < north):
@@ -81,7 +78,7 @@ def size_m(bbox: Bbox) -> tuple[float, float]:
 
 
 def tile_bboxes(bbox: Bbox, tile_m: float) -> list[Bbox]:
-    """Cut a bounding box into squares, from its south-west corner by rows running north; the rest is not used."""
+    """Split a bounding box into squares, row by row from the south-west corner; the remainder is dropped."""
     wide, deep = size_m(bbox)
     east, north = LocalFrame.about(bbox).metres_a_degree
     nx, ny = (int(s / tile_m + 1e-3) for s in (wide, deep))
@@ -97,5 +94,5 @@ def tile_bboxes(bbox: Bbox, tile_m: float) -> list[Bbox]:
 
 
 def format_bbox(bbox: Bbox) -> str:
-    """Write a bounding box for a message, as ``--bbox`` takes it."""
+    """Format a bounding box as ``--bbox`` takes it."""
     return " ".join(f"{v:.4f}" for v in bbox)

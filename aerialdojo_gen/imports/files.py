@@ -1,8 +1,7 @@
-"""Read a mesh file of a foreign make: glTF, OBJ, STL, PLY (by trimesh), 3DS, or Collada and FBX (by assimp).
+"""Read mesh files: glTF, OBJ, STL, PLY (by trimesh), 3DS, Collada and FBX (by Assimp).
 
-Files are hostile until shown otherwise: they are read in a process of their own that may take neither more memory
-nor more time than it is given, GLB files are looked over before an array of theirs is made, and what a file refers
-to is read from beside it or not at all.
+Files are untrusted: they are read in a child process with limits on memory and time, GLB files are checked before
+any array is allocated, and references are resolved in the file's own folder only.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ MAX_TRIANGLES = 4_000_000
 
 
 def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read a mesh file's nodes with at least one triangle, transforms applied, in bounded memory and time."""
+    """Read the nodes of a mesh file that have triangles, transforms applied, in bounded memory and time."""
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise AssetError(f"{path}: meshes are read from {', '.join(s[1:].upper() for s in SUFFIXES)} files")
@@ -61,11 +60,8 @@ def _type_mismatch(path: Path) -> str:
 
 
 def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
-    """Read a mesh file without bounds, for a child process that has them.
-
-    Returns what is wrong, or an empty string.
-    """
-    # What readers grumble about is repaired and reported later.
+    """Read a mesh file in the sandboxed child process; returns the error message, or an empty string."""
+    # Reader warnings are irrelevant: faults are repaired and reported later.
     warnings.simplefilter("ignore")
     try:
         nodes = [n for n in _read(path, texture_px) if len(n.faces)]
@@ -77,7 +73,7 @@ def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
         _pack(nodes, out)
     except AssetError as error:
         return str(error)
-    except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
+    except Exception as error:  # untrusted files can make a reader fail in any way: report it
         if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
             raise MemoryError from None
         first = (str(error).splitlines() or [""])[0]
@@ -100,7 +96,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
         return read_assimp(path, SiblingFiles(path).get, texture_px)
     import trimesh
 
-    # What the file refers to comes through a resolver that stays in its folder.
+    # References are resolved within the mesh's folder only.
     siblings = _resolver(path)
     scene = trimesh.load_scene(
         path, file_type=suffix[1:], resolver=siblings, process=False, split_objects=True, group_material=True,
@@ -127,7 +123,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
 
 
 def _objects_of(path: Path) -> dict[str, str]:
-    """Read the objects of an OBJ file: by the names that trimesh gives to what of one is of one material."""
+    """Map trimesh's mesh names to the objects of an OBJ file."""
     named, thing, material = {}, "", ""
     for key, value in re.findall(rb"^(o|usemtl)[ \t]+(.*?)[ \t\r]*$", path.read_bytes(), re.MULTILINE):
         if key == b"o":
@@ -139,11 +135,11 @@ def _objects_of(path: Path) -> dict[str, str]:
 
 
 def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
-    """Say of which object a mesh of trimesh's is, where its name holds a number in place of a material, too."""
+    """Return the object that a trimesh mesh belongs to."""
     stem = re.sub(r"_\d+$", "", name)
     objects = set(named.values())
-    # Without materials, or with one alone, trimesh counts the pieces of an object. What has no name it calls by the
-    # path of the file.
+    # With no more than one material, trimesh numbers the pieces of an object, and names unnamed
+    # ones by the file's path.
     other = stem if name not in objects and stem in objects else "" if path.name in name else name
     return named.get(name, other)
 
@@ -152,7 +148,7 @@ def _resolver(path: Path) -> Any:
     import trimesh
 
     class Resolver(SiblingFiles, trimesh.resolvers.Resolver):
-        """What trimesh asks for files."""
+        """Resolver for trimesh."""
 
     return Resolver(path)
 
@@ -223,7 +219,7 @@ def _pack(nodes: list[RawNode], out: Path) -> None:
 
 
 def unpack_nodes(path: Path) -> list[RawNode]:
-    """Return the nodes that `read_into` wrote."""
+    """Load the nodes that `read_into` wrote."""
     with np.load(path, allow_pickle=False) as file:
 
         def optional(key: str) -> Any:

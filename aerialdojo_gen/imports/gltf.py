@@ -1,7 +1,7 @@
-"""glTF 2.0: nodes, triangles and materials, from a .glb or from a .gltf and what lies beside it.
+"""glTF 2.0: nodes, triangles and materials, from .glb or .gltf files.
 
-By code of our own, as general readers leave out what decides the picture: normalised integers, second texture
-coordinates, texture transforms, unlit materials; and they name nodes anew in every run.
+Own code, because general readers ignore normalised integers, second texture coordinates, texture transforms and
+unlit materials, and rename nodes in every run.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ Resolve = Callable[[str], bytes]
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-# Writers that put sRGB into vertex colours, which the format means to be linear.
+# Writers that store sRGB in vertex colours, which should be linear.
 _SRGB_WRITERS = ("trimesh", "meshlab", "open3d")
 
 
 def read_gltf(raw: bytes, resolve: Resolve, texture_px: int = TEXTURE_PX) -> list[RawNode]:
-    """Read glTF bytes: one RawNode a mesh node, transforms applied."""
+    """Read glTF bytes: one RawNode per mesh node, transforms applied."""
     return _File(raw, resolve, texture_px).nodes()
 
 
@@ -47,7 +47,7 @@ class _File:
         self._surfaces, self._index = surfaces, index
 
     def nodes(self) -> list[RawNode]:
-        """Return the nodes that show a mesh, in the order of the file's tree."""
+        """Return the mesh nodes, in tree order."""
         document, out = self._document, []
         for k, world in self._world_transforms():
             node = document["nodes"][k]
@@ -110,7 +110,7 @@ class _File:
         return RawNode(name, vertices, faces, colours, surface, corners, self._surfaces)
 
     def _factor(self, material: int | None) -> Floats | None:
-        """Return what vertex colours are multiplied by, linear; None for white."""
+        """Return the factor of vertex colours, linear; None for white."""
         if material is None:
             return None
         factor = np.array(_base_colour(self._document["materials"][material])[0][:3], dtype=np.float64)
@@ -151,7 +151,7 @@ class _File:
             uv = uv * np.array(moved.get("scale", (1.0, 1.0)), dtype=np.float64)
             uv = uv @ np.array([[c, s], [-s, c]]).T + np.array(moved.get("offset", (0.0, 0.0)), dtype=np.float64)
         uv[~np.isfinite(uv)] = 0.0
-        # The format's v points down.
+        # glTF's v axis points down.
         return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype(np.float32)
 
     def _source_material(self, material: dict[str, Any], k: int) -> SourceMaterial:
@@ -189,7 +189,7 @@ class _File:
         return self._resolve(unquote(uri))
 
     def _array(self, accessor: int) -> NDArray[Any]:
-        """Return an accessor's values, (n, width); normalised integers as they are meant, 0-1."""
+        """Return an accessor's values, (n, width); normalised integers as 0-1."""
         entry = self._document["accessors"][accessor]
         count, width = int(entry["count"]), _WIDTHS[entry["type"]]
         dtype = np.dtype(_DTYPES[entry["componentType"]])
@@ -256,7 +256,7 @@ def _parse(raw: bytes) -> tuple[dict[str, Any], memoryview]:
 
 
 def _base_colour(material: dict[str, Any]) -> tuple[list[float], dict[str, Any] | None]:
-    """Return a material's colour, linear, and its texture."""
+    """Return a material's base colour (linear) and texture."""
     old = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
     if old is not None:
         return list(old.get("diffuseFactor", (1.0, 1.0, 1.0, 1.0))), old.get("diffuseTexture")

@@ -1,4 +1,4 @@
-"""From a file's nodes to a scene like those of recipes: axes, units, repair, instances, ground, ceiling."""
+"""Convert the nodes of a mesh file to a scene: axes, units, repair, instances, ground, ceiling."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 LARGEST_M = 2000.0
 SMALLEST_M = 5.0
-# Cells of half a metre that planning keeps a few bytes each of.
+# Limit on half-metre planning cells, a few bytes each.
 _MAX_CELLS = 150e6
 _MARGIN_M = 5.0
 _HEADROOM_M = 6.0
@@ -45,34 +45,34 @@ _MAX_NOTES = 8
 
 @dataclass
 class Repairs:
-    """What was found and how it was mended, for the user to read."""
+    """Repairs of a mesh, as lines for the user."""
 
     lines: list[str] = field(default_factory=list)
     origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (x, y, z)
 
     def add(self, n: int, text: str) -> None:
-        """Note a repair of n things, if there were any."""
+        """Record a repair of n elements, if n > 0."""
         if n:
             self.lines.append(f"{n:,} {text}")
 
 
 @dataclass(frozen=True, eq=False)
 class SourceMesh:
-    """A foreign mesh in metres, z up, mended, before any of it is cut away."""
+    """A repaired foreign mesh in metres, z up, before clipping."""
 
-    bodies: list[RawNode]  # What stands there, and the skies around it; in the order of their places
+    bodies: list[RawNode]  # Bodies and sky domes, sorted by position
     domes: list[RawNode]
-    repairs: Repairs  # What was mended
+    repairs: Repairs  # Repairs so far
 
     @classmethod
     def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> SourceMesh:
-        """Turn, scale and mend the nodes of a file; errors as of `import_mesh`."""
+        """Reorient, scale and repair the nodes of a file; errors as in `import_mesh`."""
         check_options(up, scale)
         repairs = Repairs()
         bodies = [b for node in nodes for b in [_repair(_reorient(node, up, scale), repairs)] if len(b.faces)]
         if not bodies:
             raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
-        # Lines of repairs, too, must not depend on the order in which a reader gives the nodes.
+        # The repair lines must not depend on the reader's order of nodes.
         repairs.lines.sort()
         bodies = sort_by_position(bodies)
         table_names = [naming.from_table(b.name).category if naming else "" for b in bodies]
@@ -82,7 +82,7 @@ class SourceMesh:
 
     @property
     def low(self) -> Floats:
-        """Lower corner of what stands there, (3,) float64, metres."""
+        """Lower corner of the bodies, (3,) float64, metres."""
         return _bounds(self.bodies)[0]
 
     @property
@@ -91,7 +91,7 @@ class SourceMesh:
         return _bounds(self.bodies)[1]
 
     def within(self, region: Region) -> SourceMesh:
-        """Cut away what lies outside a region; AssetError where nothing is left, with what lies where."""
+        """Clip to a region; AssetError if nothing is left."""
         cut = [_repair(clip_node(b, region), Repairs()) for b in self.bodies]
         kept = [b for b in cut if len(b.faces)]
         if not kept:
@@ -100,7 +100,7 @@ class SourceMesh:
 
 
 def describe_extent(bodies: Sequence[RawNode]) -> str:
-    """Say the ranges of x and y of bodies, and about where most of their triangles lie."""
+    """Describe the x and y ranges of bodies, and where most triangles are."""
     low, high = _bounds(bodies)
     middles = np.concatenate([b.vertices[b.faces].mean(axis=1)[:, :2] for b in bodies])
     cell = max(float((high - low)[:2].max()) / 10, 1e-9)
@@ -113,12 +113,12 @@ def describe_extent(bodies: Sequence[RawNode]) -> str:
 
 
 def size_text(size: Floats) -> str:
-    """Write lengths in metres, three digits of small ones: ``"1,250 by 84.5 by 12 m"``."""
+    """Format lengths in metres, small ones with three digits: ``"1,250 by 84.5 by 12 m"``."""
     return f"{' by '.join(f'{s:,.0f}' if s >= 99.95 else f'{s:.3g}' for s in size.tolist())} m"
 
 
 def check_options(up: str | None, scale: float | None, light: str = "auto") -> None:
-    """Refuse what says of no mesh how it lies: a `UsageError`, before any mesh is read."""
+    """Raise a `UsageError` for invalid options, before any mesh is read."""
     if up not in (None, "y", "z"):
         raise UsageError(f"--up {up[:20]!r}: must be z or y, the mesh's axis that points up")
     if scale is not None and not (math.isfinite(scale) and scale > 0):
@@ -139,10 +139,7 @@ def import_mesh(
     naming: Naming | None = None,
     light: str = "auto",
 ) -> tuple[Scene, Repairs]:
-    """Make a scene of a foreign mesh, its origin in the middle at the ground.
-
-    Returns the scene and what was repaired.
-    """
+    """Make a scene of a foreign mesh, with its origin at the centre on the ground; returns the scene and repairs."""
     source = SourceMesh.of(nodes, up, scale, naming)
     return make_scene(name, source, make_region(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
 
@@ -150,7 +147,7 @@ def import_mesh(
 def make_region(
     crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
 ) -> Region | None:
-    """Return the part that is kept; UsageError for two of them, or one without an area."""
+    """Return the region to keep; UsageError if both are given, or one without area."""
     if crop_m is not None and box_m is not None:
         raise UsageError("--crop and --box are mutually exclusive")
     numbers = crop_m or box_m or ()
@@ -177,7 +174,7 @@ def make_scene(
     origin_m: Floats | None = None,
     light: str = "auto",
 ) -> tuple[Scene, Repairs]:
-    """Make a scene of a place, or of the part of it in `region`; returns the scene and what was repaired."""
+    """Make a scene of a mesh, or of the part in `region`; returns the scene and repairs."""
     check_options(None, None, light)
     repairs = Repairs(list(source.repairs.lines))
     part = source if region is None else source.within(region)
@@ -217,7 +214,7 @@ def make_scene(
         [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
     )
     if region is not None:
-        # What is cut open at the border is shut by the end of the flight volume.
+        # Bodies cut open at the border are closed by the end of the flight volume.
         bounds[0, :2] = np.maximum(bounds[0, :2], region.low - shift[:2])
         bounds[1, :2] = np.minimum(bounds[1, :2], region.high - shift[:2])
     scene = classify_surfaces(
@@ -239,7 +236,7 @@ def _reorient(node: RawNode, up: str, scale: float) -> RawNode:
 
 
 def _repair(node: RawNode, repairs: Repairs) -> RawNode:
-    """Drop faces that are no triangles of finite size; weld vertices, so that neighbours are known."""
+    """Drop invalid and degenerate faces; weld vertices."""
     faces = node.faces
     inside = ((faces >= 0) & (faces < len(node.vertices))).all(axis=1)
     finite = np.asarray(np.isfinite(node.vertices).all(axis=1) & (np.abs(node.vertices) < 1e7).all(axis=1))
@@ -284,7 +281,7 @@ def _check_extent(size: Floats, bodies: Sequence[RawNode]) -> None:
 
 
 def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
-    """Make one body of all that is too small to be a thing of its own."""
+    """Merge bodies that are too small to be separate things."""
     size = np.array([np.linalg.norm(b.vertices.max(axis=0) - b.vertices.min(axis=0)) for b in bodies])
     small = (size < _CLUTTER_M) & np.array([not b.name for b in bodies])
     if len(bodies) - small.sum() > _MAX_INSTANCES:
@@ -296,7 +293,7 @@ def _merged_clutter(bodies: list[RawNode]) -> list[RawNode]:
 
 
 def _parts(body: RawNode, builder: MaterialBuilder, repairs: Repairs) -> tuple[Part, ...]:
-    """Make parts by material; a closed body faces outwards, an open one is there from both sides."""
+    """Make parts by material; closed bodies face outwards, open ones are double-sided."""
     mesh = trimesh.Trimesh(body.vertices, body.faces, process=False)
     closed = mesh.is_watertight and mesh.is_winding_consistent
     if closed and mesh.volume < 0:
@@ -307,7 +304,7 @@ def _parts(body: RawNode, builder: MaterialBuilder, repairs: Repairs) -> tuple[P
 
 
 def _report_textures(bodies: Sequence[RawNode], builder: MaterialBuilder, light: str, repairs: Repairs) -> None:
-    """Say what became of the textures."""
+    """Report how textures are used."""
     shown = [m for m in builder.materials.values() if m.texture is not None]
     if shown:
         sizes = {m.name.split(",")[0]: m.texture.shape[:2] for m in shown if m.texture is not None}
@@ -324,7 +321,7 @@ def _report_textures(bodies: Sequence[RawNode], builder: MaterialBuilder, light:
 def _make_instances(
     bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
 ) -> list[Instance]:
-    """Give every body a node name, a category from it, and what can be said of its colour, height and form."""
+    """Give each body a node name, a category, and attributes of colour, size and shape."""
     counts: dict[str, int] = {}
     heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
     tall, low = (float(np.quantile(heights, q)) for q in (0.8, 0.2)) if heights else (0.0, 0.0)
@@ -344,7 +341,7 @@ def _make_instances(
 
 
 def _is_terrain(body: RawNode, extent: Floats) -> bool:
-    """Whether a body is what the others stand on: as wide as half the place, uneven, and level rather than steep."""
+    """Whether a body is terrain: as wide as half the mesh, uneven, and more level than steep."""
     size = np.ptp(body.vertices, axis=0)
     if (size[:2] < 0.5 * extent[:2]).any() or not 0.05 * size[:2].max() <= size[2] < 0.25 * size[:2].min():
         return False
@@ -355,14 +352,14 @@ def _is_terrain(body: RawNode, extent: Floats) -> bool:
 
 
 def _category(body: RawNode) -> str:
-    """The category of a body whose name tells nothing: flat and wide is no thing to look for."""
+    """Category of a body without a meaningful name: flat and wide ones are never targets."""
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
     flat = size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0)
     return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
 
 
 def _shape_attributes(body: RawNode, appearance: dict[str, str]) -> dict[str, str]:
-    """Say the form of what has no name, as nothing else tells it from others: each has one, and a size."""
+    """Describe the shape of an unnamed body, which has no other distinction."""
     size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
     outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
     if outline.area < 1e-6:
@@ -375,7 +372,7 @@ def _shape_attributes(body: RawNode, appearance: dict[str, str]) -> dict[str, st
     elif long > 1.15 * short:
         plan = "oblong" if filled > 0.9 else "irregular"
     else:
-        # A disc fills 0.785 of the square around it, an octagon 0.828.
+        # A disc fills 0.785 of its bounding square, an octagon 0.828.
         plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
     rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
     return {"size": appearance.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
@@ -396,7 +393,7 @@ def _appearance(
 
 
 def _ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
-    """Share of a grid of plumb lines that meet the mesh."""
+    """Share of a grid of vertical rays that hit the mesh."""
     from aerialdojo_gen.geometry.rays import RayCaster
 
     scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
@@ -413,7 +410,7 @@ def _ground_plane(low: Floats, high: Floats, materials: dict[str, Material]) -> 
     x0, y0, x1, y1 = low[0] - 4 * _MARGIN_M, low[1] - 4 * _MARGIN_M, high[0] + 4 * _MARGIN_M, high[1] + 4 * _MARGIN_M
     spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
     materials.setdefault(spec, Material(spec, _GROUND))
-    # Just under the lowest point, where a floor of the mesh may lie.
+    # Just below the lowest point, where the mesh may have a floor.
     z = low[2] - 0.02
     vertices = single(np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]))
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)

@@ -1,4 +1,4 @@
-"""What a mesh file holds, told before anything is made of it: bodies, ranges, guesses of axis and scale."""
+"""Describe a mesh file before importing it: bodies, ranges, guesses of axis and scale."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from aerialdojo_gen.scenes.mesh import areas
 
 Floats = NDArray[np.float64]
 
-# Metres of a unit that programs export in, and what they are called, the likelier before the rarer.
+# Metres per unit, likeliest first.
 _UNITS = ((1.0, "metres"), (0.01, "centimetres"), (0.001, "millimetres"), (0.3048, "feet"), (0.0254, "inches"))
-# A place that is flown in is so wide, and so high.
+# Plausible width and height of a scene.
 _WIDE_M, _HIGH_M = (15.0, 5000.0), (1.5, 400.0)
 _SURE = 1.3
 _FLAT = 0.95
@@ -28,15 +28,15 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class Guess:
-    """What a file's form suggests."""
+    """Axis and units that a file's shape suggests."""
 
-    up: str  # The axis along which more of the surface is level
-    up_sure: bool  # Whether it is so by much
+    up: str  # The axis along which more surface is level
+    up_sure: bool  # Whether the difference is large
     units: tuple[tuple[float, str], ...]  # tuple of (float, str)
 
 
 def guess(nodes: Sequence[RawNode]) -> Guess:
-    """Guess the axis that points up, and the unit, of what a file holds."""
+    """Guess the up axis and the unit of a mesh."""
     level = np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for node in nodes:
@@ -47,12 +47,12 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = np.linalg.norm(normal, axis=1)
         for k in range(3):
-            # A sheet of hills is level in parts alone: the area in plan counts.
+            # Hills are only partly level: use the projected area.
             steep = np.abs(normal[:, k]) < 0.3 * area
             level[k] += np.abs(normal[~steep, k]).sum()
         low, high = np.minimum(low, corners.min(axis=(0, 1))), np.maximum(high, corners.max(axis=(0, 1)))
     size = np.where(np.isfinite(high - low), high - low, 0.0)
-    # Places are wider than high: the shorter of the two axes is the likelier one.
+    # Scenes are wider than high: prefer the shorter axis.
     weight = [level[k] / max(float(size[k]), 1e-9) ** 0.5 for k in (1, 2)]
     up = "y" if weight[0] > weight[1] else "z"
     sure = max(weight) >= _SURE * min(weight)
@@ -67,13 +67,13 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
 
 
 def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming | None) -> Guess:
-    """Guess by what stands within sky domes, whose form tells neither axis nor scale of the place."""
+    """Guess without sky domes, whose shape hides axis and scale."""
     guessed = guess(nodes)
     for up in (guessed.up, "z" if guessed.up == "y" else "y"):
         taken = scale or guessed.units[0][0]
         source = SourceMesh.of(nodes, up, taken, naming)
         if source.domes:
-            # Back into the file's axes and unit.
+            # Convert back to the file's axes and unit.
             v = [b.vertices / taken for b in source.bodies]
             own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
             return guess([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
@@ -88,7 +88,7 @@ def describe_mesh(
     naming: Naming | None = None,
     width: int | None = None,
 ) -> list[str]:
-    """Say what a file holds, in lines for a terminal."""
+    """Describe the content of a file, in lines for a terminal."""
     guessed = _guess_within_domes(nodes, scale, naming)
     taken_up, taken_scale = up or guessed.up, scale or guessed.units[0][0]
     source = SourceMesh.of(nodes, taken_up, taken_scale, naming)

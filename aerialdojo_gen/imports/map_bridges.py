@@ -1,7 +1,7 @@
-"""Bridges of a map: which ways cross together, how high their deck is, and how far their ramps reach.
+"""Bridges of a map: grouping of ways, height of the deck, length of the ramps.
 
-OpenStreetMap says that a way is on a bridge, and over what; not how high. So the deck rises as far as what passes
-below needs, along the approaches as far as nothing joins them, the rest along the bridge itself.
+OpenStreetMap says that a way is on a bridge, not how high. The deck is as high as the clearance below requires; the
+ramps use the approaches up to the first junction, and the rest of the climb is on the bridge.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from aerialdojo_gen.imports.map_tags import Tags, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
 BRIDGE = "aerialdojo:bridge"
-"""Tag of what lies on a bridge: the bridge's index."""
+"""Tag with the index of the bridge that a way lies on."""
 
 _RAILS = ("rail", "tram", "light_rail", "narrow_gauge", "subway")
 _PATHS = ("footway", "path", "cycleway", "steps", "bridleway", "pedestrian")
-# Free height over what passes below, metres.
+# Required clearance above what passes below, metres.
 _CLEAR_M = {"rail": 5.5, "road": 4.7, "water": 3.2, "path": 2.8, "": 2.8}
 _DEPTH_M = {"rail": 1.0, "road": 0.8, "path": 0.45}
-# What a ramp climbs a metre where it has room, and where it has none.
+# Ramp grades: usual, and maximum where there is no room.
 _GRADE = {"rail": (0.03, 0.08), "road": (0.06, 0.14), "path": (0.1, 0.2)}
 _MAX_OFFSET_M, _ALONG = 14.0, math.cos(math.radians(30.0))
 _MAX_RAMP_M = 120.0
@@ -42,12 +42,12 @@ Cut = tuple[Feature, list[tuple[LineString, bool]]]
 
 @dataclass(frozen=True)
 class Bridge:
-    """A deck for one way or several side by side, with its ramps."""
+    """A deck for one or several parallel ways, with its ramps."""
 
-    axis: LineString  # Middle line from ramp's foot to ramp's foot, metres
+    axis: LineString  # Centre line between the feet of the ramps, metres
     heights_m: tuple[float, ...]
-    span_m: tuple[float, float]  # (from, to); what of the axis is bridge; the rest is ramp, metres along it
-    kind: str  # ``"rail"``, ``"road"`` or ``"path"``: the heaviest that it bears
+    span_m: tuple[float, float]  # (from, to) along the axis, metres: the bridge itself; the rest is ramp
+    kind: str  # ``"rail"``, ``"road"`` or ``"path"``: the heaviest traffic
     layer: int  # As mapped
     members: tuple[Feature, ...]  # Ways on the bridge itself
 
@@ -57,7 +57,7 @@ class Bridge:
         return float(np.interp(s, np.linspace(0.0, self.axis.length, len(self.heights_m)), self.heights_m))
 
     def to_recipe(self) -> dict[str, Any]:
-        """Make the recipe's table."""
+        """Return the bridge as a table of the recipe."""
         at = np.linspace(0.0, self.axis.length, len(self.heights_m))
         name = next((f.tags["name"] for f in self.members if f.tags.get("name")), "")[:80]
         points = [self.axis.interpolate(s) for s in at]
@@ -73,7 +73,7 @@ class Bridge:
 def bridges(
     lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, summary: MapSummary
 ) -> tuple[list[Bridge], list[Feature]]:
-    """Find the bridges (metres) that touch the site, lowest first, and cut the lines that lie on them."""
+    """Find the bridges that touch the site, lowest first, and split the lines on them."""
     ways = [f for f in lines if _kind(f.tags) and isinstance(f.shape, LineString) and not below_ground(f.tags)]
     net = _RoadNetwork(ways)
     out: list[Bridge] = []
@@ -121,7 +121,7 @@ def _at(point: Sequence[float]) -> At:
 
 
 class _RoadNetwork:
-    """Which ways meet at which points."""
+    """The graph of ways and the points at which they meet."""
 
     def __init__(self, ways: Sequence[Feature]) -> None:
         self._meet: dict[At, list[Feature]] = {}
@@ -130,10 +130,7 @@ class _RoadNetwork:
                 self._meet.setdefault(at, []).append(way)
 
     def approach(self, way: Feature, end: At, most_m: float) -> list[tuple[Feature, list[At]]]:
-        """Follow a way beyond its end, as far as only ways of its kind go on, one from the next.
-
-        Returns the ways with their points from the bridge on; what is joined by another ends there.
-        """
+        """Follow ways of the same kind beyond a way's end, up to the first junction; returns ways with points."""
         out: list[tuple[Feature, list[At]]] = []
         length = 0.0
         while length < most_m:
@@ -155,7 +152,7 @@ class _RoadNetwork:
 
 
 def _clusters(ways: Sequence[Feature]) -> list[tuple[Feature, ...]]:
-    """Group what crosses together: ways of one layer, one after the other or side by side."""
+    """Group ways that share a bridge: same layer, consecutive or parallel."""
     ways = sorted(ways, key=lambda f: (_layer(f.tags), f.key, sorted(f.tags.items())))
     group = list(range(len(ways)))
 
@@ -183,7 +180,7 @@ def _same_bridge(a: LineString, b: LineString) -> bool:
     if lengths < 1e-6 or abs(float(u @ v)) < _ALONG * lengths:
         return False
     ends = {_at(a.coords[0]), _at(a.coords[-1])} & {_at(b.coords[0]), _at(b.coords[-1])}
-    # Side by side, not two bridges one behind the other.
+    # Parallel, not two bridges in a row.
     across = np.array([-u[1], u[0]]) / np.hypot(*u)
     along = u / np.hypot(*u)
     p, q = (np.asarray(line.coords)[:, :2] @ along for line in (a, b))
@@ -193,7 +190,7 @@ def _same_bridge(a: LineString, b: LineString) -> bool:
 
 
 def _merged(members: Sequence[Feature]) -> LineString:
-    """Take the longest line of the heaviest kind, from west to east (or south to north)."""
+    """Return the longest line of the heaviest kind, from west to east (or south to north)."""
     kind = _heaviest(members)
     whole = linemerge([f.shape for f in members if _kind(f.tags) == kind])
     line = max(getattr(whole, "geoms", [whole]), key=lambda one: (round(one.length, 3), one.coords[0]))
@@ -212,7 +209,7 @@ def _build_bridge(
     usual, most = _GRADE[kind]
     needs = _required_rises(members, core, kind, lines, areas, ground, lower)
     rise = max(need for _, need in needs)
-    # Ramps of all ways of a side end together, so that none of them ends in a step.
+    # All ramps of a side end together, so that there are no steps.
     ends = [[(f, e) for f, e in _ends(members) if (core.project(Point(e)) > core.length / 2) == far]
             for far in (False, True)]  # fmt: skip
     room, runs = [0.0, 0.0], [[], []]  # type: tuple[list[float], list[list[Any]]]
@@ -242,7 +239,7 @@ def _build_bridge(
 
 
 def _ends(members: Sequence[Feature]) -> list[tuple[Feature, At]]:
-    """List the ends that no other way of the bridge goes on from."""
+    """List the outer ends of a bridge's ways."""
     count = Counter(e for f in members for e in {_at(f.shape.coords[0]), _at(f.shape.coords[-1])})
     return [(f, e) for f in members for e in (_at(f.shape.coords[0]), _at(f.shape.coords[-1])) if count[e] == 1]
 
@@ -251,7 +248,7 @@ def _required_rises(
     members: Sequence[Feature], core: LineString, kind: str, lines: Sequence[Feature], areas: Sequence[Feature],
     ground: Ground, lower: Sequence[Bridge],
 ) -> list[tuple[float, float]]:  # fmt: skip
-    """List where along the core something passes below, and how far over the line of its ends the road is to be."""
+    """List positions along the core where something passes below, and the required height above its end line."""
     first, last = (ground(*core.coords[k][:2]) for k in (0, -1))
     own = {id(f) for f in members}
     out = []
@@ -284,7 +281,7 @@ def _required_rises(
 
 
 def _axis(core: LineString, runs: Sequence[Sequence[Any]], ramp: Sequence[float], kind: str) -> LineString:
-    """Lengthen the core by its own approaches."""
+    """Extend the core by its approaches."""
     points = [tuple(p[:2]) for p in core.coords]
     for side in (0, 1):
         if ramp[side] < 0.5:
@@ -304,7 +301,7 @@ def _join_points(run: Sequence[tuple[Feature, list[At]]]) -> list[At]:
 
 
 def _split_ways(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[Cut]:
-    """Cut the ways of an approach where its ramp ends: each with its pieces, and whether they are on the ramp."""
+    """Split the approach's ways at the ramp's end: pieces, and whether they are on the ramp."""
     out: list[Cut] = []
     done = 0.0
     for way, points in run:
@@ -317,19 +314,19 @@ def _split_ways(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[
         pieces = [(substring(line, 0.0, up), True)]
         if line.length - up > 0.5:
             pieces.append((substring(line, up, line.length), False))
-        # Lanes and one-way streets run as the way does.
+        # Keep the way's direction, for lanes and one-way streets.
         back = line is not way.shape
         out.append((way, [(LineString(p.coords[::-1]) if back else p, on) for p, on in pieces]))
     return out
 
 
 def _smooth(at: Any, heights: Any, beyond: Sequence[bool]) -> Any:
-    """Round crest and feet by a moving average; an end on the ground stays there."""
+    """Smooth the profile by a moving average; ends on the ground stay there."""
     near = np.abs(at[:, None] - at[None, :]) <= _ROUND_M / 2
     out = (near * heights[None, :]).sum(axis=1) / near.sum(axis=1)
     for end, free in ((0, beyond[0]), (-1, beyond[1])):
         if not free:
-            # From the first station in which the average is whole, straight down.
+            # Linear from the first full window of the average to the end.
             inner = np.flatnonzero(at - at[0] >= _ROUND_M / 2)[0] if end == 0 else np.flatnonzero(
                 at[-1] - at >= _ROUND_M / 2)[-1]  # fmt: skip
             rows = slice(0, inner + 1) if end == 0 else slice(inner, len(at))
@@ -339,7 +336,7 @@ def _smooth(at: Any, heights: Any, beyond: Sequence[bool]) -> Any:
 
 
 def _level(bridge: Bridge, ground: Ground) -> bool:
-    """Whether the ground below follows the deck: there is nothing to bridge."""
+    """Whether the ground follows the deck, so that there is nothing to bridge."""
     a, b = (ground(*bridge.axis.coords[k][:2]) for k in (0, -1))
     for share in np.linspace(0.0, 1.0, 9):
         p = bridge.axis.interpolate(share, normalized=True)

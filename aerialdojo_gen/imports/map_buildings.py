@@ -1,4 +1,4 @@
-"""Buildings of a map: what they are, how high, under which roof, behind which façade."""
+"""Buildings of a map: category, height, roof, façade."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ STOREY_M = 3.2
 _ROOF_LEVEL_M = 2.4
 _LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
 _LEAST_HOLE_M2 = 1.0
-# A recipe takes rings of 1,000.
+# Recipes allow 1,000 points per ring.
 _MOST_POINTS = 900
 _LEFT_OUT = "outlines left out: self-intersecting or with too many corners"
 _PITCH = 0.62
 _MOST_RISE_M = 5.0
-# Of a building's ground: where its parts take more, its outline has nothing to add.
+# If the parts cover more than this share of a building, its outline adds nothing.
 _PARTED = 0.85
 _SHOP_NEAR_M = 2.5
 
@@ -79,23 +79,23 @@ _ROOFS = {
 
 @dataclass
 class MapSummary:
-    """What was made of the map, for the user to read: how often, by what."""
+    """Counts of what was made of the map, for the user."""
 
     counts: Counter[str] = field(default_factory=Counter)
 
     def add(self, what: str, n: int = 1) -> None:
-        """Count a thing."""
+        """Count an item."""
         self.counts[what] += n
 
 
 def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> list[Polygon]:
-    """Simplify an area, and round it to centimetres; count what is left out as it crosses itself then."""
+    """Simplify an area and round it to centimetres; count what becomes invalid."""
     out = []
     for piece in polygons_of(shape):
         plan = piece.simplify(tolerance_m)
         rounded = [_to_centimetres(plan)]
         if not rounded[0].is_valid:
-            # By GEOS's noding, which gives whole centimetres: rounding its result again changes nothing.
+            # GEOS snaps to whole centimetres, so that rounding again changes nothing.
             rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
         valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MOST_POINTS]
         if len(valid) < len(rounded):
@@ -105,7 +105,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> li
 
 
 def rings_of(plan: Polygon) -> dict[str, Any]:
-    """Return the keys of a recipe that have an area: `outline`, and `holes` where there are any."""
+    """Return the recipe keys of an area: `outline`, and `holes` if any."""
     outline, *holes = ([list(at) for at in ring.coords[:-1]] for ring in (plan.exterior, *plan.interiors))
     return {"outline": outline, **({"holes": holes} if holes else {})}
 
@@ -129,7 +129,7 @@ def buildings(
     taken: list[BaseGeometry] = []
     shop_points = shapely.union_all(list(shops)) if shops else None
     out = []
-    # A passage or a wing that was drawn over its house is cut out of the larger one.
+    # Overlapping outlines are cut out of the larger building.
     for area in sorted(outlines, key=lambda a: (a.shape.area, a.key)):
         own = [parts[k] for k in sorted(tree.query(area.shape, predicate="contains"))]
         plan = area.shape.difference(shapely.union_all(taken)) if taken else area.shape
@@ -150,14 +150,14 @@ def buildings(
 
 
 def _inherited(whole: Feature, part: Feature) -> Feature:
-    """A part is of its building's material, kind and colour unless it says otherwise; heights are its own."""
+    """Return a part with its building's tags as defaults, except for heights."""
     own = ("height", "building:levels", "roof:", "min_height", "building:min_level")
     given = {k: v for k, v in whole.tags.items() if not k.startswith(own)}
     return Feature(part.key, part.shape, given | dict(part.tags))
 
 
 def category(tags: Tags) -> str:
-    """What a building is, by its own kind or by what is in it."""
+    """Return the category of a building, by its kind or its use."""
     for key in ("building", "amenity", "tourism", "shop", "office", "building:use"):
         value = tags.get(key, "")
         if value in _CATEGORY:
@@ -204,7 +204,7 @@ def _bodies(
 
 
 def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | None) -> tuple[float, float, str, float]:
-    """Base, top, roof's form and rise, metres over the ground."""
+    """Base, top, roof shape and roof rise, metres above ground."""
     tags, kind = area.tags, category(area.tags)
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
     if levels is None:
@@ -215,7 +215,7 @@ def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | Non
     if summary is not None:
         summary.add("height" if height else "levels" if levels else "rule")
     form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
-    # A roof's slope is as long as half its narrower side.
+    # The roof slope spans half the narrower side.
     half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)
     rise = metres(tags, "roof:height")
     if rise is None:
@@ -244,7 +244,7 @@ def _usual_roof(area: Feature, kind: str, levels: int) -> str:
 
 
 def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
-    """Material of the walls, and their colour in a word, empty where glass is most of it."""
+    """Material of the walls, and their colour word, empty for glass."""
     tags = area.tags
     given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
     paint = given or _PLASTER[_pick(area, "plaster", len(_PLASTER))]
@@ -284,5 +284,5 @@ def _roofing(area: Feature, pitched: bool, kind: str) -> str:
 
 
 def _pick(area: Feature, what: str, n: int) -> int:
-    """Draw by the place of the building: no other building, no id and no bounding box changes it."""
+    """Choose by the building's position alone: independent of ids, other buildings and the bounding box."""
     return rank(0, "add-map", area.key, what) % n

@@ -18,7 +18,7 @@ _SPACING_M = 0.06
 _PARKED = ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
 _LANE_M, _PARKED_M = 3.2, 2.2
 _LEAST_AREA_M2 = 2.0
-# Kind, width without lanes, lanes, pavement: what a street of this class has if its tags do not say.
+# Kind, width without lanes, lanes, pavement: defaults by street class.
 _CLASSES: dict[str, tuple[str, float, int, float]] = {
     "motorway": ("main", 12.0, 3, 0.0), "trunk": ("main", 10.0, 3, 2.0), "primary": ("main", 10.0, 3, 3.0),
     "secondary": ("main", 8.0, 2, 2.8), "tertiary": ("main", 7.5, 2, 2.5), "unclassified": ("side", 6.5, 2, 2.2),
@@ -31,7 +31,7 @@ _PATH_SURFACE = {
     "cycleway": "asphalt:#7d5a50", "footway": "paving:#b1aaa0", "pedestrian": "paving:#b5aca0",
     "path": "gravel:#b0a38a", "steps": "concrete:#9b9890", "bridleway": "dirt",
 }  # fmt: skip
-# Material, what grows, by key and value.
+# Material and vegetation by key and value.
 _AREAS: dict[str, dict[str, tuple[str, str]]] = {
     "landuse": {
         "grass": ("grass", ""), "village_green": ("grass", "park"), "recreation_ground": ("grass", "park"),
@@ -75,7 +75,7 @@ def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> l
             summary.add("ways in tunnels or below ground left out")
             continue
         if BRIDGE in feature.tags:
-            # Nobody parks on a bridge.
+            # No parking on bridges.
             made = {k: v for k, v in made.items() if k != "parking"} | {"bridge": int(feature.tags[BRIDGE])}
         for line in clipped(feature.shape, window):
             out.append({**made, "line": line})
@@ -84,7 +84,7 @@ def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> l
 
 
 def clipped(shape: BaseGeometry, window: Polygon) -> list[list[list[float]]]:
-    """Clip a line, and round it to centimetres without points that fall together."""
+    """Clip a line and round it to centimetres, without coincident points."""
     inner = shape.intersection(window)
     out = []
     for part in getattr(inner, "geoms", [inner]):
@@ -147,7 +147,7 @@ def _parks(tags: Tags, *, by_rule: bool) -> bool:
 
 
 def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[list[float]]]:
-    """Make the tracks that lie in the open, on the ground or on the bridge of a number."""
+    """Make the tracks in the open, on the ground or on bridge `on`."""
     kinds = ("tram", "rail", "light_rail", "narrow_gauge")
     open_ = (f for f in lines if f.tags.get("railway") in kinds and not below_ground(f.tags))
     return [line for f in open_ if f.tags.get(BRIDGE, "") == on for line in clipped(f.shape, window)]
@@ -156,7 +156,7 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 def areas(
     found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: MapSummary
 ) -> list[dict[str, Any]]:
-    """Make the recipe's areas: the larger before the smaller, water over land."""
+    """Make the recipe's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
     for feature in found:
         rule = _ground(feature.tags)
@@ -198,7 +198,7 @@ def _areas(
 
 
 def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:
-    """What lies to the right of coastlines: so OpenStreetMap tells the sea."""
+    """Return the sea: what lies to the right of coastlines in OpenStreetMap."""
     coasts = [f.shape for f in lines if f.tags.get("natural") == "coastline" and f.shape.intersects(window)]
     if not coasts:
         return []

@@ -1,4 +1,4 @@
-"""From a map to a town's recipe."""
+"""Convert map data to the recipe of a town."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.layouts.places.parts.heights import Heights as HeightTable
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
-# Streets run on a little beyond the border, so that their ends are not seen.
+# Streets extend beyond the border, to hide their ends.
 _BEYOND_M = 15.0
 _HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0
-# Where so much of the ground is built on it is paved between.
+# Built-up share above which the ground is paved.
 _PAVED = 0.12
 _MAX_ITEMS = 1000
 
@@ -35,7 +35,7 @@ def town_recipe(
     heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
     extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
 ) -> tuple[str, MapSummary]:  # fmt: skip
-    """Write the recipe of a town from map data; the middle of the bounding box (degrees) is the origin."""
+    """Write the recipe of a town; its origin is the centre of the bounding box (degrees)."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
     if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
         raise UsageError(
@@ -124,7 +124,7 @@ def _make_valid(shape: Any) -> Any:
     if shape.is_valid:
         return shape
     made = shapely.make_valid(shape)
-    # Of an area, the lines that are left of what crosses itself are no part: overlays refuse what is mixed.
+    # Repairing an area may leave lines, which overlays do not accept.
     return shapely.MultiPolygon(polygons_of(made)) if shape.geom_type.endswith("Polygon") else made
 
 

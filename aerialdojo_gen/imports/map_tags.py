@@ -1,4 +1,4 @@
-"""What OpenStreetMap's tags say in numbers and colours: heights, levels, widths, materials."""
+"""Numbers and colours from OpenStreetMap tags: heights, levels, widths, materials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FOOT_M = 0.3048
 
 
 def metres(tags: Tags, *keys: str) -> float | None:
-    """Read a length, metres or feet, by the first key that holds one; None where none does."""
+    """Read a length in metres or feet by the first key that has one; None if none has."""
     for key in keys:
         match = _NUMBER.fullmatch(tags.get(key, "").replace(",", "."))
         if match:
@@ -28,7 +28,7 @@ def metres(tags: Tags, *keys: str) -> float | None:
 
 
 def bearing_deg(tags: Tags, *keys: str) -> float | None:
-    """Read a compass bearing, degrees from north or one of 16 points; None where none of the keys holds one."""
+    """Read a bearing, degrees from north or one of 16 compass points; None if no key has one."""
     for key in keys:
         text = tags.get(key, "").strip().upper().removesuffix("°")
         if text in _POINTS:
@@ -39,13 +39,13 @@ def bearing_deg(tags: Tags, *keys: str) -> float | None:
 
 
 def count(tags: Tags, *keys: str) -> int | None:
-    """Read a whole number above 0, rounded; None where none of the keys holds one."""
+    """Read a whole number above 0, rounded; None if no key has one."""
     found = metres(tags, *keys)
     return None if found is None else max(round(found), 1)
 
 
 def colour(tags: Tags, *keys: str) -> str:
-    """Read a colour as ``"#rrggbb"``; empty where there is none."""
+    """Read a colour as ``"#rrggbb"``; empty if there is none."""
     for key in keys:
         text = tags.get(key, "").strip().lower().replace(" ", "").replace("_", "")
         text = str(CSS4_COLORS.get(text, text)).lower()
@@ -55,7 +55,7 @@ def colour(tags: Tags, *keys: str) -> str:
 
 
 def below_ground(tags: Tags) -> bool:
-    """Whether a thing lies in a tunnel, under the ground or indoors."""
+    """Whether a thing is in a tunnel, underground or indoors."""
     tunnel = tags.get("tunnel", "no") not in ("no", "building_passage", "avalanche_protector")
     layer = tags.get("layer", "0")
     under = layer.startswith("-") or tags.get("location") in ("underground", "indoor")

@@ -1,4 +1,4 @@
-"""Things of a map that the catalogue has: trees, benches, lamps, stops, statues."""
+"""Objects of a map that the catalogue has: trees, benches, lamps, stops, statues."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_tags import Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
-# By key and value. What is listed first counts.
+# By key and value; the first match counts.
 _THINGS: dict[str, dict[str, str]] = {
     "natural": {"tree": "urban_tree", "shrub": "bush", "stone": "boulder"},
     "highway": {"street_lamp": "street_lamp", "bus_stop": "bus_shelter", "stop": "stop_sign"},
@@ -81,18 +81,18 @@ def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[
 
 
 def shop_points(points: Sequence[Feature], areas: Sequence[Feature]) -> list[BaseGeometry]:
-    """Where shops, cafés and the like are, metres."""
+    """Positions of shops, cafés and the like, metres."""
     return [f.shape.representative_point() for f in (*points, *areas)
             if "shop" in f.tags or f.tags.get("amenity") in _SHOPS]  # fmt: skip
 
 
 def crossings(points: Sequence[Feature], site: Polygon) -> list[list[float]]:
-    """Where streets are crossed on stripes."""
+    """Positions of marked crossings."""
     return [_at(f.shape) for f in points if site.contains(f.shape) and _striped(f.tags)]
 
 
 def signals(points: Sequence[Feature], site: Polygon) -> list[list[float]]:
-    """Where traffic lights are."""
+    """Positions of traffic lights."""
     kinds = ("highway", "crossing")
     return [_at(f.shape) for f in points if site.contains(f.shape)
             and any(f.tags.get(key) == "traffic_signals" for key in kinds)]  # fmt: skip
@@ -144,7 +144,7 @@ def _along(line: BaseGeometry, spacing_m: float) -> list[Point]:
 
 
 def _move_before_wall(point: Point, built: BaseGeometry, thick_m: float = 1.5, out_m: float = 1.0) -> Point | None:
-    """Where a thing stands that was drawn in a wall or on one: before it; None where it is well inside."""
+    """Move a point in or on a wall to just outside it; None if it is well inside."""
     if built.is_empty or not built.intersects(point.buffer(0.3)):
         return point
     ring = built.boundary

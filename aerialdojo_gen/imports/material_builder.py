@@ -1,4 +1,4 @@
-"""From the look of a foreign mesh's faces to parts and materials of a scene."""
+"""Convert the appearance of a foreign mesh's faces to parts and materials of a scene."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
-# What lights textures: what suits them, the scene's sun, or nothing, as their light is in them.
+# Lighting of textures: automatic, by the scene's sun, or none because it is baked in.
 LIGHTS = ("auto", "sun", "baked")
 
-# A thing with more plain colours than this is painted vertex by vertex, and no longer part by part.
+# Bodies with more plain colours use vertex colours instead of one part per colour.
 _MAX_PLAIN = 64
-# More colours than this are those of a photograph.
+# More vertex colours than this suggest a photograph.
 _MAX_PAINTED = 256
-# A texture that covers itself more often than this is a pattern, and no picture of a place (a box has six sides).
+# Textures repeated more often are patterns, not photographs of the place (a box has six sides).
 _REPEATED = 8.0
 _MIXED = "vertex colours"
 
 
 @dataclass
 class MaterialBuilder:
-    """Makes parts, and the materials that they are of."""
+    """Makes parts and their materials."""
 
-    baked: bool = False  # Whether textures and vertex colours have their light in them
-    materials: dict[str, Material] = field(default_factory=dict)  # What has been used, by name
+    baked: bool = False  # Whether textures and vertex colours include lighting
+    materials: dict[str, Material] = field(default_factory=dict)  # Materials in use, by name
     _scales: dict[str, float] = field(default_factory=dict)
 
     def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
-        """Make a body's parts, one a material, in the order of the materials' names."""
+        """Make a body's parts, one per material, sorted by material name."""
         found: list[tuple[Material, Part]] = []
         kind = _face_kinds(body)
         plain = kind == _PLAIN
@@ -45,7 +45,7 @@ class MaterialBuilder:
             found += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
         painted = kind == _PAINTED
         if painted.any():
-            # White: vertex colours take its place, and where a program multiplies by both they stay what they are.
+            # White: vertex colours replace it, or are multiplied by it without effect.
             paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
             found += self._build_parts(body, painted, paint)
         for k in np.unique(kind[kind >= 0]):
@@ -53,7 +53,7 @@ class MaterialBuilder:
         return tuple(part for _, part in sorted(found, key=lambda pair: pair[0].name))
 
     def measure_texture_scales(self, nodes: Sequence[RawNode]) -> None:
-        """Find how many metres a texture's width stands for, over all that shows it; vertices are in metres."""
+        """Measure the metres that each texture's width covers, over all nodes that show it; vertices in metres."""
         world: dict[str, float] = {}
         flat: dict[str, float] = {}
         for node in nodes:
@@ -101,12 +101,12 @@ _PLAIN, _PAINTED = -1, -2
 
 
 def _face_kinds(body: RawNode) -> NDArray[np.int32]:
-    """Tell how each face is drawn: the index of its texture, or one of `_PLAIN` and `_PAINTED`."""
+    """Classify faces: the index of the texture, `_PLAIN` or `_PAINTED`."""
     n = len(body.faces)
     kind = np.full(n, _PLAIN, dtype=np.int32)
     if body.corners is not None:
         own = np.isfinite(body.corners[..., 2:]).all(axis=(1, 2))
-        # A face of one colour is no more than that colour, however its file tells it.
+        # A face of uniform colour is plain, however the file stores it.
         even = own & (np.ptp(np.nan_to_num(body.corners[..., 2:]), axis=1) < 1.0).all(axis=1)
         kind[own & ~even] = _PAINTED
         if (kind == _PAINTED).any():
@@ -122,7 +122,7 @@ def _face_kinds(body: RawNode) -> NDArray[np.int32]:
 
 
 def _painted(body: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Colours of faces' corners, (m, 3, 3), where they have none that of the face."""
+    """Corner colours of faces, (m, 3, 3), by default the face's colour."""
     face = np.repeat(body.colours[rows][:, None, :].astype(np.float32), 3, axis=1)
     if body.corners is None:
         return face
@@ -140,7 +140,7 @@ def _uv_areas(node: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
 def _split(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], corners: NDArray[np.float32] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.float32] | None]:
-    """Split vertices where what their corners carry jumps."""
+    """Split vertices at discontinuities of corner attributes."""
     used, flat = np.unique(faces, return_inverse=True)
     flat = flat.reshape(-1)
     if corners is None:
@@ -161,7 +161,7 @@ def _material_name(material: Material) -> str:
 
 
 def is_photographic(nodes: Sequence[RawNode]) -> bool:
-    """Guess whether most of a mesh shows photographs of the place, with their light in them, and no patterns."""
+    """Guess whether most of a mesh shows photographs with baked lighting rather than patterns."""
     whole = painted = 0.0
     shown: dict[str, float] = {}
     flat: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""What trimesh tells of a mesh's colours, materials and texture coordinates (OBJ with MTL, PLY, STL)."""
+"""Colours, materials and texture coordinates from trimesh (OBJ with MTL, PLY, STL)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from aerialdojo_gen.imports.untrusted import SiblingFiles
 
 @dataclass(frozen=True, eq=False)
 class FaceMaterials:
-    """What the faces of a mesh look like; see `aerialdojo_gen.imports.raw.RawNode`."""
+    """Appearance of a mesh's faces; see `aerialdojo_gen.imports.raw.RawNode`."""
 
     colours: NDArray[np.uint8]
     surface: NDArray[np.int32] | None
@@ -25,7 +25,7 @@ class FaceMaterials:
 
 
 def mesh_materials(bodies: Sequence[Any], siblings: SiblingFiles, texture_px: int) -> list[FaceMaterials]:
-    """Describe the materials of the meshes of one file."""
+    """Convert the materials of the meshes of one file."""
     materials: dict[int, Any] = {}
     for body in bodies:
         material = getattr(body.visual, "material", None)
@@ -65,7 +65,7 @@ def _face_materials(body: Any, place: dict[int, int], surfaces: tuple[RawSurface
 
 
 def _source_material(material: Any, maps: dict[str, dict[str, str]], siblings: SiblingFiles) -> SourceMaterial:
-    """Read a material of an MTL file, or of a PLY that names a picture."""
+    """Convert a material of an MTL file, or of a PLY with a texture."""
     name = str(getattr(material, "name", "") or "")
     textures = maps.get(name, {})
     file, missing = _read_texture(textures.get("map_kd", ""), siblings)
@@ -73,13 +73,13 @@ def _source_material(material: Any, maps: dict[str, dict[str, str]], siblings: S
         file = next(iter(siblings.loaded.values()), None)
     mask, _ = _read_texture(textures.get("map_d", ""), siblings)
     red, green, blue = (float(c) / 255.0 for c in np.asarray(material.main_color)[:3])
-    # Where there is a picture, writers leave any number as its colour, and few programs multiply by it.
+    # Writers leave arbitrary colours next to a texture, and few programs multiply by them.
     factor = (1.0, 1.0, 1.0) if file is not None else (red, green, blue)
     return SourceMaterial(name, factor, file, missing, alpha="blend" if mask is None else "mask", mask=mask)
 
 
 def _maps(siblings: SiblingFiles) -> dict[str, dict[str, str]]:
-    """Read which pictures the MTL files name, by material."""
+    """Read the texture files of each material from the MTL files."""
     out: dict[str, dict[str, str]] = {}
     for name, data in list(siblings.loaded.items()):
         own: dict[str, str] = {}

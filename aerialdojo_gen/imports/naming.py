@@ -1,4 +1,4 @@
-"""What a foreign node's name tells: words where it holds words, nothing where it holds ids; or a user's own table."""
+"""Names of foreign nodes: meaningful words, or the user's own table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.errors import AssetError, check_regular
 
-# Said by exporters and by people who name nothing, of whatever the thing is.
+# Words of exporters and defaults that mean nothing.
 _NOISE = frozenset({
     "api", "asset", "body", "box", "brep", "capsule", "circle", "clone", "col", "collada", "collider", "collision",
     "component", "cone", "copy", "cube", "curve", "cylinder", "default", "dummy", "dup", "duplicate", "elem",
@@ -27,7 +27,7 @@ _NOISE = frozenset({
     "temp", "test", "tmp", "torus", "transform", "tri", "triangle", "ucx", "undefined", "unknown", "unnamed",
     "untitled", "uuid", "uv", "vert", "visual", "volume", "way", "world", "xform",
 })  # fmt: skip
-# Words that might be hexadecimal digits.
+# Words that could be hexadecimal.
 _HEX_WORDS = frozenset({"bed", "cab", "cafe", "facade", "facades", "beds", "cabs", "cafes"})
 _SHORT = frozenset({"atm", "bus", "gym", "hut", "van", "tv", "spa", "shrub", "sky", "crypt", "gypsum"})
 _MAX_WORDS = 4
@@ -38,9 +38,9 @@ _MAX_BYTES = 4 << 20
 
 @dataclass(frozen=True)
 class NodeName:
-    """What a thing is called."""
+    """Category and naming attributes of a node."""
 
-    category: str  # Its kind, e.g. ``"fire_engine"``; empty where nothing is known
+    category: str  # E.g. ``"fire_engine"``; empty if unknown
     attributes: dict[str, str]
 
 
@@ -49,27 +49,27 @@ UNNAMED = NodeName("", {})
 
 @dataclass(frozen=True)
 class Naming:
-    """A user's table of node patterns."""
+    """A user's table of node name patterns."""
 
     rows: Sequence[tuple[str, NodeName]] = ()  # glob, name
 
     def name_of(self, node: str) -> NodeName:
-        """Say what a node of the file is called: by the table, else by the words in its name."""
+        """Return the name of a node: from the table, else from the words in its name."""
         entry = self.from_table(node)
         words = words_in(node)
         return entry if entry is not UNNAMED else _node_name(" ".join(words), "", "") if words else UNNAMED
 
     def from_table(self, node: str) -> NodeName:
-        """Say what the table calls a node; `UNNAMED` where it says nothing of it."""
+        """Return the table's name for a node; `UNNAMED` if it has none."""
         return next((name for pattern, name in self.rows if fnmatchcase(node, pattern)), UNNAMED)
 
 
 def words_in(node: str) -> list[str]:
-    """List the words in a node's name: no numbers, ids, hexadecimal digits, or what exporters say of everything."""
+    """List the meaningful words in a node's name: no numbers, ids, hexadecimal digits or exporter defaults."""
     split = re.sub(r"([a-z])([A-Z])", r"\1 \2", node)
     tokens = [token for token in re.split(r"[^A-Za-z0-9]+", split) if token]
     words = [word for word in map(_word, tokens) if word]
-    # "building building": a mesh and its node are often called alike.
+    # Mesh and node often have the same name: "building building".
     words = [word for k, word in enumerate(words) if word not in words[:k]]
     return words[:_MAX_WORDS]
 

@@ -1,6 +1,6 @@
-"""Extracts of OpenStreetMap, read by osmium: what lies in bounding boxes, by tags.
+"""Read OpenStreetMap extracts with osmium: the features in bounding boxes.
 
-Files are hostile until shown otherwise: they are read in a process of their own, in bounded memory and time.
+Files are untrusted: they are read in a child process with limits on memory and time.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from aerialdojo_gen.store.staging import scratch_folder
 
 ATTRIBUTION = "© OpenStreetMap contributors, Open Database License (ODbL) 1.0, openstreetmap.org/copyright"
 SUFFIXES = (".pbf", ".osm", ".osm.bz2", ".osm.gz")
-# An extract of a city has tens of megabytes; positions of a country's points take gigabytes of memory.
+# A city's extract has tens of megabytes; a country's node positions need gigabytes of memory.
 _MAX_BYTES = 1 << 30
 _MAX_POINTS = 5_000
-# Ways of these are outlines of areas where they are closed; others stay lines.
+# Closed ways with these keys are areas; others stay lines.
 _AREA_KEYS = ("building", "building:part", "landuse", "leisure", "natural", "amenity", "area", "area:highway",
               "tourism", "place", "water", "man_made", "public_transport", "railway")  # fmt: skip
 _LINES = {"natural": ("tree_row", "cliff", "coastline"), "man_made": ("embankment", "pipeline", "beam", "wire"),
@@ -42,16 +42,16 @@ _RawFeature = tuple[str, str, Tags]
 
 @dataclass(frozen=True)
 class Feature:
-    """A thing of the map."""
+    """A feature of the map."""
 
     key: str
-    shape: Any  # Point, LineString or Polygon, degrees; a multipolygon's parts are features of the same key
+    shape: Any  # Point, LineString or Polygon, degrees; parts of a multipolygon are features with the same key
     tags: Tags  # As mapped
 
 
 @dataclass(frozen=True)
 class Map:
-    """What an extract has in a bounding box, each in the order of its places, whatever the order in the file."""
+    """The features of an extract in a bounding box, sorted by position."""
 
     points: tuple[Feature, ...]
     lines: tuple[Feature, ...]
@@ -60,7 +60,7 @@ class Map:
 
 
 def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[Map]:
-    """Read the features of an extract that touch bounding boxes (degrees), in one pass; ways and areas whole."""
+    """Read the features that touch bounding boxes (degrees) in one pass; ways and areas stay whole."""
     try:
         importlib.import_module("osmium")
     except ImportError:
@@ -103,16 +103,13 @@ def _extract_advice(path: Path, boxes: Sequence[Bbox]) -> str:
 
 
 def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
-    """Read an extract without bounds, for a child process that has them.
-
-    Returns what is wrong, or an empty string.
-    """
+    """Read an extract in the sandboxed child process; returns the error message, or an empty string."""
     try:
         found, extent = _read(importlib.import_module("osmium"), path, boxes)
         if extent is None:
             return "holds no points"
         out.write_text(json.dumps({"extent": extent, "boxes": found}), encoding="utf-8")
-    except Exception as error:  # a foreign file may make a reader fail in any way: it is named, never let through
+    except Exception as error:  # untrusted files can make a reader fail in any way: report it
         if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
             raise MemoryError from None
         why = " ".join(str(error).split())[:200] or "it is damaged"
@@ -125,12 +122,12 @@ def _order(feature: Feature) -> tuple[str, list[tuple[str, str]], bytes]:
 
 
 def _key(shape: Any) -> str:
-    # OpenStreetMap's coordinates have seven digits.
+    # OpenStreetMap coordinates have seven decimals.
     return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
 
 
 def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_RawFeature]]], Bbox | None]:
-    """Go through a file once; the extent is that of its points, which a header need not state."""
+    """Read a file once; the extent is computed from its points, as a header need not state it."""
     windows = shapely.box(*np.asarray(boxes, dtype=np.float64).T)
     extent_box = shapely.box(*shapely.total_bounds(windows))
     for shape in (windows, extent_box):
@@ -166,7 +163,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
             try:
                 whole = shapely.from_wkb(bytes.fromhex(factory.create_multipolygon(thing)))
             except RuntimeError:
-                continue  # an outline that the extract has cut
+                continue  # an outline that the extract cuts off
             for part in shapely.get_parts(whole):
                 if isinstance(part, Polygon):
                     keep("areas", whole, part, tags)
@@ -183,7 +180,7 @@ def _is_area(tags: Tags) -> bool:
 
 
 def _line(nodes: Any) -> LineString | None:
-    """Make the line of a way, as far as the extract has its points."""
+    """Make the line of a way from the points in the extract."""
     at = [(n.lon, n.lat) for n in nodes if n.location.valid()]
     at = [p for k, p in enumerate(at) if k == 0 or p != at[k - 1]]
     return LineString(at) if len(at) > 1 else None

@@ -1,4 +1,4 @@
-"""Textures of foreign meshes: decoded, held to a budget, and made materials that are told by what they show."""
+"""Textures of foreign meshes: decoded, limited in size, deduplicated by content."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.imports.raw import GREY, RawSurface
 
-# Of one texture, pixels a side; of all textures of a file together, pixels.
+# Maximum side of a texture; maximum pixels of all textures of a file.
 TEXTURE_PX = 8192
 TEXELS = 8192 * 8192
-# What a file may ask to be decoded at all, pixels a side and in all.
+# Limits on decoding: pixels per side, and pixels per image.
 _LARGEST_PX, _MOST_DECODED = 16384, 20000 * 10000
-# Alpha below this is a hole, where the file says nothing else.
+# Alpha below this is transparent, unless the file has its own cutoff.
 CUTOFF = 0.5
-# A texture that is blended is cut where at least so much of it is all but gone; else it is glass, and drawn whole.
+# Blended textures are cut out if at least this share is nearly transparent; else they are glass, drawn opaque.
 _HOLES, _GONE = 0.05, 0.1
 
 
 @dataclass(frozen=True)
 class SourceMaterial:
-    """What a file's material says, before its texture is decoded."""
+    """A file's material before its texture is decoded."""
 
     name: str  # Its name, for messages
     factor: tuple[float, float, float] = (GREY[0] / 255, GREY[1] / 255, GREY[2] / 255)  # (r, g, b) of float
     image: bytes | None = None  # The texture's file
-    missing: str = ""  # Name of a texture that the file asks for and that is not there; empty where none is
-    alpha: str = "opaque"  # What the texture's alpha means
+    missing: str = ""  # Name of a missing texture file; else empty
+    alpha: str = "opaque"  # Alpha mode: ``"opaque"``, ``"mask"`` or ``"blend"``
     cutoff: float = CUTOFF  # Of ``"mask"``
     mask: bytes | None = None  # A file whose brightness is the texture's alpha
     double_sided: bool = False
@@ -42,7 +42,7 @@ class SourceMaterial:
 def decode_surfaces(
     materials: Sequence[SourceMaterial], texture_px: int = TEXTURE_PX
 ) -> tuple[tuple[RawSurface, ...], list[int]]:
-    """Decode what materials show."""
+    """Decode the materials of a file; returns the distinct surfaces and the index of each material's."""
     decoded: dict[bytes, tuple[NDArray[Any] | None, str]] = {}
     made = [_surface(material, decoded) for material in materials]
     made = _limit_sizes(made, texture_px)
@@ -68,7 +68,7 @@ def _surface(material: SourceMaterial, decoded: dict[bytes, tuple[NDArray[Any] |
     rgb, alpha = _channels(image)
     white = min(red, green, blue) == 255
     if not white:
-        # What modellers mean is a product of light; a texture's numbers are not.
+        # Colour factors multiply linear light, not sRGB values.
         scale = _srgb_to_linear(np.array([red, green, blue]) / 255.0)
         levels = _srgb_to_linear(np.arange(256) / 255.0)[:, None] * scale
         table = np.rint(255 * _linear_to_srgb(levels)).astype(np.uint8)
@@ -101,7 +101,7 @@ def _mean_colour(rgb: NDArray[np.uint8], mask: NDArray[np.bool_] | None) -> tupl
 
 
 def _decode(file: bytes) -> tuple[NDArray[Any] | None, str]:
-    """Decode an image file, with the channels that it has, RGB(A); or say what is wrong with it."""
+    """Decode an image file to RGB(A); or return what is wrong with it."""
     size = image_size(file)
     if file[:12] == b"\xabKTX 20\xbb\r\n\x1a\n":
         return None, "is in KTX2, which is not read (export it as PNG or JPEG)"
@@ -128,7 +128,7 @@ def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.u
 
 
 def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
-    """Make textures smaller until each, and all together, keep to what they are given."""
+    """Reduce textures until each one, and all together, are within the limits."""
     different = {s.digest: s for s in made if s.texture is not None}
     sides = {d: s.texture.shape[:2] for d, s in different.items() if s.texture is not None}
     size = {d: _fit_size(shape, texture_px) for d, shape in sides.items()}
@@ -171,5 +171,5 @@ def _linear_to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turn linear light, 0-1, into sRGB, 0-1."""
+    """Convert linear light, 0-1, to sRGB, 0-1."""
     return _linear_to_srgb(np.clip(linear, 0.0, 1.0))

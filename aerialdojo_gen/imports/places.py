@@ -1,4 +1,4 @@
-"""The twins of ``add-map`` and ``add-terrain``: real places as recipes in a folder of one's own scenes."""
+"""``add-map`` and ``add-terrain`` as functions: real places as recipes in a project folder."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 
-# A map's ways and areas are read a little beyond the box: streets run on, and parts belong to buildings.
+# Margin around the box: streets continue, and building parts may lie outside.
 _BEYOND_DEG = 0.0006
 _MOST_SCENES = 100
 
 
 @dataclass(frozen=True)
 class AddedPlace:
-    """A scene that was made of a real place."""
+    """A scene made of a real place."""
 
     name: str  # Of the scene
     scene: Scene  # As its recipe is built
     recipe: Path  # Files of the project
     pipeline: Path
-    notes: tuple[str, ...]  # What was done, for people
+    notes: tuple[str, ...]  # Lines for the user
 
 
 def add_map(
@@ -42,10 +42,7 @@ def add_map(
     cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
     drive_on: str = "right", force: bool = False,
 ) -> list[AddedPlace]:  # fmt: skip
-    """Make a town a bounding box (degrees, WGS 84) of an OpenStreetMap extract.
-
-    Each is built once before it is kept.
-    """
+    """Make one town per bounding box (degrees, WGS 84) of an OpenStreetMap extract; each is test-built first."""
     if drive_on not in ("right", "left"):
         raise UsageError(f"--drive-on {drive_on[:20]!r}: right or left")
     boxes = [check_bbox(box) for box in bbox]
@@ -79,7 +76,7 @@ def add_terrain(
     sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
     ceiling_m: float | None = None, force: bool = False,
 ) -> AddedPlace:  # fmt: skip
-    """Make open country of a height model, in a project folder."""
+    """Make open country from a height model, in a project folder."""
     check_free([name], project, force)
     model: Dem = read_dem(dem)
     text, notes = relief_recipe(
@@ -90,7 +87,7 @@ def add_terrain(
 
 
 def _write_place(name: str, text: str, project: Path, notes: tuple[str, ...]) -> AddedPlace:
-    """Build a recipe, and keep it if that went well."""
+    """Build a recipe, and write it if that succeeds."""
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.toml"
         trial.write_text(text, encoding="utf-8")
@@ -108,7 +105,7 @@ def _write_place(name: str, text: str, project: Path, notes: tuple[str, ...]) ->
 
 
 def _summary_lines(counts: dict[str, int]) -> list[str]:
-    """Say what of the map is there, how high buildings are known to be, and what was left out."""
+    """Summarise the features, the sources of building heights, and omissions."""
     what = [
         f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))
     ]

@@ -1,4 +1,4 @@
-"""What a mesh file holds, before anything is believed of it."""
+"""Content of a mesh file before validation."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class RawSurface:
     name: str = ""  # As in the file
     colour: tuple[int, int, int] = GREY  # sRGB, 0-255; a texture's mean where it has one
     texture: NDArray[np.uint8] | None = None  # (H, W, 3) uint8 or None; sRGB; row 0 is the top (v = 1)
-    mask: NDArray[np.bool_] | None = None  # Where the texture is there; None where it is everywhere
-    double_sided: bool = False  # Whether it is there from both sides
-    unlit: bool = False  # Whether it is to be drawn without light
-    jpeg: bytes = b""  # The texture's file, where that is a JPEG and the texture is just what it decodes to
-    notes: tuple[str, ...] = ()  # What was lost or changed of it, for the user to read
+    mask: NDArray[np.bool_] | None = None  # Opaque pixels; None if all are
+    double_sided: bool = False  # Whether both sides are drawn
+    unlit: bool = False  # Whether it is drawn without lighting
+    jpeg: bytes = b""  # The texture's file, if it is a JPEG that decodes to exactly the texture
+    notes: tuple[str, ...] = ()  # Losses and changes, for the user
 
     @cached_property
     def digest(self) -> str:
-        """Of all that is drawn of it, hexadecimal: the same whatever it is called and wherever it stands."""
+        """Digest of everything that is drawn, hexadecimal, independent of names."""
         sha = hashlib.sha256(repr((self.colour, self.double_sided, self.unlit)).encode())
         for array in (self.texture, self.mask):
             if array is not None:
@@ -45,10 +45,10 @@ class RawSurface:
 
 @dataclass(frozen=True, eq=False)
 class RawNode:
-    """A node of a file: its name and its triangles."""
+    """A node of a file: name and triangles."""
 
     name: str  # As in the file; empty where it has none
-    vertices: NDArray[np.float64]  # In the file's own axes and units; anything may stand in it, NaN too
+    vertices: NDArray[np.float64]  # In the file's axes and units; may contain NaN
     faces: NDArray[np.int64]  # (m, 3) int64; indices into `vertices`
     colours: NDArray[np.uint8]  # (m, 3) uint8; sRGB of each face
     surface: NDArray[np.int32] | None = None  # (m,) int32 or None
@@ -56,7 +56,7 @@ class RawNode:
     surfaces: tuple[RawSurface, ...] = ()
 
     def select_faces(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
-        """Return the node with some of its faces alone, in the order given; vertices stay as they are."""
+        """Return the node with a subset of its faces; vertices stay."""
         return RawNode(
             self.name, self.vertices, self.faces[rows], self.colours[rows],
             None if self.surface is None else self.surface[rows],
@@ -64,22 +64,22 @@ class RawNode:
         )  # fmt: skip
 
     def with_vertices(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
-        """Return the node with other vertices, and where given with other indices into them, face by face."""
+        """Return the node with other vertices, and optionally other indices."""
         faces = self.faces if faces is None else faces
         return RawNode(self.name, vertices, faces, self.colours, self.surface, self.corners, self.surfaces)
 
 
 def extract_faces(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
-    """Make a node of some faces of another, with the vertices that they need."""
+    """Extract faces as a node with only the vertices they need."""
     used, faces = np.unique(body.faces[rows], return_inverse=True)
     return body.select_faces(rows).with_vertices(body.vertices[used], faces.reshape(-1, 3))
 
 
 def clip_node(body: RawNode, region: Region) -> RawNode:
-    """Make a node of what of another lies within a region of the plan; without faces where nothing does."""
+    """Clip a node to a region of the plan; may have no faces."""
     pieces = cut(body.vertices, body.faces, region)
     n = len(pieces.source)
-    # What faces have comes from their source; what corners have is mixed by their weights.
+    # Face attributes come from the source; corner attributes are interpolated.
     kept = body.select_faces(pieces.source)
     if kept.corners is not None:
         kept = replace(kept, corners=np.einsum("kij,kjc->kic", pieces.weights, kept.corners).astype(np.float32))
@@ -87,12 +87,12 @@ def clip_node(body: RawNode, region: Region) -> RawNode:
 
 
 def default_colours(n: int) -> NDArray[np.uint8]:
-    """Return the colour of faces whose file has none, (n, 3) uint8."""
+    """Return the default face colours, (n, 3) uint8."""
     return np.tile(np.array(GREY, dtype=np.uint8), (n, 1))
 
 
 def merge_nodes(name: str, bodies: Sequence[RawNode]) -> RawNode:
-    """Make one node of several of a file; the same one whatever their order."""
+    """Merge nodes into one, independent of their order."""
     bodies = sorted(bodies, key=_digest)
     vertices, faces = soup(bodies)
     colours = np.concatenate([b.colours for b in bodies])
@@ -113,7 +113,7 @@ def merge_nodes(name: str, bodies: Sequence[RawNode]) -> RawNode:
 
 
 def empty_corners(n: int) -> NDArray[np.float32]:
-    """Return what the corners of n faces carry that have neither texture coordinates nor colours, (n, 3, 5)."""
+    """Return corners without texture coordinates and colours, (n, 3, 5)."""
     out = np.full((n, 3, len(CORNER)), np.nan, dtype=np.float32)
     out[..., :2] = 0.0
     return out

@@ -1,4 +1,4 @@
-"""From a height model to the heights and the recipe of a scene."""
+"""Convert a height model to the recipe of a scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aerialdojo_gen.imports.toml_text import recipe_text
 Floats = NDArray[np.float64]
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
-# So many cells are two triangles each: as much as a scene of the dataset has all in all.
+# Two triangles per cell: as many as a whole scene of the dataset.
 MOST_CELLS = 40_000
 _FINEST_M = 0.25
 _LEAST_SHARE = 0.5
@@ -27,10 +27,7 @@ _HEADROOM_M = 25.0
 def grid(
     dem: Dem, size: tuple[float, float], cell_m: float, frame: LocalFrame | None, middle: tuple[float, float]
 ) -> Floats:
-    """Sample a height model on a square grid, (rows, columns) metres, rows running north.
-
-    Gaps take the nearest height.
-    """
+    """Sample a height model on a square grid, (rows, columns) metres, rows from south to north; gaps are filled."""
     columns, rows = (round(s / cell_m) for s in size)
     x, y = np.meshgrid(*((np.arange(n + 1) - n / 2) * cell_m for n in (columns, rows)))
     if frame is not None:
@@ -50,7 +47,7 @@ def grid(
 
 
 def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float) -> float:
-    """Choose the distance of heights: no finer than the model's own, and no more than `MOST_CELLS` of them."""
+    """Choose the cell size: not finer than the model's, and at most `MOST_CELLS` cells."""
     least = math.sqrt(size[0] * size[1] / MOST_CELLS)
     if cell_m is not None:
         if not (math.isfinite(cell_m) and cell_m >= _FINEST_M) or cell_m < least * 0.999 or cell_m > min(size) / 2:
@@ -64,18 +61,18 @@ def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float
 
 
 def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]:
-    """Shorten an extent to whole cells, metres."""
+    """Round an extent down to whole cells, metres."""
     x, y = (max(int(s / cell_m + 1e-6), 1) * cell_m for s in size)
     return round(x, 6), round(y, 6)
 
 
 def to_centimetres(z: Floats) -> list[list[float]]:
-    """Heights as a recipe states them, to the centimetre."""
+    """Round heights to centimetres, as recipes state them."""
     return [[round(float(v), 2) for v in row] for row in z]
 
 
 def native_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
-    """Distance of a model's own heights, metres, the larger of both ways."""
+    """Cell size of a model, metres, the larger of both axes."""
     if not dem.geographic:
         return max(dem.dx, dem.dy)
     east, north = (frame or LocalFrame(*dem.extent[:2])).metres_a_degree
@@ -87,7 +84,7 @@ def relief_recipe(
     water_m: float | None = None, snow_m: float | None = None, sand_m: float | None = None, bare: bool = False,
     seed: int = 0, ceiling_m: float | None = None, attribution: str = "",
 ) -> tuple[str, list[str]]:  # fmt: skip
-    """Write the recipe of a relief (heights in metres), and list what was done."""
+    """Write the recipe of a relief, and notes for the user."""
     frame, middle, size = _place(dem, bbox, size)
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(
@@ -132,7 +129,7 @@ def relief_recipe(
 def _place(
     dem: Dem, bbox: Bbox | None, size: tuple[float, float] | None
 ) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
-    """Where on earth, or in the model's metres, the scene's middle is, and its extent."""
+    """Return the frame, centre and extent of the scene, on earth or in the model's metres."""
     west, south, east, north = dem.extent
     middle = (west + east) / 2, (south + north) / 2
     if bbox is not None:
@@ -149,7 +146,7 @@ def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float)
 
 
 def ground_sampler(dem: Dem, cell_m: float | None = None) -> Any:
-    """Make what gives a town its ground: ``(frame, size_m) -> table``, the height of z = 0 in `z_m`."""
+    """Make the function that samples a town's ground: ``(frame, size_m) -> table``, with the datum in `z_m`."""
 
     def heights(frame: LocalFrame, size: tuple[float, float]) -> dict[str, Any]:
         cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)

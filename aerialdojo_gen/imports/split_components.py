@@ -1,4 +1,4 @@
-"""Take a soup of triangles apart into things: by what touches, by material, and by what stands on the ground."""
+"""Segment unstructured meshes: by connectivity, by material, and by what rises from the ground."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _TOUCH_M = 0.3
-# A node as wide as this along both axes, in many pieces, is a soup of things; a thing as wide may be several.
+# Wide nodes in many pieces are soups; a single thing this wide may be several.
 _WIDE_M, _SPREAD_M = 60.0, 100.0
 _MAX_PIECE_SHARE = 0.6
-# A body as wide as this share of all that there is, and open, is what the rest stands on.
+# Open bodies at least this share of the extent wide are ground.
 _GROUND_SHARE = 0.25
 _CELL_M = 1.0
 _MAX_CELLS = 4_000_000
-# Openings by windows of these many cells take away what is narrower: Zhang et al. 2003, progressive.
+# Windows, in cells, of progressive morphological openings (Zhang et al. 2003).
 _WINDOWS = (3, 5, 9, 17, 33, 65)
 _SLOPE, _STEP_M, _HIGHEST_STEP_M, _HOUSE_M = 0.35, 0.4, 3.0, 35.0
 _ABOVE_M = 0.4
-# What stands out of the ground is a thing if it is so high, covers so much, and has walls.
+# Minimum height, area and share of walls of a thing that rises from the ground.
 _THING_M, _THING_M2, _WALLS, _STEEP = 1.2, 2.0, 0.2, 0.6
 _MAP_M = 0.5
 _MAX_MAPPED = 20_000
@@ -36,16 +36,16 @@ _MAX_MAPPED = 20_000
 
 @dataclass
 class SplitStats:
-    """How often what was taken apart."""
+    """Statistics of a segmentation."""
 
-    pieces: int = 0  # Connected pieces that soups fell into; what they were gathered to
+    pieces: int = 0  # Connected pieces of soups, and the things made of them
     things: int = 0
-    materials: int = 0  # Pieces of one material that wide connected bodies fell into
-    attached: int = 0  # Things that were one surface with the ground
+    materials: int = 0  # Pieces of one material from wide connected bodies
+    attached: int = 0  # Things that were connected to the ground
     soups: list[str] = field(default_factory=list)
 
     def lines(self) -> list[str]:
-        """Say it, a line each."""
+        """Format the statistics, one line each."""
         if not self.soups:
             return []
         of = "the only node" if self.soups == [""] else f"{len(self.soups):,} node{'s' * (len(self.soups) > 1)}"
@@ -59,7 +59,7 @@ class SplitStats:
 
 
 def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitStats]:
-    """Segment unstructured meshes (z up, metres) into things; nodes that are things of their own stay whole."""
+    """Segment unstructured meshes (z up, metres) into things; nodes that are single things stay whole."""
     stats = SplitStats()
     low = np.min([b.vertices.min(axis=0) for b in bodies], axis=0)
     high = np.max([b.vertices.max(axis=0) for b in bodies], axis=0)
@@ -71,7 +71,7 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
             continue
         stats.soups.append(body.name if len(bodies) > 1 else "")
         if len(bodies) == 1 and len(pieces) > 1:
-            # What a file calls all that it holds is no name of a thing in it.
+            # The name of a file's only node does not name the things in it.
             pieces = [replace(piece, name="") for piece in pieces]
         stats.pieces += len(pieces)
         grounds, things = [], []
@@ -100,7 +100,7 @@ def _connected(body: RawNode) -> list[RawNode]:
 
 
 def _split(body: RawNode, label: Ints) -> list[RawNode]:
-    """Faces of equal labels as bodies, in the order of their first faces."""
+    """Split faces by label, in the order of their first faces."""
     order = np.argsort(label, kind="stable")
     cuts = np.flatnonzero(np.diff(label[order])) + 1
     groups = sorted((np.sort(rows) for rows in np.split(order, cuts) if len(rows)), key=lambda rows: int(rows[0]))
@@ -115,7 +115,7 @@ def _is_soup(body: RawNode, pieces: Sequence[RawNode]) -> bool:
 
 
 def _materials(body: RawNode) -> Ints:
-    """Number the faces by colour and by the file's material, from 0; (m,) int64."""
+    """Label faces by colour and material, from 0; (m,) int64."""
     surface = np.full(len(body.faces), -1) if body.surface is None else body.surface
     _, kind = np.unique(np.column_stack([body.colours // 16, surface]), axis=0, return_inverse=True)
     return np.asarray(kind.reshape(-1), dtype=np.int64)
@@ -127,7 +127,7 @@ def _by_material(body: RawNode) -> list[RawNode]:
 
 
 def _is_ground_surface(body: RawNode, low: Floats, high: Floats) -> bool:
-    """Whether a body is wide enough, and open, to be what others stand on."""
+    """Whether a body is wide, open and level enough to be ground."""
     size = np.ptp(body.vertices[:, :2], axis=0)
     if (size < _GROUND_SHARE * (high - low)[:2]).any() or (size < 10.0).any():
         return False
@@ -141,7 +141,7 @@ def _is_ground_surface(body: RawNode, low: Floats, high: Floats) -> bool:
 
 
 def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
-    """Cut what stands out of a surface from it: the ground below it has a hole there."""
+    """Separate what rises from a surface; the ground gets a hole there."""
     floor, plan = _floor(body)
     middle = body.vertices[body.faces].mean(axis=1)
     cell = np.clip(((middle[:, :2] - plan.low) / plan.step_m).astype(np.int64), 0, np.array(plan.shape) - 1)
@@ -162,7 +162,7 @@ def _ground_and_things(body: RawNode) -> tuple[RawNode, list[RawNode]]:
 
 
 def _floor(body: RawNode) -> tuple[Floats, Plan]:
-    """Height of the bare ground over a lattice: openings take away what is narrow and high."""
+    """Bare ground heights on a lattice: openings remove what is narrow and high."""
     low, high = body.vertices[:, :2].min(axis=0), body.vertices[:, :2].max(axis=0)
     step = max(_CELL_M, float(np.sqrt(np.prod(high - low) / _MAX_CELLS)))
     plan = Plan.over(low, high, step)
@@ -178,7 +178,7 @@ def _floor(body: RawNode) -> tuple[Floats, Plan]:
             break
         opened = scipy.ndimage.grey_opening(surface, size=(window, window), mode="nearest")
         step_m = _STEP_M + _SLOPE * (window - before) * step
-        # A house of a storey is no hill; what is wider than a house may be one.
+        # A one-storey house is not a hill; anything wider may be one.
         step_m = min(step_m, _HIGHEST_STEP_M) if window * step < _HOUSE_M else step_m
         surface = np.where(surface - opened > step_m, opened, surface)
         before = window
@@ -200,7 +200,7 @@ def _is_thing(body: RawNode, rows: Ints) -> bool:
 
 
 def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
-    """Give what lies within the box of something larger, and over or at it, to the smallest such thing."""
+    """Assign pieces within the box of a larger one, and above or at it, to the smallest such piece."""
     if not pieces:
         return []
     low = np.array([p.vertices.min(axis=0) for p in pieces])
@@ -228,7 +228,7 @@ def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
 def _lies_over(
     pieces: Sequence[RawNode], larger: int, smaller: int, maps: dict[int, frozenset[tuple[int, int]] | None]
 ) -> bool:
-    """Whether half of a piece's plan lies over another's, or beside it: a fence does not hold the house within."""
+    """Whether half of a piece's plan lies over or next to another's: a fence does not contain the house inside."""
     own, other = (_cells(pieces[k], k, maps) for k in (smaller, larger))
     if own is None or other is None:
         return True
@@ -238,7 +238,7 @@ def _lies_over(
 def _cells(
     body: RawNode, k: int, maps: dict[int, frozenset[tuple[int, int]] | None]
 ) -> frozenset[tuple[int, int]] | None:
-    """Squares of the plan that a body's triangles lie over, and those around; None for one of too many."""
+    """Grid cells under a body's triangles and around them; None if there are too many."""
     if k not in maps:
         corners = body.vertices[body.faces][:, :, :2]
         first = np.floor((corners.min(axis=1) - _TOUCH_M) / _MAP_M).astype(np.int64)

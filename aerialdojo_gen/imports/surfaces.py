@@ -1,4 +1,4 @@
-"""What the surfaces of a foreign mesh are: closed, open, the ground, or a sky that encloses everything."""
+"""Classify the surfaces of a foreign mesh: closed, open, ground, or sky dome."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
 
-# The category by which a table of names says of a node that it is a dome.
+# Category by which a naming table marks a sky dome.
 SKY = "sky"
 _SKY_WORDS = frozenset({"sky", "skybox", "skydome", "skysphere", "hdri", "panorama", "backdrop", "horizon", "env"})
-# What a sky may be called, and other things too: its form has to tell.
+# Ambiguous words: the shape has to decide.
 _SKY_PERHAPS = frozenset({"dome", "hemisphere", "background", "environment", "backside", "bg"})
 _GROUND_WORDS = frozenset(
     {"terrain", "ground", "landscape", "relief", "dem", "dtm", "topography", "heightfield", "heightmap", "earth"}
 )
-# By so much a dome is larger in plan than what it encloses: one that is called a sky, and one that is called nothing.
+# Minimum ratio of a dome's size to its content: if named a sky, and if unnamed.
 _WIDER_CALLED, _WIDER = 1.05, 1.5
 _LARGE_M = 100.0
-# A shell: its triangles keep away from the middle of its box by this share of the way to its corners at the least.
+# A shell: this share of triangles keeps this relative distance from the centre of its box.
 _HOLLOW, _SHELL = 0.4, 0.95
-# Columns over what it encloses of which a dome roofs so many.
+# Share of columns over the content that a dome must cover.
 _ROOFED = 0.9
 _PROBES = 12
 
 
 def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[int]:
-    """Find sky domes, the largest first: large hollow shells that enclose everything else and roof it over."""
+    """Find sky domes, largest first: large hollow shells that enclose everything else."""
     found: list[int] = []
     low = np.array([b.vertices.min(axis=0) for b in bodies])
     high = np.array([b.vertices.max(axis=0) for b in bodies])
@@ -61,14 +61,14 @@ def _is_hollow(body: RawNode) -> bool:
     low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
     centres = body.vertices[body.faces].mean(axis=1)
     middle, reach = (low + high) / 2, np.maximum((high - low) / 2, 1e-9)
-    # Half of a sphere has its middle at its rim.
+    # A hemisphere's centre is at its rim.
     foot, height = np.array([*middle[:2], low[2]]), np.array([*reach[:2], high[2] - low[2]])
     shares = [(np.abs((centres - m) / r).max(axis=1) >= _HOLLOW).mean() for m, r in ((middle, reach), (foot, height))]
     return bool(max(shares) > _SHELL)
 
 
 def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
-    """Whether columns over a box meet the body above the box's top."""
+    """Whether vertical rays from the top of a box hit the body."""
     from aerialdojo_gen.geometry.rays import TriangleRayCaster
 
     at = (np.arange(_PROBES) + 0.5) / _PROBES
@@ -80,7 +80,7 @@ def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
 
 
 def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
-    """Say of every open surface of an imported scene whether it is the ground."""
+    """Classify each open surface of an imported scene as ground or sheet."""
     unknown = replace(scene, instances=tuple(replace(i, surface="") for i in scene.instances))
     ground = Ground.of(unknown)
     nodes = frozenset() if ground is None else ground.nodes
@@ -97,7 +97,7 @@ def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
 
 
 def describe_surfaces(scene: Scene) -> list[str]:
-    """Say what was decided, a line each."""
+    """Describe the classification, one line each."""
     from collections import Counter
 
     n = Counter(i.surface for i in scene.instances)

@@ -1,8 +1,7 @@
-"""3DS files: a tree of chunks, each an id, a length and a body (Autodesk 3D Studio File Format, release 3).
+"""3DS files: a tree of chunks with id, length and body (Autodesk 3D Studio File Format, release 3).
 
-No maintained package for Python reads them without a system library. Only what a scene needs is read: the named
-triangle objects, and the diffuse colours of their materials. A mesh's vertices stand in world coordinates; the
-key-framer's transformations, which animate from there, are left out.
+No maintained Python package reads them without a system library. This reads the named triangle objects, in world
+coordinates, and the diffuse colours of their materials; animation is ignored.
 """
 
 from __future__ import annotations

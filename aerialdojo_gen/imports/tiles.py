@@ -1,4 +1,4 @@
-"""A large place as a set of scenes in one frame."""
+"""Split a large mesh into scenes in one frame."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from aerialdojo_gen.scenes.model import Scene
 Floats = NDArray[np.float64]
 
 _MAX_TILES = 400
-# A tile with less at the place's edge than this share of its plan is none.
+# Tiles at the edge with less than this share of their plan are skipped.
 _MIN_SHARE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """A part of a place as a scene."""
+    """A tile of a mesh as a scene."""
 
-    name: str  # Of its scene: that of the place with its column from the west and row from the south, ``"City-x0y2"``
+    name: str  # Name with column from the west and row from the south, ``"City-x0y2"``
     region: Region  # The square, in the file's axes, metres
-    scene: Scene  # In the frame that all tiles share: their scenes' coordinates lie side by side
-    repairs: Repairs  # What was mended; its `origin_m` is the same for all tiles
+    scene: Scene  # In the frame shared by all tiles
+    repairs: Repairs  # Repairs; `origin_m` is the same for all tiles
 
 
 def make_tiles(
@@ -41,10 +41,7 @@ def make_tiles(
     naming: Naming | None = None,
     light: str = "auto",
 ) -> Iterator[Tile]:
-    """Cut a place into squares of `edge_m` metres, west to east and south to north.
-
-    A scene of each that holds something.
-    """
+    """Cut a mesh into squares of `edge_m` metres, west to east and south to north; yields those with content."""
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
     low, high = source.low, source.high
@@ -71,7 +68,7 @@ def make_tiles(
 
 
 def tile_name(name: str, column: int, row: int) -> str:
-    """Name a tile; the suffix that says a partition stays last."""
+    """Name a tile; a partition suffix stays last."""
     for suffix in ("_0", "_1"):
         if name.endswith(suffix):
             return f"{name[: -len(suffix)]}-x{column}y{row}{suffix}"
@@ -79,7 +76,7 @@ def tile_name(name: str, column: int, row: int) -> str:
 
 
 def _has_content(source: SourceMesh, region: Region, edge_m: float) -> bool:
-    """Whether what lies in a square is wide enough to fly in, and more than a scrap of it."""
+    """Whether the content of a square is wide enough to fly in."""
     try:
         part = source.within(region)
     except AssetError:

@@ -1,4 +1,4 @@
-"""Recipes as text: TOML that a person can read and change."""
+"""Write recipes as readable TOML."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 def recipe_text(head: Mapping[str, Any], parameters: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
     """Write a recipe."""
-    # A file's name may have any character in it, a new line too.
+    # File names may contain any character, newlines too.
     lines = ["# " + "".join(c if c.isprintable() else "?" for c in line) for line in comments]
     lines += [f"{key} = {toml_value(value)}" for key, value in head.items()]
     plain = {k: v for k, v in parameters.items() if not _tables(v) and not isinstance(v, Mapping)}
@@ -28,7 +28,7 @@ def _tables(value: Any) -> bool:
 
 
 def toml_value(value: Any) -> str:
-    """Write a value: a number, a text, a truth value, a list or an inline table."""
+    """Format a value: number, string, boolean, list or inline table."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
@@ -42,6 +42,6 @@ def toml_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.10g}" if value % 1 else f"{value:.1f}"
     if isinstance(value, str):
-        # Of JSON's escapes TOML lacks none but the slash's, which is not written.
+        # TOML supports all of JSON's escapes except the slash's, which is not used.
         return json.dumps(value.replace("\x7f", ""), ensure_ascii=False)
     return str(value)

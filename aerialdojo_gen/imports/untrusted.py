@@ -20,8 +20,8 @@ _OUT_OF_MEMORY = 3
 
 
 def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memory_bytes: int, advice: str) -> None:
-    """Run a module that reads a file, and wait for it."""
-    # Not multiprocessing, which would run a caller's unguarded script a second time.
+    """Run a reader module in a child process, and wait for it."""
+    # Not multiprocessing, which would run an unguarded script of the caller a second time.
     command = [sys.executable, "-m", module, str(max_memory_bytes), str(path.resolve()), *arguments]
     try:
         process = subprocess.run(command, capture_output=True, text=True, timeout=MAX_SECONDS, check=False)
@@ -32,7 +32,7 @@ def read_in_sandbox(module: str, path: Path, arguments: Sequence[str], max_memor
 
 
 def _failure_reason(process: subprocess.CompletedProcess[str], max_memory_bytes: int, advice: str) -> str:
-    """Say why a reading process ended with another code than 0."""
+    """Explain the exit status of a reader process."""
     out, err = (text.strip().splitlines() for text in (process.stdout, process.stderr))
     if process.returncode == _OUT_OF_MEMORY or environment_errors.is_out_of_memory(process.stderr):
         return f"needs more than {_memory_limit(max_memory_bytes) >> 20:,} MB of memory to read: {advice}"
@@ -47,16 +47,16 @@ def _failure_reason(process: subprocess.CompletedProcess[str], max_memory_bytes:
 
 
 def _memory_limit(most: int) -> int:
-    """Return the bound on address space, where the caller's own limit may be lower."""
+    """Return the limit on address space, or the caller's own if that is lower."""
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     return most if hard == resource.RLIM_INFINITY else min(most, hard)
 
 
 def exit_status(read: Callable[[list[str]], str]) -> int:
-    """Bound this process as its command line says, read, and print what is wrong with the file."""
+    """Apply the limits of the command line to this process, read, and print the error."""
     memory, *arguments = sys.argv[1:]
     resource.setrlimit(resource.RLIMIT_AS, (_memory_limit(int(memory)),) * 2)
-    # At the hard limit the kernel sends SIGKILL, which does not tell its cause.
+    # At the hard limit the kernel sends SIGKILL, which hides the cause.
     resource.setrlimit(resource.RLIMIT_CPU, (MAX_SECONDS, MAX_SECONDS + 5))
     try:
         fault = read(arguments)
@@ -70,7 +70,7 @@ _MAX_BYTES = 256 << 20
 
 
 class SiblingFiles:
-    """Gives the files beside a mesh file."""
+    """Files in the folder of a mesh file and below, and no others."""
 
     def __init__(self, path: Path) -> None:
         self._folder = path.resolve().parent
@@ -78,7 +78,7 @@ class SiblingFiles:
         self.missing: list[str] = []
 
     def get(self, name: str) -> bytes:
-        """Read a file; FileNotFoundError where there is none, or it is too large or elsewhere."""
+        """Read a file; FileNotFoundError if it is missing, too large or elsewhere."""
         path = self._resolve(name.strip())
         if path is None or path.stat().st_size > _MAX_BYTES:
             self.missing.append(name)
@@ -88,7 +88,7 @@ class SiblingFiles:
         return self.loaded[name]
 
     def _resolve(self, name: str) -> Path | None:
-        """Look a name up; other machines' full paths by their last part, as exporters write them."""
+        """Resolve a name; absolute paths of other machines by their last part, as exporters write them."""
         plain = name.replace("\\", "/")
         # map_Kd may have options before the name: "-s 1 1 1 wall.png".
         for candidate in (plain, PurePosixPath(plain).name, plain.split(" ")[-1]):
@@ -101,20 +101,20 @@ class SiblingFiles:
         return None
 
     def keys(self) -> list[str]:
-        """Nothing: what is there is found by asking."""
+        """Return nothing: files are looked up by name only."""
         return []
 
     def namespaced(self, namespace: str) -> Any:
-        """Return itself: names are looked up in one folder."""
+        """Return itself: there is one folder."""
         return self
 
     def write(self, name: str, data: bytes) -> None:
-        """Refuse."""
+        """Not supported."""
         raise PermissionError(name)
 
 
 _HEAD = 1024
-# What begins so is this, and what to do about it.
+# First bytes of other file types, and advice.
 _OTHER_TYPES = (
     (b"\x1f\x8b", "is compressed by gzip: unpack it first"),
     (b"7z\xbc\xaf\x27\x1c", "is a 7z archive: unpack it, and give the mesh in it"),
@@ -135,7 +135,7 @@ _OTHER_TYPES = (
     (b"age-encryption.org", "is encrypted by age: decrypt it first"),
     (b"SQLite format 3", "is an SQLite database: export the mesh itself, as GLB"),
 )
-# Formats that are read, by their first bytes.
+# First bytes of supported formats.
 _MESHES = (
     (b"glTF", ".glb"), (b"ply\n", ".ply"), (b"ply\r", ".ply"), (b"Kaydara FBX Binary", ".fbx"),
 )  # fmt: skip
@@ -144,7 +144,7 @@ _PAGES = (b"<!doctype html", b"<html")
 
 
 def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
-    """Say what a file is, where it cannot be what its name says."""
+    """Describe a file whose content does not match its suffix; empty if it does."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
     if not head:

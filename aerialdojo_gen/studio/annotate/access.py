@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 COOKIE = "aerialdojo-annotate"
-# Wrong tokens of one address: so many at once, then one every few seconds.
+# Wrong tokens per address: this many at once, then one per interval.
 MOST_GUESSES, SECONDS_A_GUESS = 10, 6.0
 _MOST_ADDRESSES = 4096
 
@@ -24,13 +24,12 @@ _Asgi = Callable[
 
 
 class TokenGate:
-    """ASGI middleware: lets nothing through without the token.
+    """ASGI middleware: rejects requests without the token.
 
-    The address that the command prints carries it; the answer moves it into a cookie that no script and no other
-    site sees, and leads to the address without it. A request whose ``Origin`` is not the ``Host`` that it is sent to
-    is refused: the page's own scripts always have both alike. An address that has sent `MOST_GUESSES` wrong tokens is
-    answered without a look at what it sends, until its time is up; not so one from which somebody has come in before,
-    lest a neighbour behind the same router locks them out.
+    The printed address contains the token; the response stores it in an HttpOnly, SameSite cookie and redirects to
+    the address without it. Requests whose ``Origin`` does not match their ``Host`` are rejected. An address that sent
+    `MOST_GUESSES` wrong tokens is blocked for a while, unless it has logged in before: a neighbour behind the same
+    router must not lock it out.
     """
 
     def __init__(self, app: _Asgi, token: str) -> None:
@@ -92,7 +91,7 @@ class _Guesses:
 
     level: float = 0.0
     since: float = 0.0
-    # A tab that was open when the server began anew sends its old token on and on: that is no guess.
+    # A tab from before a restart keeps sending its old token: that is no guess.
     seen: set[str] = field(default_factory=set)
 
     def wait(self, now: float) -> float:

@@ -32,9 +32,9 @@ _MAX_PICTURES = 400
 class View:
     """What a viewpoint shows."""
 
-    png: bytes  # Front view of the size of the reference images
-    boxes: dict[str, tuple[int, int, int, int]]  # dict of str to (int, int, int, int)
-    pixels: dict[str, int]  # How many pixels show it
+    png: bytes  # Front view, PNG, in the size of the reference images
+    boxes: dict[str, tuple[int, int, int, int]]  # Pixel boxes (u0, v0, u1, v1) by node
+    pixels: dict[str, int]  # Visible pixels by node
 
 
 class AnchorService:
@@ -43,7 +43,7 @@ class AnchorService:
     def __init__(self, scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> None:
         self.scene, self.config, self._pictures = scene, pipeline.anchor_sample, pipeline.reference_images
         self._job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)
-        # One thread: PyBullet is not made for several, and two cores have the page to serve as well.
+        # One thread: PyBullet is not thread-safe, and the page needs CPU as well.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="anchors")
         self._world: Future[Any] = self._worker.submit(self._build)
         self._candidates: OrderedDict[tuple[int, str], list[dict[str, Any]]] = OrderedDict()
@@ -98,7 +98,7 @@ class AnchorService:
         surface = Surface.of(instance)
         direction = (away / length)[None]
         place = surface.standoff(instance.centroid, direction, self.config.standoff_m)[0]
-        if np.isnan(place[0]):  # an arch: its middle is an opening
+        if np.isnan(place[0]):  # an arch: its centre is an opening
             place = surface.standoff(surface.nearest_point(instance.centroid), direction, self.config.standoff_m)[0]
         return np.asarray(np.round(place, 3))
 

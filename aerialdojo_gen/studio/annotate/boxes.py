@@ -1,8 +1,7 @@
-"""Boxes in an imported scene's recipe: what the annotation tool adds to it and takes from it.
+"""Boxes in an imported scene's recipe, added and removed by the annotation tool.
 
-A recipe with a box that could not be built would be a trap for every later run. So a changed recipe is built first,
-in a folder of its own, and takes the place of the old one when the scene is whole; after a crash in between, the old
-recipe stands, and the next run builds the scene that it describes.
+A changed recipe is first built in a scratch folder, and replaces the old one only if that succeeds: a recipe that
+cannot be built would break every later run.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from aerialdojo_gen.annotations.format import Object
 if TYPE_CHECKING:
     from aerialdojo_gen.studio.annotate.session import AnnotationSession
 
-# A thing of fewer pixels is nothing to learn a box from.
+# Minimum visible pixels of an object.
 MIN_PIXELS = 16
-_DATE = (1980, 1, 1, 0, 0, 0)  # the same annotations give the same bytes
+_DATE = (1980, 1, 1, 0, 0, 0)  # fixed, so that the same annotations give the same bytes
 
 
 def coco_zip(session: AnnotationSession) -> bytes:

@@ -27,7 +27,7 @@ class Describer:
         self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None, looks: Looks | None = None
     ) -> None:
         self._scene, self._names, self._counts, self._looks = scene, names, counts, looks
-        self._geometry = SceneGeometry(scene)  # remembers as it goes
+        self._geometry = SceneGeometry(scene)  # caches results
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
         """Describe all entries.

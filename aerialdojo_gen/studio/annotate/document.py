@@ -1,7 +1,6 @@
-"""Annotations as they are edited: operations that people ask for, and the edits of single entries that they become.
+"""Operations on annotations, and the edits of single entries that they become.
 
-An edit knows its entry before and after. So it can be undone, it can be told whether it still fits what others have
-changed meanwhile, and a history of edits is enough to know who did what.
+An edit stores its entry before and after: it can be undone and checked for conflicts with changes of others.
 """
 
 from __future__ import annotations

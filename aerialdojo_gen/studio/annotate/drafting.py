@@ -35,10 +35,10 @@ from aerialdojo_gen.scenes.model import Scene
 log = logging.getLogger(__name__)
 
 AUTO = "auto"
-# As many objects as a first run of a scene of one's own is planned with: some hundred tasks.
+# Default number of objects: some hundred tasks.
 _AUTO_OBJECTS = 20
 _FEW_THINGS = 8
-# A task goes from one object to another.
+# A task needs a start and a target object.
 MIN_OBJECTS = 2
 _CAUSES = {
     "no_surface": "no surface 1 m away",
@@ -63,7 +63,7 @@ def draft_scene(
     keep_objects: bool = False,
     reporter: Reporter | None = None,
 ) -> Path:
-    """Draft a scene's annotations and write them to the folder of annotations."""
+    """Draft a scene's annotations and write them to the annotations folder."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     if keep_objects:
         return _redraft(name, path, roots, seed)
@@ -113,7 +113,7 @@ def draft_scene(
 
 
 def _check_enough(name: str, found: int, expected: int, why: str, *, exact: bool) -> None:
-    """Refuse a draft of nothing, or of fewer objects than there must be; warn of one of fewer than were proposed."""
+    """Raise an error for an empty or incomplete draft; warn of one smaller than proposed."""
     by_hand = f"add others by hand: {command('annotate', scene=name)}"
     if found == 0:
         raise _nothing_to_draft(name, why)
@@ -159,7 +159,7 @@ def _redraft(name: str, path: Path, roots: ProjectPaths, seed: int) -> Path:
 
 
 def make_reject(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[[str], str]:
-    """Make the test why a node cannot be an object: it must have a full shortlist of anchors."""
+    """Make the function that rejects nodes without a full shortlist of anchors, with the reason."""
     config = pipeline.anchor_sample
     world = World.of(scene, pipeline.embodiment.radius_m, config.margin_m)
     job = Job("anchor-sample", scene.name, 0, 1, pipeline.seed, pipeline.embodiment, roots)

@@ -1,6 +1,6 @@
-"""The history of an annotation file: one JSON line a change, saying who did what and when.
+"""The history of an annotation file: one JSON line per change, with author and time.
 
-It is also what undo and redo are made of, so that both outlive the server and a reload of the page.
+Undo and redo are based on it, so that they survive restarts of the server and reloads of the page.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ class Record(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
     time: str  # UTC, ISO 8601
-    who: str  # Name that the person gave
-    client: str  # The browser tab, whose undo and redo this is a part of
-    action: Action  # ``outside``: the file was changed by something other than this tool
-    what: str  # In words
+    who: str  # Name that the person entered
+    client: str  # The browser tab that the change's undo belongs to
+    action: Action  # ``outside``: changed by something other than this tool
+    what: str  # Summary in words
     before: str  # Versions of the file (SHA-256 of its bytes, hexadecimal)
     after: str
     edits: tuple[Edit, ...]
 
 
 class History:
-    """The lines of a history file, read on as it grows."""
+    """The records of a history file, read incrementally."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.records: list[Record] = []
-        self.whole = 0  # bytes up to the end of the last whole line
+        self.whole = 0  # bytes up to the end of the last complete line
         self._lock = threading.Lock()
 
     def refresh(self) -> None:
-        """Read what has been added since; a line without an end, left by a crash, is passed over."""
+        """Read new records; an incomplete last line, left by a crash, is ignored."""
         with self._lock:
             self._read_on()
 
@@ -59,11 +59,11 @@ class History:
             try:
                 self.records.append(Record.model_validate_json(line))
             except ValidationError:
-                continue  # of another version, or damaged: it can no longer be undone, and that is all
+                continue  # of another version, or damaged: it only cannot be undone
         self.whole += end
 
     def stacks(self, client: str) -> tuple[list[Record], list[Record]]:
-        """What a tab can undo and redo, the next one last."""
+        """Return a tab's undo and redo stacks, the next one last."""
         undo: list[Record] = []
         redo: list[Record] = []
         for record in self.records:
@@ -79,12 +79,12 @@ class History:
         return undo, redo
 
     def since(self, version: str) -> Iterator[Record]:
-        """The changes after a version, as far as the history knows it; all of them where it does not."""
+        """Yield the changes after a version; all of them if it is unknown."""
         last = max((k for k, record in enumerate(self.records) if record.after == version), default=None)
         first = max((k for k, record in enumerate(self.records) if record.before == version), default=None)
         start = last + 1 if last is not None else first if first is not None else 0
         yield from self.records[start:]
 
     def highest_id(self, kind: str) -> int:
-        """The highest id that an entry of a kind ever had here; -1 where there was none."""
+        """Return the highest id that a kind of entry ever had; -1 if none."""
         return max((e.id for record in self.records for e in record.edits if e.kind == kind), default=-1)

@@ -1,4 +1,4 @@
-"""The twin of ``annotate``: serve a desk's page until Ctrl-C, or write its boxes."""
+"""``annotate`` as functions: serve a session's page until Ctrl-C, or write its COCO export."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def serve_session(
 
 
 def write_coco(session: AnnotationSession, path: Path) -> Path:
-    """Write `coco_zip` to a file, whole or not at all."""
+    """Write `coco_zip` to a file atomically."""
     content = coco_zip(session)
     session.anchors.close()
     with atomic_file(path.parent, path.name) as temporary:

@@ -1,4 +1,4 @@
-"""The annotation tool's web server: requests in, the desk's answers out; checks nothing that the desk can check."""
+"""The annotation tool's web server: HTTP routes that call an `AnnotationSession`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class _Body(BaseModel):
 
 
 class AuthoredRequest(_Body):
-    """A request that changes something says who asks for it."""
+    """A request for a change, with its author."""
 
     who: Annotated[StrictStr, Field(max_length=80)] = ""
     client: Annotated[StrictStr, Field(max_length=40, pattern=r"^[A-Za-z0-9-]*$")] = ""
@@ -69,7 +69,7 @@ class Ray(_Body):
 
 
 class Box(_Body):
-    """A box around a thing for which the mesh has no node."""
+    """A box around a thing that has no node in the mesh."""
 
     low_m: _Triple
     high_m: _Triple
@@ -77,7 +77,7 @@ class Box(_Body):
 
 
 class Viewpoint(_Body):
-    """A place to look at an object from; without a yaw it faces it, with `snap` it is moved to the standoff."""
+    """A viewpoint of an object; without a yaw it faces the object, with `snap` it is moved to the standoff."""
 
     position_m: _Triple
     yaw_deg: Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-720, le=720)] | None = None
@@ -118,7 +118,7 @@ def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
         try:
             return _with_version(session.change(version, body.author, body.operation))
         except (StoreError, AnnotationError) as error:
-            # A full disk, a file that an editor has left half: no fault of what is asked, which the page sends again.
+            # A full disk or a half-written file is not the client's fault: it retries.
             return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
     @app.post("/api/undo")

@@ -1,4 +1,4 @@
-"""One scene at the annotation desk: its annotations with everything that the page says about them."""
+"""An annotation session: one scene's annotations with everything that the page shows."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from aerialdojo_gen.studio.web.payload import scene_payload
 
 
 class AnnotationSession:
-    """What the page's requests come down to."""
+    """The operations behind the page's requests."""
 
     def __init__(self, name: str, pipeline: Pipeline, roots: ProjectPaths) -> None:
         self.storage = Storage(roots.annotations, name)
@@ -43,14 +43,14 @@ class AnnotationSession:
         self._looks = {category: catalogue[category].looks for category in catalogue}
         self._targets = catalogue.targets
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
-        self._lock = threading.RLock()  # the geometry remembers as it goes
+        self._lock = threading.RLock()  # the geometry caches results
         self._open_scene()
 
     def _open_scene(self, commit: Callable[[], None] = lambda: None) -> None:
-        """Read the scene, do what makes it the desk's, and only then let go of the one before."""
+        """Load the scene, run `commit`, and only then replace the previous scene."""
         name, pipeline = self.storage.scene, self._pipeline
         job = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots)
-        scene = job.scene_model(keep=2)  # a picture of the scene before may be under way
+        scene = job.scene_model(keep=2)  # a picture of the previous scene may be in progress
         payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts, self._looks)
         rays = ray_caster(scene)
         commit()
@@ -59,10 +59,10 @@ class AnnotationSession:
         self._described: tuple[str, dict[str, Any]] | None = None
         self.anchors = AnchorService(scene, pipeline, self._roots)
 
-    # What the page shows.
+    # Reading.
 
     def facts(self) -> dict[str, Any]:
-        """What stays the same: the scene's name, bounds and categories with the words for them."""
+        """Return what does not change: name, bounds and categories with their words."""
         there = {instance.category for instance in self.scene.instances}
         words = {category: self._names.get(category, spoken(category)) for category in there}
         if self.scene.imported:
@@ -79,7 +79,7 @@ class AnnotationSession:
         }
 
     def document(self, client: str = "") -> dict[str, Any]:
-        """The annotations, where each entry is, what it lacks, and what the tab `client` can undo."""
+        """Return the annotations with positions, faults, and what the tab `client` can undo."""
         return self._document(self.storage.load(), client)
 
     def _document(self, state: State, client: str) -> dict[str, Any]:
@@ -97,7 +97,7 @@ class AnnotationSession:
             }
 
     def draft(self, operation: Operation) -> dict[str, Any]:
-        """What would be said of an entry after an operation, which is not done: the check while somebody types."""
+        """Return an entry as it would be after an operation: the check while somebody types."""
         annotations = self.storage.load().annotations
         edits = edits_of(operation, annotations, 2**31 - 1)
         with self._lock:
@@ -105,10 +105,10 @@ class AnnotationSession:
         entry_id = 2**31 - 1 if isinstance(operation, Add) else operation.id
         return next((e for e in described[operation.kind] if e["id"] == entry_id), {})
 
-    # What changes them.
+    # Changes.
 
     def change(self, version: str, author: Author, operation: Operation) -> dict[str, Any]:
-        """Do an operation and save it; see `Storage.change`."""
+        """Apply an operation and save it; see `Storage.change`."""
         fields = {} if operation.do == "remove" else operation.fields.set_values()
         if fields.get("node", "") and fields["node"] not in self.scene:
             raise AerialDojoError(f"no node {fields['node']!r} in the scene")
@@ -117,15 +117,15 @@ class AnnotationSession:
         return self._saved(self.storage.change(version, author, operation), author)
 
     def undo(self, version: str, author: Author) -> dict[str, Any]:
-        """Take back the author's last change."""
+        """Undo the author's last change."""
         return self._saved(self.storage.undo(version, author), author)
 
     def redo(self, version: str, author: Author) -> dict[str, Any]:
-        """Do again what the author took back."""
+        """Redo the author's last undone change."""
         return self._saved(self.storage.redo(version, author), author)
 
     def replace(self, version: str, author: Author, raw: bytes) -> dict[str, Any]:
-        """Take over another annotation file."""
+        """Import an annotation file."""
         return self._saved(self.storage.replace(version, author, raw), author)
 
     def _saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
@@ -133,24 +133,21 @@ class AnnotationSession:
         return self._document(state, author.client) | {"done": _to_json(record) if record else None}
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
-        """What has been changed after a version, by whom."""
+        """Return the changes after a version."""
         with self._lock:
             self.storage.history.refresh()
             return [_to_json(record) for record in self.storage.history.since(version)][-50:]
 
     def history(self, most: int = 200) -> list[dict[str, Any]]:
-        """The last changes, the newest first."""
+        """Return the last changes, newest first."""
         with self._lock:
             self.storage.history.refresh()
             return [_to_json(record) for record in reversed(self.storage.history.records[-most:])]
 
-    # What is under the cursor, and anchors.
+    # Picking, and anchors.
 
     def pick(self, origin_m: Sequence[float], direction: Sequence[float]) -> dict[str, Any] | None:
-        """Find what a ray (world frame, metres) hits first: node, category, point and bearing.
-
-        None where it hits nothing.
-        """
+        """Return the first hit of a ray (world, metres): node, category, point, bearing; None if there is none."""
         ray = np.asarray([direction], dtype=np.float64)
         if not 1e-9 < float(np.linalg.norm(ray)) < 1e9:
             raise AerialDojoError("a ray needs a direction")
@@ -161,7 +158,7 @@ class AnnotationSession:
         return self.about(self._rays.nodes[int(k[0])]) | {"point_m": point.round(3).tolist()}
 
     def about(self, node: str) -> dict[str, Any]:
-        """What the mesh knows of a node."""
+        """Return what the mesh says about a node."""
         instance = self.scene[node]
         return {
             "node": node,
@@ -175,16 +172,16 @@ class AnnotationSession:
         }
 
     def object(self, object_id: int) -> Object:
-        """Look an object up whose node is in the scene; `UsageError` where there is none."""
+        """Return an object whose node is in the scene; `UsageError` if there is none."""
         found = find(self.storage.load().annotations, "objects", object_id)
         if found is None or not isinstance(found[1], Object) or found[1].node not in self.scene:
             raise UsageError(f"there is no object {object_id} with a node in the scene")
         return found[1]
 
-    # Boxes, where a foreign mesh has no node for a thing.
+    # Boxes, where an imported mesh has no node for a thing.
 
     def cut(self, low_m: Sequence[float], high_m: Sequence[float], category: str) -> dict[str, Any]:
-        """Make a node of what lies in a box (corners in world metres); only imported scenes can be cut."""
+        """Make a node of what lies in a box (corners in world metres); imported scenes only."""
         slug = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:60]
         if not slug:
             raise AerialDojoError("a category is required")
@@ -197,7 +194,7 @@ class AnnotationSession:
         return self.about(node)
 
     def uncut(self, node: str) -> None:
-        """Take a box away; `AerialDojoError` where its node is annotated, or no box made it."""
+        """Remove a box; `AerialDojoError` if its node is annotated, or no box made it."""
         annotations = self.storage.load().annotations
         if node in {e.node for e in annotations.landmarks} | {e.node for e in annotations.objects}:
             raise AerialDojoError(f"{node} is annotated: remove its entry first")
@@ -227,7 +224,7 @@ class AnnotationSession:
             raise AerialDojoError(f"invalid anchor: {'; '.join(faults)}")
 
     def export(self) -> bytes:
-        """The annotation file, byte for byte; that of a scene without one."""
+        """Return the annotation file, byte for byte, or an empty one."""
         state = self.storage.load()
         return (state.text or format_annotations(state.annotations)).encode("utf-8")
 
@@ -239,7 +236,7 @@ def _to_json(record: Record) -> dict[str, Any]:
 
 
 def open_session(name: str, pipeline: Pipeline, roots: ProjectPaths) -> AnnotationSession:
-    """Open a scene at the desk, building its mesh where that is not up to date."""
+    """Open a scene for annotation, building its mesh if it is stale."""
     from aerialdojo_gen.pipeline.runner import chosen_scenes
 
     scenes = chosen_scenes(pipeline, roots, [name])

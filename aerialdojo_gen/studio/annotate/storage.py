@@ -1,8 +1,7 @@
-"""An annotation file that several people and servers change: whole on disk after every change, or as before.
+"""An annotation file that several people and servers change: every change is atomic.
 
-A change goes to disk in three steps, under a lock: the new file under a temporary name, the line of the history,
-and the rename. A crash before the line leaves the file as it was; after it, the next to open the file finishes the
-rename. What was answered with "saved" is on disk either way.
+A change is written in three steps, under a lock: the new file under a temporary name, the history record, the
+rename. A crash before the record leaves the file unchanged; after it, the next reader completes the rename.
 """
 
 from __future__ import annotations
@@ -37,20 +36,20 @@ class State:
     """The file at one moment."""
 
     annotations: Annotations
-    text: str  # The file, byte for byte; empty where there is none yet
+    text: str  # The file's text; empty if there is none yet
     version: str  # SHA-256 of its bytes, hexadecimal
 
 
 @dataclass(frozen=True)
 class Author:
-    """Who changes something: the name that a person gave, and the tab it comes from."""
+    """The author of a change: the person's name and the browser tab."""
 
     who: str
     client: str
 
 
 class StaleError(ConflictError):
-    """A change was made for another version of the file than the one on disk."""
+    """A change was based on an outdated version of the file."""
 
     def __init__(self, state: State) -> None:
         super().__init__("these annotations have been changed by another client")
@@ -68,7 +67,7 @@ class Storage:
         self._read: State | None = None
 
     def load(self) -> State:
-        """Read the file, and finish what a crash left half done."""
+        """Read the file, completing a write that a crash interrupted."""
         if self._temporary.exists():
             with self.locked():
                 self._recover()
@@ -92,7 +91,7 @@ class Storage:
         return parse_whole(raw, self.scene, str(self.path))
 
     def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
-        """Do what somebody asks for."""
+        """Apply an operation and save it."""
 
         def edits(state: State) -> list[Edit]:
             return edits_of(operation, state.annotations, self._next_id(state, operation.kind))
@@ -100,12 +99,12 @@ class Storage:
         return self._commit(version, author, "do", edits)
 
     def replace(self, version: str, author: Author, raw: bytes) -> tuple[State, Record | None]:
-        """Put an annotation file in place of this one, as a change that can be undone; `AnnotationError` if wrong."""
+        """Replace the file by another one, as a change that can be undone; `AnnotationError` if it is invalid."""
         after = parse_whole(raw, self.scene, "the file")
         return self._commit(version, author, "import", lambda state: difference(state.annotations, after))
 
     def undo(self, version: str, author: Author) -> tuple[State, Record | None]:
-        """Take back the last change of the author's tab; `ConflictError` where somebody changed the entry since."""
+        """Undo the last change of the author's tab; `ConflictError` if the entry has changed since."""
 
         def edits(_: State) -> list[Edit]:
             done, _undone = self.history.stacks(author.client)
@@ -114,7 +113,7 @@ class Storage:
         return self._commit(version, author, "undo", edits)
 
     def redo(self, version: str, author: Author) -> tuple[State, Record | None]:
-        """Do again what the author's tab has taken back last."""
+        """Redo the last undone change of the author's tab."""
 
         def edits(_: State) -> list[Edit]:
             _done, undone = self.history.stacks(author.client)
@@ -167,7 +166,7 @@ class Storage:
             file.flush()
             os.fsync(file.fileno())
         with self.history.path.open("r+b") as file:
-            file.truncate(self.history.whole)  # a line that a crash cut
+            file.truncate(self.history.whole)  # drop an incomplete line
             file.seek(self.history.whole)
             file.write(b"".join(record.model_dump_json().encode("utf-8") + b"\n" for record in records))
             file.flush()
@@ -183,7 +182,7 @@ class Storage:
             os.close(folder)
 
     def _recover(self) -> None:
-        """Finish the rename that the history's last line speaks of, or drop a file that nothing speaks of."""
+        """Complete the rename of the history's last record, or drop an unrecorded file."""
         self.history.refresh()
         if not self._temporary.exists():
             return
@@ -196,8 +195,8 @@ class Storage:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep everybody else who changes this scene waiting."""
-        # The history file is the lock, too: it is never replaced, so that all see the same one.
+        """Lock the scene against other writers."""
+        # The history file is also the lock: it is never replaced, so that all processes share it.
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.history.path.open("ab") as file:
@@ -208,7 +207,7 @@ class Storage:
 
 
 def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
-    """Read an annotation file that has no fault of form."""
+    """Parse an annotation file without faults of form."""
     try:
         source = parse_annotations(raw.decode("utf-8"))
     except UnicodeDecodeError as error:

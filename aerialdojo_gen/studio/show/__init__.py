@@ -1,1 +1,1 @@
-"""One task for a person: its route drawn over orthographic pictures of its scene, as a PNG or a page."""
+"""A task as a PNG or a page: its route drawn over orthographic pictures of the scene."""

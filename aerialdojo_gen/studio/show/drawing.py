@@ -1,4 +1,4 @@
-"""The parts of a task's picture, each on its own axes: map, side view, height profile."""
+"""The parts of a task's figure, each on its own axes: map, side view, height profile."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aerialdojo_gen.studio.show.pictured import PicturedTask
 
 Floats = NDArray[np.float64]
 
-# Clearance from tight (red) to open (blue), as on the page of `view`; told apart by the colour-blind too.
+# Clearance from tight (red) to open (blue), as in `view`; safe for colour-blind readers.
 TIGHT_M, OPEN_M = 0.25, 5.0
 _STOPS = ((0.25, "#a50026"), (0.5, "#f46d43"), (1.0, "#fee090"), (2.0, "#74add1"), (5.0, "#313695"))
 CLEARANCE_COLOURS = LinearSegmentedColormap.from_list(
@@ -29,7 +29,7 @@ _START, _GOAL, _TARGET = "#0284c7", "#16a34a", "#facc15"
 _HALO = (withStroke(linewidth=3, foreground="black"),)
 _HALO_OF_BAR = (withStroke(linewidth=5, foreground="black"),)
 _MARGIN_M, _LEAST_M, _ABOVE_M = 7.0, 26.0, 3.0
-# As wide as the words at a route's ends, of a picture's width.
+# Label width at a route's ends, as a share of the figure's width.
 _LABEL_SHARE = 0.09
 
 
@@ -38,7 +38,7 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
     way, landmark = task.way, _centre(task.landmark)
     corners = np.array([way.min(axis=0), way.max(axis=0), *_box(task.target)])[:, :2]
     with_landmark = np.vstack([corners, landmark[:2]])
-    # A far landmark would make the route small: then an arrow at the edge shows the way to it.
+    # A far landmark would make the route small: use an arrow at the edge instead.
     near = np.ptp(with_landmark, axis=0).max() <= max(1.7 * np.ptp(corners, axis=0).max(), 45.0)
     extent = _frame(with_landmark if near else corners, aspect)
     height = max(way[:, 2].max(), _box(task.target)[1][2]) + _ABOVE_M
@@ -62,10 +62,7 @@ def draw_map(axes: Axes, task: PicturedTask, aspect: float) -> None:
 
 
 def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
-    """Draw the route from the side, from start on the left to goal on the right.
-
-    All that stands before it cut away.
-    """
+    """Draw the route from the side, start on the left, goal on the right; what is in front of it is cut away."""
     first, last = task.way[0], task.way[-1]
     along = np.array([last[0] - first[0], last[1] - first[1], 0.0])
     if np.linalg.norm(along) < 1.0:
@@ -78,7 +75,7 @@ def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
     flat = Plane(origin, right, up, (0.0, 1.0, 0.0, 1.0)).project(points)
     ground = np.nanmin(np.append(task.below_m, points[:, 2].min()))
     extent = _frame(np.vstack([flat, [flat[0, 0], ground]]), aspect, around_m=3.0, least_m=4.0)
-    # Room that is left over belongs above: below there is only earth.
+    # Spare room goes above: below there is only earth.
     height = extent[3] - extent[2]
     bottom = min(extent[2] + 0.4 * height, min(ground, float(flat[:, 1].min())) - 0.12 * height)
     extent = (extent[0], extent[1], bottom, bottom + height)
@@ -98,7 +95,7 @@ def draw_side(axes: Axes, task: PicturedTask, aspect: float) -> None:
 
 
 def draw_profile(axes: Axes, task: PicturedTask) -> None:
-    """Draw height over distance flown, with what lies below."""
+    """Draw height over distance flown, and the surface below."""
     s, z = task.along_m, task.way[:, 2]
     floor = np.nanmin(np.append(task.below_m, z.min())) - 0.06 * max(2.0, float(np.ptp(z)))
     below = np.where(np.isnan(task.below_m), floor, task.below_m)
@@ -115,7 +112,7 @@ def draw_profile(axes: Axes, task: PicturedTask) -> None:
 
 
 def plain(text: str) -> str:
-    """Keep matplotlib from reading a dollar sign in a name as mathematics."""
+    """Escape dollar signs, which matplotlib would read as mathematics."""
     return text.replace("$", r"\$")
 
 
@@ -132,7 +129,7 @@ def _box(row: dict[str, float]) -> Floats:
 def _frame(
     points: Floats, aspect: float, around_m: float = _MARGIN_M, least_m: float = _LEAST_M
 ) -> tuple[float, float, float, float]:
-    """Frame points (n, 2) with room around them, in a rectangle of an aspect."""
+    """Return an extent of the given aspect around points (n, 2), with a margin."""
     low, high = points.min(axis=0) - around_m, points.max(axis=0) + around_m
     middle = (low + high) / 2.0
     width = max(high[0] - low[0], aspect * (high[1] - low[1]), least_m)
@@ -173,7 +170,7 @@ def _endpoints(axes: Axes, task: PicturedTask, plane: Plane) -> None:
     low, high = sorted(axes.get_xlim())
     for (a, b), other, text, colour in zip(ends, ends[::-1], ("start", "goal"), (_START, _GOAL), strict=True):
         axes.plot([a], [b], "o", ms=10, mfc=colour, mec="white", mew=1.6, zorder=8)
-        # Away from the other end, unless the picture ends there.
+        # Away from the other end, unless the figure ends there.
         side = -1 if a < other[0] else 1
         has_room = (a - low if side < 0 else high - a) > _LABEL_SHARE * (high - low)
         axes.annotate(
@@ -184,7 +181,7 @@ def _endpoints(axes: Axes, task: PicturedTask, plane: Plane) -> None:
 
 
 def _landmark(axes: Axes, task: PicturedTask, extent: tuple[float, float, float, float]) -> None:
-    """Mark the landmark and the direction from it to the target, or point to where it lies."""
+    """Mark the landmark and the direction to the target, or an arrow towards it."""
     mark, target = _centre(task.landmark)[:2], _centre(task.target)[:2]
     distance = float(np.linalg.norm(target - mark))
     inside = extent[0] < mark[0] < extent[1] and extent[2] < mark[1] < extent[3]
@@ -233,7 +230,7 @@ def _compass(axes: Axes) -> None:
 
 
 def _scale_bar(axes: Axes, extent: tuple[float, float, float, float], share: float = 0.02) -> None:
-    """Draw a bar of a round length at the bottom, from a share of the width on."""
+    """Draw a scale bar of a round length, bottom left."""
     wish = (extent[1] - extent[0]) / 6.0
     power = 10.0 ** math.floor(math.log10(wish))
     length = max(step * power for step in (1, 2, 5) if step * power <= wish)

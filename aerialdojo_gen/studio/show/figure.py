@@ -1,4 +1,4 @@
-"""A task on one sheet: a PNG for a paper, a talk or a look."""
+"""A task as one PNG."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _frames(sheet: _Sheet, task: PicturedTask) -> None:
 
 
 def write_png(task: PicturedTask, path: Path) -> Path:
-    """Write the picture of a task, whole or not at all."""
+    """Write the figure of a task atomically."""
     if path.suffix.lower() != ".png":
         raise UsageError(f"{path}: the output must be a PNG file, for example {path.with_suffix('.png').name}")
     with atomic_file(path.parent, path.name) as temporary:

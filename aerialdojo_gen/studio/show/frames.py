@@ -1,4 +1,4 @@
-"""What the front camera sees along a route: from the recording where there is one, else rendered now."""
+"""Front camera frames along a route: from the recording if there is one, else rendered."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ SIZE_PX = 320
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One picture of the way."""
+    """A frame at a pose of the route."""
 
-    step: int  # Pose of the route
-    action: str  # What is done there
+    step: int  # Index of the pose
+    action: str  # The action taken there
     rgb: NDArray[np.uint8]  # (SIZE_PX, SIZE_PX, 3) uint8; front view, sRGB
     recorded: bool  # Whether it comes from a recording
 
 
 def frames_along(task: FoundTask, count: int) -> list[Frame]:
-    """Front views at poses evenly along a route, start and goal among them."""
+    """Return front views at evenly spaced poses of a route, including start and goal."""
     if count == 0:
         return []
     route = task.route
@@ -57,7 +57,7 @@ def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.ui
 
 
 def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | None:
-    """Frames of the recording at some poses; None where the task was not recorded."""
+    """Return recorded frames at the poses; None if the task was not recorded."""
     root, scene = task.scene.root, task.scene.name
     if not store.shards(root, "recordings", scene):
         return None

@@ -1,4 +1,4 @@
-"""A task as one page that opens without a network: pictures and styles lie in it, there is no script."""
+"""A task as a self-contained HTML page without scripts."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _hex(rgba: tuple[float, float, float, float]) -> str:
 
 
 def write_page(task: PicturedTask, path: Path) -> Path:
-    """Write the page of a task, whole or not at all."""
+    """Write the page of a task atomically."""
     with atomic_file(path.parent, path.name) as temporary:
         temporary.write_text(render_page(task), encoding="utf-8")
     return path

@@ -1,4 +1,4 @@
-"""All that a picture of a task needs, gathered once for the PNG and the page."""
+"""Everything that the figure and the page of a task need."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PicturedTask:
     poses: Floats  # (K + 1, 4) float64; x, y, z and yaw of every pose
     way: Floats  # (n, 3) float64; points every half metre of the route at most, metres, world frame
     along_m: Floats  # (n,) float64; distance flown to each of them
-    clearance_m: Floats  # (n,) float64; fCL's distance from each to the nearest surface
+    clearance_m: Floats  # (n,) float64; FCL's distance from each to the nearest surface
     below_m: Floats  # (n,) float64; height of the surface under each, NaN where there is none
     reference: NDArray[np.uint8] | None  # (H, W, 3) uint8 or None; the target's reference image
     frames: list[Frame]
@@ -40,20 +40,20 @@ class PicturedTask:
 
     @property
     def title(self) -> str:
-        """Say what is to be found, in a line."""
+        """Return the title: what to find."""
         row = self.instance
         return f"{row['target_name']}, {row['direction']} of the {row['landmark']}"
 
     @property
     def place(self) -> str:
-        """Say where the task stands, in a line."""
+        """Return the subtitle: task, scene and setting."""
         row, gap = self.instance, "   ·   "
         kind = f"{row['setting'].replace('_', ' ')}, {row['modality']} goal, {self.task.route['split']}"
         return gap.join([row["task_id"], f"{row['family']}, {row['scene_type']}", kind])
 
     @property
     def goal(self) -> str:
-        """The goal as an agent reads it."""
+        """The goal text that an agent gets."""
         row = self.instance
         return goal_text(
             Goal(
@@ -69,7 +69,7 @@ class PicturedTask:
 
     @property
     def terminal_goal(self) -> str:
-        """The goal for a terminal, which shows no picture: which one it is, and what the twin in words says."""
+        """The goal for a terminal: for image goals, the image's id and the description of the semantic task."""
         row = self.instance
         if row["modality"] != "image" or self.reference is None:
             return self.goal
@@ -84,7 +84,7 @@ class PicturedTask:
 
     @property
     def facts(self) -> list[tuple[str, str]]:
-        """Figures of the route, name and value."""
+        """Measures of the route, as name and value."""
         route = self.task.route
         return [
             ("length L", f"{route['length_m']:.2f} m"),
@@ -98,7 +98,7 @@ class PicturedTask:
 
     @property
     def actions(self) -> list[tuple[str, int]]:
-        """The reference actions, repeats counted."""
+        """The reference actions, run-length encoded."""
         runs: list[tuple[str, int]] = []
         for action in self.task.route["action"]:
             name = schemas.ACTION_NAMES[action]
@@ -110,7 +110,7 @@ class PicturedTask:
 
 
 def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -> PicturedTask:
-    """Gather what is drawn of a task."""
+    """Collect what is drawn of a task."""
     scene, route = task.scene, task.route
     rows = sorted(task.instances, key=lambda row: row["modality"] != modality)
     target = scene.object(route["target_object_id"])

@@ -1,4 +1,4 @@
-"""What the page of a scene is told: places, routes, their ways, and all of one route."""
+"""JSON and binary data for the page of a scene: places, routes, and one route in detail."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.store import schemas
 
 _OBJECT = ("object_id", "name", "category", "description", "mesh_node", "direction", "landmark_id")
-# Sine of the angle up to which a way goes straight on.
+# Sine of the angle below which a route is straight.
 _STRAIGHT = 1e-5
 _NUMBERS = ("euclidean_m", "length_m", "detour_ratio", "min_clearance_m")
 
 
 def scene_index(scene: ReleasedScene) -> dict[str, Any]:
-    """Collect what the page lists and filters: JSON values, world metres to a millimetre."""
+    """Return what the page lists and filters: JSON values, world metres to a millimetre."""
     names = {row["landmark_id"]: row["name"] for row in scene.landmarks}
     routes = scene.routes.drop_columns(["x_m", "y_m", "z_m", "yaw_rad", "action"])
     modalities: dict[str, list[str]] = {}
@@ -98,7 +98,7 @@ def _without(
 
 
 def route_detail(scene: ReleasedScene, nav_id: str) -> dict[str, Any]:
-    """Tell all of one route: poses, actions, FCL's clearance every half metre at most, and what the agent reads."""
+    """Return one route in detail: poses, actions, clearance at least every half metre, and its tasks."""
     route = scene.route(nav_id)
     poses = np.column_stack([route["x_m"], route["y_m"], route["z_m"]])
     moved = np.concatenate([[True], np.any(np.diff(poses, axis=0) != 0.0, axis=1)])

@@ -1,4 +1,4 @@
-"""The scenes that `view` shows: their payloads, pictures and ways, the last few of them kept."""
+"""The scenes that `view` shows: mesh payloads, images and routes, with a small cache."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from aerialdojo_gen.studio.view.contents import route_detail, route_points, scen
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _T = TypeVar("_T")
-# A payload is some 20 MB, a scene's objects with their pictures as much.
+# A payload takes some 20 MB, the objects with their images as much.
 _MAX_OPEN = 4
 _WIDTH_PX, _HEIGHT_PX, _FOV_DEG = 480, 300, 60.0
 THUMB_PX = 224
 
 
 class SceneData:
-    """One scene with what the page asks for; what takes its mesh is made when it is first asked for."""
+    """The data of one scene, computed lazily."""
 
     def __init__(self, released: ReleasedScene) -> None:
         self.released = released
 
     @cached_property
     def payload(self) -> bytes:
-        """The mesh for the browser; AssetError where it is missing or another one."""
+        """The mesh for the browser; AssetError if it is missing or does not match."""
         return scene_payload(self.released.model)
 
     @cached_property
@@ -48,15 +48,15 @@ class SceneData:
 
     @cached_property
     def points(self) -> bytes:
-        """The ways of all routes."""
+        """The points of all routes."""
         return route_points(self.released)
 
     def detail(self, nav_id: str) -> dict[str, Any]:
-        """All of one route; UsageError where there is none."""
+        """Return one route in detail; UsageError if there is none."""
         return route_detail(self.released, nav_id)
 
     def image(self, object_id: int) -> bytes:
-        """Return the reference image of an object, PNG; UsageError where it has none."""
+        """Return the reference image of an object, PNG; UsageError if it has none."""
         image: bytes | None = self.released.object(object_id)["reference_image"]
         if image is None:
             raise UsageError(f"object {object_id} has no reference image")
@@ -64,7 +64,7 @@ class SceneData:
 
 
 class SceneCache:
-    """The scenes of a release, opened when they are asked for."""
+    """The scenes of a release, opened on demand."""
 
     def __init__(self, root: DataRoot, names: Sequence[str]) -> None:
         self.root, self.names = root, tuple(names)
@@ -72,19 +72,19 @@ class SceneCache:
         self._thumbs: dict[tuple[str, int], bytes] = {}
         self._pictures: dict[str, bytes] = {}
         self._lock = threading.Lock()
-        # A renderer belongs to the thread that has made it, FCL's manager is no thing for two, and scenes that are
-        # let go of close both: all that touches a mesh is done by one thread.
+        # Renderers belong to their thread and FCL's manager is not thread-safe; dropping a scene closes both.
+        # So one thread does everything that touches a mesh.
         self._worker = ThreadPoolExecutor(1, "scenes")
         self._render_lock, self._read_lock = threading.Lock(), threading.Lock()
         self._images = lru_cache(maxsize=_MAX_OPEN)(self._read_images)
 
     def require(self, name: str) -> None:
-        """UsageError where there is no scene of the name."""
+        """Raise a UsageError if there is no such scene."""
         if name not in self.names:
             raise UsageError(unknown("no scene", name, self.names, most=3))
 
     def run(self, name: str, what: Callable[[SceneData], _T]) -> _T:
-        """Do something with a scene; UsageError where there is none of the name."""
+        """Run a function on a scene; UsageError if there is none of the name."""
         self.require(name)
         return self._worker.submit(lambda: what(self._load(name))).result()
 
@@ -97,7 +97,7 @@ class SceneCache:
             return data
 
     def thumb(self, name: str, object_id: int) -> bytes:
-        """Return an object's reference image made small, JPEG; UsageError where it has none."""
+        """Return an object's reference image as a thumbnail, JPEG; UsageError if it has none."""
         self.require(name)
         with self._read_lock:
             key = (name, object_id)
@@ -115,8 +115,8 @@ class SceneCache:
         return dict(zip(table["object_id"].to_pylist(), table["reference_image"].to_pylist(), strict=True))
 
     def picture(self, name: str) -> bytes:
-        """Return a picture of a scene from its south-west, JPEG, as the page of the scene begins."""
-        # One at a time: the start page asks for many, and who opens a scene is not to wait for them all.
+        """Return a picture of a scene from the south-west, JPEG, like the initial view of its page."""
+        # One at a time: the start page requests many, and other requests must not wait for all of them.
         with self._render_lock:
             if name not in self._pictures:
                 self._pictures[name] = self.run(name, lambda data: _picture(data.released.model))

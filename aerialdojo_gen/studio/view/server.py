@@ -1,4 +1,4 @@
-"""`view`: the scenes of a release in the browser, with their landmarks, objects, anchors and routes."""
+"""`view`: the scenes of a release in the browser, with landmarks, objects, anchors and routes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_TASKS = 200
 
 
 def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
-    """Make the app that shows a release: a start page at ``/``, a page a scene at ``/scenes/NAME/``."""
+    """Make the app of a release: a start page at ``/``, one page per scene at ``/scenes/NAME/``."""
     root = open_root(data)
     names = chosen_scenes(root, scenes)
     app = local_app("start.html", f"aerialdojo-gen view {root}", also=("view.html",))
@@ -90,7 +90,7 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
 
 
 def chosen_scenes(data: Where, scenes: str | Sequence[str] | None) -> list[str]:
-    """Resolve names and globs to scenes of the release; all where there are none."""
+    """Resolve names and globs to scenes of the release; all by default."""
     given = (scenes,) if isinstance(scenes, str) else tuple(scenes or ())
     return scenes_in_release(data, given)
 

@@ -1,4 +1,4 @@
-"""The tasks of a release as the start page lists them: by filters and words, a page of them at a time."""
+"""The tasks of a release on the start page: filtered, sorted, paged."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ORDERS = ("nav_id", "length_m", "detour_ratio", "min_clearance_m", "n_actions")
 
 
 class TaskList:
-    """Navigation tasks with their targets; a scene's are read when it is first asked for."""
+    """Navigation tasks with their targets, read per scene on demand."""
 
     def __init__(self, release: Release, names: Sequence[str]) -> None:
         self._release, self._names = release, tuple(names)
@@ -49,7 +49,7 @@ class TaskList:
         self, scenes: Sequence[str], *, setting: str = "", split: str = "", words: str = "", order: str = "nav_id",
         descending: bool = False, offset: int = 0, most: int = 48,
     ) -> dict[str, Any]:  # fmt: skip
-        """Find tasks by words, setting and split, in an order: ``total`` and the rows of a page."""
+        """Return the matching tasks: ``total`` and the rows of one page."""
         if order not in ORDERS:
             raise UsageError(f"tasks are ordered by {', '.join(ORDERS)}")
         parts = [
@@ -69,7 +69,7 @@ def _filter(table: pa.Table, setting: str, split: str, words: Sequence[str]) -> 
         if value:
             keep &= pc.equal(table[column], value).to_numpy(zero_copy_only=False)
     for word in words:
-        # A task's id is its route's and a letter more.
+        # A task id is its route's id plus a suffix.
         holds = pc.match_substring(table["nav_id"], re.sub("-[si]$", "", word), ignore_case=True)
         for column in ("name", "category", "description", "landmark"):
             begins = pc.match_substring_regex(

@@ -1,1 +1,1 @@
-"""Web pages on the local machine: what `view` and `annotate` share."""
+"""Local web pages: what `view` and `annotate` share."""

@@ -1,7 +1,6 @@
-"""What a client may cost the server of a page: connections, time for a request, lines in the log.
+"""Limits on clients of the local server: connections, time per request, log lines.
 
-uvicorn bounds none of them by itself: a connection that sends half a request stays for ever, and where there are as
-many of them as the process may open files nobody else is let in, and every refused connection is logged at length.
+uvicorn has none of them: half requests stay open for ever, use up all file descriptors, and then fill the log.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-# A request line and headers within HEAD_S of the connection (or of the answer before), a body within BODY_S.
+# Time limits for a request's head and body.
 HEAD_S, BODY_S = 10.0, 60.0
-# An answer of which nothing is taken for so long is given up.
+# A response that the client stops reading is aborted after this time.
 STALL_S = 30.0
 MOST_CONNECTIONS, MOST_PER_CLIENT = 256, 64
 MOST_LINES, WINDOW_S = 20, 60.0
@@ -26,23 +25,23 @@ _TOO_LATE = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-lengt
 
 
 class LimitedProtocol(H11Protocol):
-    """A connection that is closed when it keeps the server waiting, or when others need its place.
+    """A connection that is closed when it is too slow, or when its place is needed.
 
-    Where there are too many, all in all or of one address, the one goes that has waited longest for the rest of a
-    request: half requests crowd each other out, and whoever sends a whole one is served.
+    With too many connections, in total or from one address, the one that has waited longest for the rest of a request
+    is closed: half requests displace each other, whole ones are served.
     """
 
     transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take the connection, and close another one where there are too many."""
+        """Register the connection, and close another one if there are too many."""
         super().connection_made(transport)
         self._phase = ""
         self._timer: asyncio.TimerHandle | None = None
         self._stall: asyncio.TimerHandle | None = None
         self._waits_since = time.monotonic()
         self._follow()
-        # Of those accepted at one go, the ones closed before are still in the set.
+        # Connections closed in the same batch are still in the set.
         others = [c for c in self.connections if isinstance(c, LimitedProtocol) and not c.transport.is_closing()]
         mine = [c for c in others if c.host == self.host]
         if len(mine) > MOST_PER_CLIENT:
@@ -57,7 +56,7 @@ class LimitedProtocol(H11Protocol):
 
     @property
     def _idle(self) -> bool:
-        """Whether it has been served, and has not begun to ask for more."""
+        """Whether it has been served and has not begun another request."""
         return self._phase == "head" and self.cycle is not None and not self.conn.trailing_data[0]
 
     @property
@@ -66,24 +65,24 @@ class LimitedProtocol(H11Protocol):
         return self.client[0] if self.client else ""
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the clocks."""
+        """Stop the timers."""
         super().connection_lost(exc)
         for timer in (self._timer, self._stall):
             if timer is not None:
                 timer.cancel()
 
     def data_received(self, data: bytes) -> None:
-        """Read on, and see what is waited for now."""
+        """Read on, and update what is awaited."""
         super().data_received(data)
         self._follow()
 
     def on_response_complete(self) -> None:
-        """Answered: the next request, if there is one, has its own time."""
+        """Start the time limit of the next request."""
         super().on_response_complete()
         self._follow()
 
     def _follow(self) -> None:
-        # An answer may be complete before the request is: what was refused unread is still waited for.
+        # A response may be complete before its request: a refused body is still awaited.
         if self.conn.their_state is h11.SEND_BODY:
             phase = "body"
         elif self.cycle is None or self.cycle.response_complete:
@@ -105,12 +104,12 @@ class LimitedProtocol(H11Protocol):
         self.transport.close()
 
     def pause_writing(self) -> None:
-        """Wait for the client to take what it asked for, as long as it takes any of it."""
+        """Wait for the client to read, as long as it makes progress."""
         super().pause_writing()
         self._watch(self.transport.get_write_buffer_size())
 
     def resume_writing(self) -> None:
-        """Go on."""
+        """Stop watching."""
         super().resume_writing()
         if self._stall is not None:
             self._stall.cancel()
@@ -127,13 +126,13 @@ class LimitedProtocol(H11Protocol):
 
 
 def most_connections() -> int:
-    """How many connections are held at a time: never more than half the files that the process may open."""
+    """Maximum open connections: at most half the process's file limit."""
     files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     return MOST_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, min(MOST_CONNECTIONS, files // 2))
 
 
 class BoundedLog(logging.Filter):
-    """Lets so many lines through a minute, and says how many it has kept back when there is room again."""
+    """Limits log lines per minute, and reports how many were dropped."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -155,12 +154,12 @@ class BoundedLog(logging.Filter):
 
 
 def limits() -> dict[str, Any]:
-    """Settings of `uvicorn.Config` that hold clients to these limits."""
-    # uvicorn's own limit_concurrency counts every connection, so that half requests would lock all others out.
+    """Settings of `uvicorn.Config` that enforce these limits."""
+    # uvicorn's limit_concurrency counts all connections: half requests would lock out everybody else.
     return {"http": LimitedProtocol, "ws": "none", "backlog": 128, "timeout_keep_alive": 5}
 
 
 def bound_log() -> None:
-    """Bound what the server and the event loop may log."""
+    """Limit the log of the server and the event loop."""
     for name in ("uvicorn.error", "asyncio"):
         logging.getLogger(name).addFilter(BoundedLog())

@@ -1,9 +1,8 @@
-"""A scene for the browser: one binary file, merged into a few draw calls, from which a triangle's node can be told.
+"""A scene as one binary file for the browser, merged into a few draw calls with the node of every triangle.
 
 Layout (little-endian): ``uint32`` length of the header, the header as JSON padded to 4 bytes, then the body that the
-header's offsets point into. ``static/payload.js`` reads it. Triangles are merged into one group for all flat colours
-and one for every size of texture (each a texture array), so that a scene is three draw calls or so; within a group
-they lie node by node, and ``ranges`` says where a node begins and ends.
+header's offsets point into; read by ``static/payload.js``. There is one group for all flat colours and one per
+texture size (a texture array each). In a group, triangles are sorted by node, with the bounds in ``ranges``.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from aerialdojo_gen.scenes.model import Material, Part, Scene
 VERSION = 1
 _FLAT = (0, 0)
 _LARGEST_PX = 4096
-# Larger textures are sent as JPEG, bytes of their pixels.
+# Larger textures, in bytes of pixels, are sent as JPEG.
 _PNG_BYTES = 4 << 20
 _NOTHING = np.zeros((0, 3), dtype=np.int64)
 _Look = tuple[int, int, bool, bool, bool, bool]
@@ -73,21 +72,21 @@ def scene_payload(scene: Scene) -> bytes:
 
 
 def _look(material: Material, behind: bool) -> _Look:
-    """What decides with which others a part draws: size of the texture, holes, both sides, light, behind all."""
+    """Return the key by which parts are merged into one draw call."""
     texture = _texture(material)
     size = _FLAT if texture is None else (texture.shape[0], texture.shape[1])
     return (*size, material.mask is not None, material.double_sided, material.unlit, behind)
 
 
 def _texture(material: Material) -> NDArray[np.uint8] | None:
-    """The texture as the page shows it: an atlas no larger than browsers take."""
+    """Return the texture in a size that browsers support."""
     if material.texture is None or not material.atlas:
         return material.texture
     return reduced(material.texture, _LARGEST_PX)
 
 
 def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
-    """Merge parts that draw together; within the group they stay in the order of the scene's instances."""
+    """Merge parts into one draw call, in the order of the scene's instances."""
     vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
     size, (holes, both_sides, unlit, behind) = look[:2], look[2:]
@@ -110,7 +109,7 @@ def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: d
     names = sorted({p.material for _, p in parts})
     layer = {name: k for k, name in enumerate(names)}
     layers = np.repeat(np.array([layer[p.material] for _, p in parts], dtype="<f4"), counts)
-    # The model's v points up, a picture's rows down; textures repeat, so that the sign is all there is to it.
+    # The model's v points up, image rows down; textures repeat, so only the sign changes.
     uv = np.concatenate([p.uv for _, p in parts]) * np.array([1.0, -1.0], dtype=np.float32)
     return group | {
         "uv": body.add(np.column_stack([uv, layers]).astype("<f4").tobytes()),
@@ -119,7 +118,7 @@ def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: d
 
 
 def _ranges(parts: list[tuple[int, Part]]) -> NDArray[np.int64]:
-    """Rows (node, first face, faces) of a group, (n, 3): one row for the parts of a node together."""
+    """Rows (node, first face, faces) of a group, (n, 3), one per node."""
     rows: list[list[int]] = []
     face = 0
     for node, part in parts:

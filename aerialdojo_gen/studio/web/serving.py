@@ -1,7 +1,7 @@
-"""A local web page: an app that answers this machine's browser alone, and the loop that serves it.
+"""Local web pages: an app that only this machine's browser can use, and the loop that serves it.
 
-A page on another site must not reach it: not by a form or a script (``Origin``), not by a name that resolves to
-127.0.0.1 (``Host``). A page may load nothing but what the app serves (``Content-Security-Policy``).
+Pages of other sites are rejected by ``Origin`` and ``Host`` (DNS rebinding), and a page may load nothing but what the
+app serves (``Content-Security-Policy``).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _Asgi = Callable[[_Message, _Receive, _Send], Awaitable[None]]
 
 
 class _LocalOnly:
-    """ASGI middleware: refuses foreign hosts and origins and large bodies, and sets the security headers."""
+    """ASGI middleware: rejects foreign hosts, origins and large bodies, and sets security headers."""
 
     def __init__(self, app: _Asgi, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
         self._app, self._max_body_bytes, self._any_host = app, max_body_bytes, any_host
@@ -95,7 +95,7 @@ class _LocalOnly:
 
 
 def require_web() -> None:
-    """Say what is missing before anything else is done."""
+    """Raise `MissingPackage` if the web packages are missing."""
     try:
         import fastapi  # noqa: F401
         import uvicorn  # noqa: F401
@@ -104,7 +104,7 @@ def require_web() -> None:
 
 
 def one_line(text: str, most: int = 500) -> str:
-    """Make a line for people of a text that may hold what a client sent."""
+    """Make a printable single line of a text that may come from a client."""
     shown = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" if c not in "\t\n\r" else " " for c in text)
     return shown if len(shown) <= most else f"{shown[: most - 4]} ..."
 
@@ -112,7 +112,7 @@ def one_line(text: str, most: int = 500) -> str:
 def local_app(
     page: str, title: str, max_body_bytes: int = 1 << 20, *, any_host: bool = False, also: Sequence[str] = ()
 ) -> FastAPI:
-    """Make an app that serves a page of ``static/`` at ``/``, the rest of that folder under ``/static/``."""
+    """Make an app that serves a page of ``static/`` at ``/``, and that folder under ``/static/``."""
     require_web()
     from fastapi import FastAPI, Request
     from fastapi.exceptions import RequestValidationError
@@ -163,7 +163,7 @@ def local_app(
 
 
 def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
-    """Listen on this machine's loopback, or on another IPv4 address of it; port 0 takes a free one."""
+    """Listen on loopback or another IPv4 address; port 0 chooses a free one."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -178,7 +178,7 @@ def open_socket(port: int, host: str = "127.0.0.1") -> socket.socket:
 
 
 def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: str = "") -> None:
-    """Serve until Ctrl-C, which is a plain end."""
+    """Serve until Ctrl-C."""
     import uvicorn
 
     from aerialdojo_gen.studio.web.limits import bound_log, limits
@@ -186,7 +186,7 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
     class Server(uvicorn.Server):
         @contextlib.contextmanager
         def capture_signals(self) -> Iterator[None]:
-            """Leave a SIGINT ignored where it was, as in a script's background job."""
+            """Keep SIGINT ignored if it was, as in a script's background job."""
             ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
             with super().capture_signals():
                 if ignored:
@@ -203,12 +203,12 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
     try:
         server.run(sockets=[listener])
     except KeyboardInterrupt:
-        pass  # uvicorn has shut down and passes the signal on
+        pass  # uvicorn has shut down and re-raises the signal
     finally:
         listener.close()
 
 
 def url_of(listener: socket.socket) -> str:
-    """Return the address of the page, e.g. ``http://127.0.0.1:8765/``."""
+    """Return the page's address, e.g. ``http://127.0.0.1:8765/``."""
     host, port = listener.getsockname()
     return f"http://{host}:{port}/"
