@@ -15,7 +15,7 @@ import numpy as np
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter, Vocabulary
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
-from aerialdojo_gen.annotations.landmarks import choose_landmarks, spread_m
+from aerialdojo_gen.annotations.landmarks import spread_m
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import rank
@@ -41,29 +41,6 @@ class DraftOptions:
     elevated_share: float = 0.0
     max_vegetation: int = 3  # Maximum objects per vegetation category
     max_per_category: int | None = None  # Maximum objects per other category; default 5
-
-
-def draft_annotations(
-    scene: Scene,
-    catalogue: Catalogue,
-    n_landmarks: int,
-    n_objects: int,
-    seed: int,
-    options: DraftOptions | None = None,
-    landmarks: Sequence[str] = (),
-) -> Annotations:
-    """Draft the annotations of a scene."""
-    vocabulary = Vocabulary(scene, catalogue)
-    drafter = AnnotationDrafter(
-        vocabulary, choose_landmarks(vocabulary, n_landmarks, landmarks), seed, options or DraftOptions()
-    )
-    objects = drafter.objects(n_objects)
-    if len(objects) < n_objects:
-        raise AnnotationError(
-            f"{scene.name}: {n_objects} objects requested, {len(objects)} can be chosen and distinguished"
-            f"{drafter.rejection_summary()}"
-        )
-    return Annotations(scene.name, drafter.landmarks, objects)
 
 
 class AnnotationDrafter:

@@ -77,8 +77,8 @@ class SceneGeometry:
     def _within(self, i: int, j: int, reach_m: float) -> bool:
         """Whether two instances are at most `reach_m` apart; boxes decide most cases without outlines."""
         (low_i, high_i), (low_j, high_j) = self.boxes[i].tolist(), self.boxes[j].tolist()
-        apart = [max(low_j[k] - high_i[k], low_i[k] - high_j[k], 0.0) for k in (0, 1)]
-        return math.hypot(*apart) <= reach_m + _GRID_SLACK_M and self.gap_m(i, j) <= reach_m
+        gaps = [max(low_j[k] - high_i[k], low_i[k] - high_j[k], 0.0) for k in (0, 1)]
+        return math.hypot(*gaps) <= reach_m + _GRID_SLACK_M and self.gap_m(i, j) <= reach_m
 
     def gap_m(self, i: int, j: int) -> float:
         """Distance between two instances: horizontally between outlines, vertically between height ranges."""

@@ -98,7 +98,7 @@ def _geotiff(path: Path) -> Dem:
         with rasterio.open(path, driver="GTiff") as file:
             if file.width * file.height > _MAX_CELLS:
                 raise AssetError(
-                    f"{path} has {file.width:,} x {file.height:,} heights, {_MAX_CELLS:,} are the most: "
+                    f"{path} has {file.width:,} x {file.height:,} heights, the maximum is {_MAX_CELLS:,}: "
                     "cut a part out of it first"
                 )
             z = file.read(1, masked=True).astype(np.float64).filled(np.nan)
@@ -204,7 +204,7 @@ def _check_npz_sizes(path: Path) -> None:
                 )
                 shape, _, dtype = read(file)
             if math.prod(shape) * dtype.itemsize > 8 * _MAX_CELLS:
-                raise ValueError(f"{name} has {math.prod(shape):,} numbers, {_MAX_CELLS:,} are the most")
+                raise ValueError(f"{name} has {math.prod(shape):,} numbers, the maximum is {_MAX_CELLS:,}")
 
 
 def _identity(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:

@@ -42,7 +42,9 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
-        raise AssetError(f"{path}: {size >> 20} MiB, the most is {MAX_FILE_BYTES >> 20}: simplify or split the mesh")
+        raise AssetError(
+            f"{path}: {size >> 20} MiB, the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
+        )
     if fault := _type_mismatch(path):
         raise AssetError(f"{path}: {fault}")
     with scratch_folder() as folder:
@@ -69,7 +71,7 @@ def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
         if not nodes:
             return "holds no triangles"
         if total > MAX_TRIANGLES:
-            return f"{total:,} triangles, the most is {MAX_TRIANGLES:,}: simplify or split the mesh"
+            return f"{total:,} triangles, the maximum is {MAX_TRIANGLES:,}: simplify or split the mesh"
         _pack(nodes, out)
     except AssetError as error:
         return str(error)
@@ -177,7 +179,7 @@ def check_glb(path: Path) -> None:
         raise AssetError(f"is a damaged {path.suffix[1:].upper()} file: an array of {min(counts):,} numbers")
     if sum(counts) > 6 * MAX_TRIANGLES or shown > MAX_TRIANGLES:
         raise AssetError(
-            f"asks for {max(shown, sum(counts) // 3):,} triangles, the most is {MAX_TRIANGLES:,}: "
+            f"asks for {max(shown, sum(counts) // 3):,} triangles, the maximum is {MAX_TRIANGLES:,}: "
             "simplify or split the mesh"
         )
     required = set(document.get("extensionsRequired", []))

@@ -115,7 +115,7 @@ def read_names(path: Path) -> Naming:
     columns = tuple(reader.fieldnames or ())
     unknown = [name for name in columns if name not in _COLUMNS]
     if unknown or not {"pattern", "name"} <= set(columns):
-        raise AssetError(f"{path}: line 1 must name the columns pattern, name and, if wanted, category and plural")
+        raise AssetError(f"{path}: line 1 must have the columns pattern, name and optionally category and plural")
     rows = []
     try:
         for row in reader:

@@ -73,7 +73,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     if size > _MAX_BYTES:
-        raise AssetError(f"{path} has {size / 2**30:.1f} GiB, 1 GiB is the most: {_extract_advice(path, boxes)}")
+        raise AssetError(f"{path} has {size / 2**30:.1f} GiB, the maximum is 1 GiB: {_extract_advice(path, boxes)}")
     with scratch_folder() as folder:
         out = folder / "found.json"
         args = [str(out), json.dumps(boxes)]

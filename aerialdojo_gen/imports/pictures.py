@@ -17,7 +17,7 @@ from aerialdojo_gen.imports.raw import GREY, RawSurface
 TEXTURE_PX = 8192
 TEXELS = 8192 * 8192
 # Limits on decoding: pixels per side, and pixels per image.
-_LARGEST_PX, _MOST_DECODED = 16384, 20000 * 10000
+_MAX_SIDE_PX, _MAX_DECODED = 16384, 20000 * 10000
 # Alpha below this is transparent, unless the file has its own cutoff.
 CUTOFF = 0.5
 # Blended textures are cut out if at least this share is nearly transparent; else they are glass, drawn opaque.
@@ -107,8 +107,8 @@ def _decode(file: bytes) -> tuple[NDArray[Any] | None, str]:
         return None, "is in KTX2, which is not read (export it as PNG or JPEG)"
     if size is None:
         return None, "is not PNG, JPEG, BMP or WebP"
-    if max(size) > _LARGEST_PX or size[0] * size[1] > _MOST_DECODED:
-        return None, f"has {size[0]} x {size[1]} pixels, {_LARGEST_PX} a side are the most"
+    if max(size) > _MAX_SIDE_PX or size[0] * size[1] > _MAX_DECODED:
+        return None, f"has {size[0]} x {size[1]} pixels, the maximum side is {_MAX_SIDE_PX}"
     image = cv2.imdecode(np.frombuffer(file, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None or image.dtype not in (np.uint8, np.uint16):
         return None, "cannot be decoded"

@@ -21,8 +21,8 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 
 # Margin around the box: streets continue, and building parts may lie outside.
-_BEYOND_DEG = 0.0006
-_MOST_SCENES = 100
+_MARGIN_DEG = 0.0006
+_MAX_SCENES = 100
 
 
 @dataclass(frozen=True)
@@ -52,14 +52,14 @@ def add_map(
         if not 20.0 <= tile_m <= 1000.0:
             raise UsageError(f"--tiles {tile_m:g}: a scene is 20 to 1,000 m wide")
         boxes = [tile for box in boxes for tile in tile_bboxes(box, tile_m)]
-    if len(boxes) > _MOST_SCENES:
-        raise UsageError(f"{len(boxes):,} scenes requested, {_MOST_SCENES} at a time are the most: take larger tiles")
+    if len(boxes) > _MAX_SCENES:
+        raise UsageError(f"{len(boxes):,} scenes requested, the maximum is {_MAX_SCENES}: use larger tiles")
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
     check_free(names, project, force)
     model = None if dem is None else read_dem(dem)
     heights = None if model is None else ground_sampler(model, cell_m)
     texts = []
-    wide, high = _BEYOND_DEG, _BEYOND_DEG / 2
+    wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
     for one, box, found in zip(names, boxes, maps, strict=True):
         text, summary = town_recipe(

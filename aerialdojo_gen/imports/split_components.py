@@ -49,7 +49,7 @@ class SplitStats:
         if not self.soups:
             return []
         of = "the only node" if self.soups == [""] else f"{len(self.soups):,} node{'s' * (len(self.soups) > 1)}"
-        out = [f"taken apart: {of}, in {self.pieces:,} connected pieces, into {self.things:,} things"]
+        out = [f"segmented {of}: {self.pieces:,} connected pieces into {self.things:,} things"]
         if self.materials:
             out.append(f"{self.materials:,} pieces are of wide bodies that were segmented by material")
         if self.attached:

@@ -47,7 +47,9 @@ def make_tiles(
     low, high = source.low, source.high
     columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
     if columns * rows > _MAX_TILES:
-        raise AssetError(f"--tiles {edge_m:g}: {columns * rows:,} tiles, {_MAX_TILES} are the most: make them larger")
+        raise AssetError(
+            f"--tiles {edge_m:g}: {columns * rows:,} tiles, the maximum is {_MAX_TILES}: use larger tiles"
+        )
     origin = np.array([*(low[:2] + high[:2]) / 2, low[2]])
     boxes = np.array([[b.vertices[:, :2].min(axis=0), b.vertices[:, :2].max(axis=0)] for b in source.bodies])
     for row in range(rows):

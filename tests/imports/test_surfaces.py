@@ -137,7 +137,7 @@ def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
 def test_what_stands_out_of_one_surface_becomes_things(seed):
     node, places = scan(seed)
     bodies, told = split_components([node])
-    assert told.grown == len(places)
+    assert told.attached == len(places)
     assert len(bodies) == 1 + len(places)
     assert sum(len(b.faces) for b in bodies) == len(node.faces)
     middles = [(b.vertices.min(axis=0) + b.vertices.max(axis=0))[:2] / 2 for b in bodies[1:]]
@@ -155,7 +155,7 @@ def test_what_stands_out_of_one_surface_becomes_things(seed):
 def test_bare_hills_are_not_taken_apart():
     field = hills(7, cells=30, relief_m=14.0)
     bodies, told = split_components([raw(field.mesh())])
-    assert (len(bodies), told.grown) == (1, 0)
+    assert (len(bodies), told.attached) == (1, 0)
 
 
 def test_a_fence_does_not_swallow_what_it_stands_around_and_a_house_has_its_chimney():
@@ -266,7 +266,7 @@ def test_a_file_of_ten_gigabytes_is_not_opened(tmp_path):
     path = tmp_path / "huge.obj"
     with path.open("wb") as file:
         file.truncate(10 << 30)
-    with pytest.raises(AssetError, match=r"huge\.obj: 10240 MiB, the most is 1024: simplify or split the mesh"):
+    with pytest.raises(AssetError, match=r"huge\.obj: 10240 MiB, the maximum is 1024: simplify or split the mesh"):
         read_mesh(path)
 
 

@@ -21,7 +21,7 @@ _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
 
 
 class Describer:
-    """Says of annotations of one scene what is to be said; not for several threads at once."""
+    """Describes annotations of one scene as JSON; not thread-safe."""
 
     def __init__(
         self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None, looks: Looks | None = None

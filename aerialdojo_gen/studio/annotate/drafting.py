@@ -125,14 +125,7 @@ def _check_enough(name: str, found: int, expected: int, why: str, *, exact: bool
     if found < MIN_OBJECTS:
         log.warning("%s: a single object makes no task%s; %s", name, why, by_hand)
     elif found < expected:
-        log.warning(
-            "%s: %d of %d objects can be chosen and distinguished%s; %s",
-            name,
-            found,
-            expected,
-            why,
-            by_hand,
-        )
+        log.warning("%s: %d of %d objects can be chosen and distinguished%s; %s", name, found, expected, why, by_hand)
 
 
 def _nothing_to_draft(name: str, why: str) -> AnnotationError:

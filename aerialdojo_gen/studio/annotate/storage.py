@@ -220,5 +220,5 @@ def parse_whole(raw: bytes, scene: str, name: str) -> Annotations:
     for kind in ("landmarks", "objects"):
         ids = [entry.id for entry in getattr(source.annotations, kind)]
         if len(set(ids)) < len(ids):
-            raise AnnotationError(f"{name}: duplicate id in {kind}: mend it in an editor first")
+            raise AnnotationError(f"{name}: duplicate id in {kind}: fix it in an editor first")
     return source.annotations
