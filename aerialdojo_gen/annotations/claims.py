@@ -25,7 +25,7 @@ _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _STOPS = frozenset(".;:!?")
 _VERBS = frozenset(
-    {
+    [
         "is",
         "are",
         "stands",
@@ -45,7 +45,7 @@ _VERBS = frozenset(
         "it",
         "its",
         "you",
-    }
+    ]
 )
 
 

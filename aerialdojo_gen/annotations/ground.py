@@ -13,8 +13,13 @@ from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
 
+Floats = NDArray[np.float64]
+
 GROUND = ("ground", "terrain", "river")
 _RISE_M = 3.0
+# A body that stands on the ground touches it.
+_TOUCH_M = 0.01
+_MAX_HIDDEN = 0.5
 
 
 class GroundMaterials:
@@ -33,25 +38,9 @@ class GroundMaterials:
 
     def _tree(self, pattern: str) -> tuple[shapely.STRtree, np.ndarray]:
         if pattern not in self._trees:
-            found = [
-                part.vertices[part.faces]
-                for thing in self._geometry.scene.instances
-                if thing.category in GROUND
-                for part in thing.parts
-                if any(fnmatchcase(part.material, one) for one in pattern.split("|"))
-            ]
-            corners = np.concatenate(found) if found else np.zeros((0, 3, 3))
-            shapes = shapely.polygons(corners[:, :, :2])
-            solid = shapely.area(shapes) > 1e-6
-            self._trees[pattern] = shapely.STRtree(shapes[solid]), corners[solid, :, 2].mean(axis=1)
+            tree, corners = _ground_triangles(self._geometry.scene, pattern)
+            self._trees[pattern] = tree, corners[:, :, 2].mean(axis=1)
         return self._trees[pattern]
-
-
-Floats = NDArray[np.float64]
-
-# A body that stands on the ground touches it.
-_TOUCH_M = 0.01
-_MOST_HIDDEN = 0.5
 
 
 class Surface:
@@ -63,16 +52,7 @@ class Surface:
 
     @cached_property
     def _triangles(self) -> tuple[shapely.STRtree, Floats]:
-        found = [
-            part.vertices[part.faces]
-            for thing in self._scene.instances
-            if thing.category in GROUND
-            for part in thing.parts
-        ]
-        corners = np.concatenate(found) if found else np.zeros((0, 3, 3))
-        shapes = shapely.polygons(corners[:, :, :2])
-        solid = shapely.area(shapes) > 1e-6
-        return shapely.STRtree(shapes[solid]), corners[solid]
+        return _ground_triangles(self._scene, "*")
 
     def hidden(self, instance: Instance, faces: NDArray[np.int64]) -> float:
         """Share, 0 to 1, of the area of `faces` (indices into the instance's faces) that lies below the surface."""
@@ -98,7 +78,22 @@ class Surface:
         """Whether at least half of each part that a phrase mentions, and of each counted copy, is visible."""
         pieces = [faces for name in look.count for faces in instance.copies_of(name)]
         pieces += [faces for name in look.parts if len(faces := instance.faces_of(name))]
-        return all(self.hidden(instance, faces) <= _MOST_HIDDEN for faces in pieces)
+        return all(self.hidden(instance, faces) <= _MAX_HIDDEN for faces in pieces)
+
+
+def _ground_triangles(scene: Scene, pattern: str) -> tuple[shapely.STRtree, Floats]:
+    """Ground triangles of materials that match, from above as a tree, and their corners, (n, 3, 3)."""
+    found = [
+        part.vertices[part.faces]
+        for thing in scene.instances
+        if thing.category in GROUND
+        for part in thing.parts
+        if any(fnmatchcase(part.material, one) for one in pattern.split("|"))
+    ]
+    corners = np.concatenate(found) if found else np.zeros((0, 3, 3))
+    shapes = shapely.polygons(corners[:, :, :2])
+    solid = shapely.area(shapes) > 1e-6
+    return shapely.STRtree(shapes[solid]), corners[solid]
 
 
 def _heights(triangles: Floats, points: Floats) -> Floats:

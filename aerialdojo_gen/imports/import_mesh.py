@@ -18,8 +18,14 @@ from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode, clip_node, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
-from aerialdojo_gen.imports.surfaces import SKY, classify_surfaces, describe_surfaces, find_domes
-from aerialdojo_gen.scenes.catalogue import single
+from aerialdojo_gen.imports.surfaces import (
+    SKY,
+    classify_surfaces,
+    describe_surfaces,
+    find_domes,
+    ground_cover,
+    ground_plane,
+)
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
@@ -39,7 +45,6 @@ _MAX_INSTANCES = 3000
 _MIN_AREA_M2 = 1e-9
 _LEVEL_SHARE = 0.7
 _WELD_M = 1e-4
-_GROUND = (122, 132, 108)
 _MAX_NOTES = 8
 
 
@@ -205,9 +210,9 @@ def make_scene(
     )
     _report_textures([*bodies, *domes], builder, light, repairs)
     low, high = low - shift, high - shift
-    cover = _ground_cover(instances, low, high)
+    cover = ground_cover(instances, low, high)
     if cover < _GROUND_COVER:
-        instances.insert(0, _ground_plane(low, high, parts))
+        instances.insert(0, ground_plane(low, high, 4 * _MARGIN_M, parts))
         repairs.lines.append(f"ground plane added (the mesh covers {cover:.0%} of its extent)")
     top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
     bounds = np.array(
@@ -390,29 +395,3 @@ def _appearance(
     if spread[1] > 3.0 * spread[0]:
         appearance["shape"] = "long"
     return appearance
-
-
-def _ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
-    """Share of a grid of vertical rays that hit the mesh."""
-    from aerialdojo_gen.geometry.rays import RayCaster
-
-    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
-    fractions = (np.arange(24) + 0.5) / 24
-    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
-        -1, 2
-    )
-    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
-    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
-    return float(np.isfinite(hit).mean())
-
-
-def _ground_plane(low: Floats, high: Floats, materials: dict[str, Material]) -> Instance:
-    x0, y0, x1, y1 = low[0] - 4 * _MARGIN_M, low[1] - 4 * _MARGIN_M, high[0] + 4 * _MARGIN_M, high[1] + 4 * _MARGIN_M
-    spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
-    materials.setdefault(spec, Material(spec, _GROUND))
-    # Just below the lowest point, where the mesh may have a floor.
-    z = low[2] - 0.02
-    vertices = single(np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]))
-    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-    part = Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec)
-    return Instance("ground", "ground", "", {}, (part,), surface="sheet")

@@ -53,17 +53,9 @@ _LEVELS = {
     "station_building": 3, "canopy": 1,
 }  # fmt: skip
 _PLASTER = (
-    "#d9bd74",
-    "#e3d6b0",
-    "#c98f6a",
-    "#d8c7b4",
-    "#b9c2b0",
-    "#cfa79c",
-    "#c4b49a",
-    "#e6e0d2",
-    "#b08a6a",
-    "#a9b4bb",
-)
+    "#d9bd74", "#e3d6b0", "#c98f6a", "#d8c7b4", "#b9c2b0", "#cfa79c", "#c4b49a", "#e6e0d2",
+    "#b08a6a", "#a9b4bb",
+)  # fmt: skip
 _BRICK = ("#8f4a3c", "#a4614a", "#7d5546")
 _OFFICE = ("facade_office:#b8b4ac", "facade_office:#97a1a8", "facade_office:#c9bfae", "curtain_wall:#6f95ad",
            "curtain_wall:#7f958c", "facade_office:#a08c78")  # fmt: skip

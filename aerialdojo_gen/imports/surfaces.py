@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.catalogue import single
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +33,7 @@ _HOLLOW, _SHELL = 0.4, 0.95
 # Share of columns over the content that a dome must cover.
 _ROOFED = 0.9
 _PROBES = 12
+_GROUND = (122, 132, 108)
 
 
 def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[int]:
@@ -98,8 +101,6 @@ def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
 
 def describe_surfaces(scene: Scene) -> list[str]:
     """Describe the classification, one line each."""
-    from collections import Counter
-
     n = Counter(i.surface for i in scene.instances)
     lines = [
         f"surfaces: {n['solid']:,} closed, {n['sheet']:,} open (there from both sides), {n['ground']:,} open ground"
@@ -112,3 +113,30 @@ def describe_surfaces(scene: Scene) -> list[str]:
         names = [i.node for i in scene.backdrop]
         lines.append(f"{', '.join(names)}: drawn as the sky, without collisions, never a target")
     return lines
+
+
+def ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
+    """Share of a grid of vertical rays that hit the mesh."""
+    from aerialdojo_gen.geometry.rays import RayCaster
+
+    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
+    fractions = (np.arange(24) + 0.5) / 24
+    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
+        -1, 2
+    )
+    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
+    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
+    return float(np.isfinite(hit).mean())
+
+
+def ground_plane(low: Floats, high: Floats, margin_m: float, materials: dict[str, Material]) -> Instance:
+    """Make a level ground plane just below a box, with a margin around it."""
+    (x0, y0), (x1, y1) = low[:2] - margin_m, high[:2] + margin_m
+    spec = "#{:02x}{:02x}{:02x}".format(*_GROUND)
+    materials.setdefault(spec, Material(spec, _GROUND))
+    # Just below the lowest point, where the mesh may have a floor.
+    z = low[2] - 0.02
+    vertices = single(np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]]))
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    part = Part(vertices, faces, np.zeros((4, 2), dtype=np.float32), spec)
+    return Instance("ground", "ground", "", {}, (part,), surface="sheet")
