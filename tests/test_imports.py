@@ -106,7 +106,7 @@ def test_pybullet_is_loaded_by_who_draws_with_it():
         "import sys\n"
         "from aerialdojo_gen.rendering import backend, casters, checks, gl, picture, raycast\n"
         "from aerialdojo_gen.pipeline.stages.work import anchor_sample, reference_images, render\n"
-        "from aerialdojo_gen.benchmark import eyes\n"
+        "from aerialdojo_gen.benchmark import observations\n"
         "assert 'pybullet' not in sys.modules\n"
         "from aerialdojo_gen.rendering import world\n"
         "assert 'pybullet' in sys.modules\n"
