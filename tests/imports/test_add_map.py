@@ -70,7 +70,7 @@ def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
     z = hall.vertices[:, 2]
     assert np.any(np.abs(z - (tops["hall"] - 3.0)) < 0.01)
     assert found["house"].attributes["colour"] == "red"
-    assert any("3 by their height, 1 by their levels" in line for line in town.said)
+    assert any("3 by their height, 1 by their levels" in line for line in town.notes)
 
 
 def test_streets_lie_on_the_ground_with_marks_and_a_crossing(town):
@@ -98,7 +98,7 @@ def test_streets_lie_on_the_ground_with_marks_and_a_crossing(town):
     # The tunnel is not there.
     recipe = load_recipe(town.recipe)
     assert all(abs(y + 70) > 1 for road in recipe.parameters["roads"] for _, y in road["line"])
-    assert any("1 ways in tunnels" in line for line in town.said)
+    assert any("1 ways in tunnels" in line for line in town.notes)
 
 
 def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(town):
@@ -108,7 +108,7 @@ def test_things_of_the_map_are_the_catalogues_and_what_is_in_a_building_is_not(t
     bench = [i for i in scene.instances if i.category == "bench" and np.hypot(*(i.centroid[:2] - (-40, 7.6))) < 2.5]
     assert len(bench) == 1
     assert bench[0].attributes["place"] == "on Long Street"
-    assert any("1 things inside buildings left out" in line for line in town.said)
+    assert any("1 things inside buildings left out" in line for line in town.notes)
     plans = shapely.union_all([Polygon(o) for o, _ in maps.BUILDINGS.values()]).buffer(-0.2)
     feet = [i for i in scene.instances if i.bounds[0, 2] < 3.0 and i.category not in
             ("ground", "apartment_building", "office_building", "house", "building")]  # fmt: skip

@@ -142,7 +142,7 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
     path = tmp_path / "hole.asc"
     path.write_text(f"ncols 61\nnrows 61\nxllcenter -60\nyllcenter -60\ncellsize 2\nNODATA_value -9999\n{rows}\n")
     place = add_terrain("Hole", path, tmp_path / "mine", bare=True)
-    assert any("16 of 3,721 heights" in line for line in place.said)
+    assert any("16 of 3,721 heights" in line for line in place.notes)
     known = maps.heights(2.0, 60.0)
     found = ground_heights(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + read_dem_origin(place)
     assert known[9:15, 19:25].min() - 0.02 <= found <= known[9:15, 19:25].max() + 0.02
@@ -162,7 +162,7 @@ FAULTS = {
     ),
     "no coordinate system": (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
     "feet": (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),
-    "too large": (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 takes the middle"),
+    "too large": (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 crops to its centre"),
     "elsewhere": (
         lambda d: tif(d),
         {"bbox": (10.0, 50.0, 10.001, 50.001)},
