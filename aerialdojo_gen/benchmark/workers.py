@@ -81,7 +81,7 @@ def fly_units(
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
     for outcome in executor.map(
-        _fly, work, lambda one: one.scene, talk=ParentChannel(tell, stopped), memory_mb=MEMORY_MB
+        _fly, work, lambda one: one.scene, channel=ParentChannel(tell, stopped), memory_mb=MEMORY_MB
     ):
         if isinstance(outcome, AerialDojoError):
             raise outcome
@@ -118,7 +118,7 @@ class _Teller:
 
     def _send(self) -> None:
         if self._sum.episodes:
-            self._link.tell(self._sum)
+            self._link.send(self._sum)
         self._sum, self._last = Finished(), time.monotonic()
 
     def __enter__(self) -> _Teller:

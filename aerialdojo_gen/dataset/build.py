@@ -239,7 +239,7 @@ def run_stages(
     """
     from aerialdojo_gen.dataset.provenance import check_replaced
     from aerialdojo_gen.pipeline import runner
-    from aerialdojo_gen.pipeline.freshness import keep_footers
+    from aerialdojo_gen.pipeline.freshness import cache_footers
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.store.footer_cache import cached_footers
 
@@ -265,7 +265,7 @@ def run_stages(
             reporter=reporter, limits=limits, prepare=prepare, finish=finish,
         )  # fmt: skip
         if any(summary.computed for summary in summaries):
-            keep_footers(stages, ready, roots)
+            cache_footers(stages, ready, roots)
     exact = config.split.paper_counts or config.annotate_import.paper_counts
     owed = [line for name, line in left_out.items() if exact or name in (scenes or config.scenes)]
     if owed:

@@ -95,7 +95,7 @@ def _of_paper(made: Made) -> bool:
 
 def _difficulty(tasks: Tasks) -> dict[str, str]:
     """Tables of difficulty and splits as Markdown, without their headings; none where the release does not tell."""
-    if not tasks.told or not (tasks.target_split != "").any():
+    if not tasks.has_columns or not (tasks.target_split != "").any():
         return {}
     tables = {
         "setting": setting_table(tasks),

@@ -153,21 +153,21 @@ def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
 
 
 def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
-    mend = f"run {command('split', scene=scene)}"
+    remedy = f"run {command('split', scene=scene)}"
     if not present:
-        return [f"{scene} is not in the release in {root}: {mend}"]
+        return [f"{scene} is not in the release in {root}: {remedy}"]
     lines, prints = [], {}
     for name in SHARDS:
         part = part_name(name, scene)
         if name not in present:
-            lines.append(f"{root.at(part)} is missing: {mend}")
+            lines.append(f"{root.at(part)} is missing: {remedy}")
             continue
         try:
             prints[name] = store.read_info(root, part).fingerprint
         except StoreError as error:
             lines.append(str(error))
     if len(set(prints.values())) > 1:
-        lines.append(f"the release's parts of {scene} in {root} are of different runs: {mend} --force")
+        lines.append(f"the release's parts of {scene} in {root} are of different runs: {remedy} --force")
     return lines
 
 

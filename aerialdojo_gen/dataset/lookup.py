@@ -104,12 +104,12 @@ class ReleasedScene:
         AssetError
             The mesh is missing, leads out of the data directory, or is not the one that the release was made from.
         """
-        told = self.row["mesh_path"]
+        mesh_path = self.row["mesh_path"]
         try:
-            path = mesh_copy(self.root, told)
+            path = mesh_copy(self.root, mesh_path)
         except FileNotFoundError:
             raise AssetError(
-                f"the mesh {self.root.at(told)} is missing: run {command('build-scenes', scene=self.name)}"
+                f"the mesh {self.root.at(mesh_path)} is missing: run {command('build-scenes', scene=self.name)}"
             ) from None
         return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
 

@@ -68,8 +68,8 @@ def makers(data: Where) -> dict[str, Maker]:
     known: dict[str, Maker] = {}
     try:
         for entry in _recorded(root):
-            told = (entry.get("paper_counts", True) is not False, float(entry.get("prefer_harder", 0.0)))
-            maker = Maker(str(entry["name"]), str(entry["sha256"]), *told)
+            rules = (entry.get("paper_counts", True) is not False, float(entry.get("prefer_harder", 0.0)))
+            maker = Maker(str(entry["name"]), str(entry["sha256"]), *rules)
             known |= dict.fromkeys(entry["scenes"], maker)
     except (ValueError, KeyError, TypeError):
         known = {}  # damaged: as if nothing were known, which is the cautious side

@@ -98,9 +98,11 @@ class Release:
             raise UsageError(f"{name} is one table, not split: leave split out")
         key = f"{name}/train" if name in _SPLIT else f"release/{name}"
         schema = store.LAYOUT[key].spec.schema
-        wanted = list(columns) if columns is not None else None
-        with_split = name in _SPLIT and (wanted is None or "split" in wanted)
-        read = None if wanted is None else [column for column in wanted if column != "split" or name not in _SPLIT]
+        selected = list(columns) if columns is not None else None
+        with_split = name in _SPLIT and (selected is None or "split" in selected)
+        read = (
+            None if selected is None else [column for column in selected if column != "split" or name not in _SPLIT]
+        )
         for column in read or ():
             if column not in schema.names:
                 raise UsageError(unknown(f"no column of {name}", column, schema.names))
@@ -119,7 +121,7 @@ class Release:
         if not parts:
             raise UsageError(f"no scene that was asked for has a part in {', '.join(splits)}")
         table = pa.concat_tables(parts)
-        return table if wanted is None else table.select(wanted)
+        return table if selected is None else table.select(selected)
 
     def tasks(
         self, *, split: str | Sequence[str] | None = None, scene: str | Sequence[str] | None = None

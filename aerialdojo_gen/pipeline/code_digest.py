@@ -21,8 +21,9 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_facts import Definition, Edge, Facts, module_facts
+from aerialdojo_gen.pipeline.stage import work_module
 
-# Modules of which the named definitions count, and nothing else. A configuration's values count, not its classes.
+# Modules of which only the named definitions count. A configuration counts by its values, not its classes.
 PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen": (),
     "aerialdojo_gen.benchmark": (),
@@ -87,56 +88,53 @@ PLUMBING: dict[str, tuple[str, ...]] = {
     "aerialdojo_gen.store.shards": (),
     "aerialdojo_gen.store.staging": (),
 }
-# Of a stage's module, which declares it, and which says more: these definitions count, and nothing else. What it
-# decides about the configuration (`settle`) or refuses (`check`) shapes no bytes that the configuration does not.
-_DECLARED = ("run", "parts", "sources")
-# What writes every stage's rows.
+# Writes every stage's rows.
 _WRITERS = (Edge("aerialdojo_gen.store.parquet_files", "write_clustered"), Edge("aerialdojo_gen.store.tables"))
 
-# Modules that import what their caller names; what that can be stands in the configuration.
+# Modules that import what their caller names; the configuration determines it.
 DYNAMIC = frozenset({"aerialdojo_gen.base.llm_client.service", "aerialdojo_gen.benchmark.agents.load"})
 
-# Files that modules read, relative to the package. Those outside of it are sources of the stages.
+# Files that modules read, relative to the package. Files outside it are sources of stages.
 DATA_FILES = {
     "aerialdojo_gen.annotations.phrases": "annotations/phrases/*.toml",
     "aerialdojo_gen.annotations.places": "annotations/places/*.toml",
 }
 
-# Where the package that is installed is not called what is imported; several may provide it.
+# Distributions that provide an import of another name.
 _DISTRIBUTIONS = {
     "cv2": ("opencv-python-headless", "opencv-python", "opencv-contrib-python-headless", "opencv-contrib-python"),
     "fcl": ("python-fcl",),
-    # Numba's code generator rounds as it likes; what PyBullet and moderngl draw with stands in their pictures' rows.
+    # llvmlite generates Numba's code, and so its rounding; PyBullet's and moderngl's drivers are columns of pictures.
     "numba": ("numba", "llvmlite"),
 }
-# They check values or show progress: what passes through them is the same in every version.
+# They check values or show progress, and do not change rows.
 _SHAPELESS = frozenset({"pydantic", "pydantic_core", "tqdm", "typer", "typing_extensions"})
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Which modules of a package are imported by a name that is made at run time, where a recipe tells."""
+    """Which modules of a package are imported dynamically, if a recipe determines it."""
 
-    package: str  # Absolute name of the package. Where nothing is known of it, all of its modules count
-    modules: tuple[str, ...]  # Absolute names of the modules; they count, with what they import
+    package: str  # Absolute name; without a choice all of its modules count
+    modules: tuple[str, ...]  # Absolute names; they count with their imports
 
 
 @dataclass(frozen=True)
 class Code:
-    """The code that makes something."""
+    """The code that a module depends on."""
 
     parts: dict[str, str]  # Digests by module, or by ``module:definition`` where the module is plumbing, or by file
-    libraries: dict[str, str]  # Versions of the third-party packages imported by it; empty where one is not installed
+    libraries: dict[str, str]  # Versions of imported third-party packages; empty if not installed
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of it all, hexadecimal."""
+        """SHA-256 of parts and libraries, hexadecimal."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
 
 @cache
 def code_of(module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
-    """Return the code that a module of the running package consists of, as it is when first asked in this process."""
+    """Return the code that a module of the running package depends on, as of the first call in this process."""
     return _running().of(module, chosen, idle)
 
 
@@ -146,20 +144,17 @@ def _running() -> Package:
 
 
 def stage_code(stage: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
-    """Return the code of a stage, by the stage's name."""
-    return code_of(stage_module(stage), chosen, idle)
+    """Return the code of a stage, by the stage's name.
 
-
-def stage_module(stage: str) -> str:
-    """Name the module of a stage."""
-    return f"aerialdojo_gen.pipeline.stages.{stage.replace('-', '_')}"
+    That is the code of its work. `parts` and `sources` count by what they return: the number of shards and the files'
+    digests are compared themselves. `resolve_config` and `check` shape no bytes that the configuration does not.
+    """
+    return code_of(work_module(stage), chosen, idle)
 
 
 def counted(module: str) -> tuple[str, ...] | None:
-    """Return which of a module's definitions count, ``("*",)`` for all that are asked for; None if all of it does."""
-    if module in PLUMBING:
-        return PLUMBING[module]
-    return _DECLARED if module.rpartition(".")[0] == "aerialdojo_gen.pipeline.stages" else None
+    """Return which of a module's definitions count, ``("*",)`` for all that are used; None if all of it counts."""
+    return PLUMBING.get(module)
 
 
 class Package:
@@ -173,39 +168,39 @@ class Package:
         self._paths = {_module_name(path.relative_to(folder.parent)): path for path in sorted(folder.rglob("*.py"))}
 
     def of(self, module: str, chosen: Choice | None = None, idle: tuple[str, ...] = ()) -> Code:
-        """Return the code that a module consists of."""
-        search = self._followed(module, chosen.package if chosen else "", frozenset(idle))
-        if chosen and chosen.package in search.asked:
-            # What is reached does not depend on the order: the way to the package is the same for all its modules.
+        """Return the code that a module depends on."""
+        search = self._search(module, chosen.package if chosen else "", frozenset(idle))
+        if chosen and chosen.package in search.dynamic:
+            # The order of following does not matter: all modules of the package are reached the same way.
             search = search.copy()
             for name in chosen.modules:
                 search.follow(Edge(name))
         self._cache.save()
         return Code(dict(sorted(search.parts.items())), {name: _version(name) for name in sorted(search.libraries)})
 
-    def _followed(self, module: str, left_out: str, idle: frozenset[str]) -> _Search:
-        """Follow a module's imports, those of any module of one package left out."""
-        key = module, left_out, idle
+    def _search(self, module: str, excluded: str, idle: frozenset[str]) -> _Search:
+        """Follow a module's imports, without the dynamic imports of one package."""
+        key = module, excluded, idle
         if key not in self._searches:
-            search = self._searches[key] = _Search(self, left_out, idle)
+            search = self._searches[key] = _Search(self, excluded, idle)
             for edge in (Edge(module), *_WRITERS):
                 search.follow(edge)
         return self._searches[key]
 
     def contains(self, module: str) -> bool:
-        """Whether a module is one of the package's, by its absolute name."""
+        """Whether the package has a module of this absolute name."""
         return module in self._paths
 
     def belongs(self, module: str) -> bool:
-        """Whether a name is that of a module of the package, be it there or not."""
+        """Whether a name is below the package, existing or not."""
         return module.split(".")[0] == self._name
 
     def modules_in(self, package: str) -> list[str]:
-        """Name the modules below a package, however deep."""
+        """Names of all modules below a package."""
         return [module for module in self._paths if module.startswith(f"{package}.")]
 
     def facts(self, module: str) -> Facts:
-        """Read a module; AssetError where its source is missing."""
+        """Read a module; AssetError if its source is missing."""
         if module not in self._facts:
             path = self._paths.get(module)
             if path is None:
@@ -215,7 +210,7 @@ class Package:
         return self._facts[module]
 
     def data_files(self, module: str) -> Iterator[tuple[str, str]]:
-        """Yield name and SHA-256 of the files in the package that a module reads."""
+        """Yield name and SHA-256 of the package's files that a module reads."""
         for path in sorted(self._folder.glob(DATA_FILES[module])) if module in DATA_FILES else ():
             yield path.relative_to(self._folder).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -225,25 +220,25 @@ def _module_name(path: Path) -> str:
 
 
 class _Search:
-    """Follows imports from where it is put."""
+    """Follows imports, and collects what counts."""
 
-    def __init__(self, package: Package, left_out: str, idle: frozenset[str]) -> None:
-        self._package, self._left_out, self._idle = package, left_out, idle
+    def __init__(self, package: Package, excluded: str, idle: frozenset[str]) -> None:
+        self._package, self._excluded, self._idle = package, excluded, idle
         self.parts: dict[str, str] = {}
         self.libraries: set[str] = set()
-        # Packages of which any module is imported, by a name that is made at run time.
-        self.asked: set[str] = set()
+        # Packages of which modules are imported dynamically.
+        self.dynamic: set[str] = set()
         self._seen: set[Edge] = set()
 
     def copy(self) -> _Search:
-        """Return another that goes on from here."""
-        other = _Search(self._package, self._left_out, self._idle)
+        """Return an independent copy."""
+        other = _Search(self._package, self._excluded, self._idle)
         other.parts, other.libraries = dict(self.parts), set(self.libraries)
-        other.asked, other._seen = set(self.asked), set(self._seen)
+        other.dynamic, other._seen = set(self.dynamic), set(self._seen)
         return other
 
     def follow(self, first: Edge) -> None:
-        """Count what is imported, and what that imports."""
+        """Count an import and, recursively, its imports."""
         waiting = [first]
         while waiting:
             edge = waiting.pop()
@@ -256,8 +251,8 @@ class _Search:
                 if edge.module not in sys.stdlib_module_names and edge.module not in _SHAPELESS:
                     self.libraries.add(edge.module)
             elif edge.name == "**":
-                self.asked.add(edge.module)
-                if edge.module != self._left_out:
+                self.dynamic.add(edge.module)
+                if edge.module != self._excluded:
                     waiting += [Edge(module) for module in self._package.modules_in(edge.module)]
             elif edge.name and self._package.contains(f"{edge.module}.{edge.name}"):
                 waiting += [Edge(edge.module, "", ()), Edge(f"{edge.module}.{edge.name}", "", edge.uses)]
@@ -268,7 +263,7 @@ class _Search:
     def _enter(self, module: str, names: tuple[str, ...]) -> Iterator[Edge]:
         above = module.rpartition(".")[0]
         if above:
-            # Its ``__init__`` runs; of plumbing nothing is asked by that.
+            # Its ``__init__`` runs; of plumbing that uses nothing.
             yield Edge(above, "", ())
         if counted(module) is not None:
             yield from self._definitions(module, names)
@@ -286,10 +281,10 @@ class _Search:
             return
         facts = self._package.facts(module)
         known = facts.definitions
-        allowed = {*known, *facts.handed_on} if listed == ("*",) else set(listed)
+        allowed = {*known, *facts.reexports} if listed == ("*",) else set(listed)
         waiting = sorted(allowed if "*" in names else allowed & set(names))
         for name in waiting:
-            yield from facts.handed_on.get(name, ())
+            yield from facts.reexports.get(name, ())
         while waiting:
             name = waiting.pop()
             if name in known and f"{module}:{name}" not in self.parts:
@@ -299,11 +294,11 @@ class _Search:
 
 
 class _Cache:
-    """Facts of sources that were read before, in a file; one that is damaged, or cannot be written, is none."""
+    """A file with the facts of sources; a damaged or unwritable file is ignored."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        # Facts that another reader of sources gave would be other facts.
+        # Facts depend on the version of the reader.
         self._reader = hashlib.sha256(Path(__file__).with_name("code_facts.py").read_bytes()).digest()
         self._entries: dict[str, Any] = {}
         self._changed = False
@@ -326,7 +321,7 @@ class _Cache:
         return _facts(entry["facts"])
 
     def save(self) -> None:
-        """Write the file, where something came to it."""
+        """Write the file if there is anything new."""
         if not self._changed:
             return
         self._changed = False
@@ -350,7 +345,7 @@ def _facts(raw: dict[str, Any]) -> Facts:
             for name, d in raw["definitions"].items()
         },
         tuple(raw["unknown"]),
-        {name: _edges(edges) for name, edges in raw["handed_on"].items()},
+        {name: _edges(edges) for name, edges in raw["reexports"].items()},
     )
 
 
@@ -360,7 +355,7 @@ def _edges(raw: list[dict[str, Any]]) -> tuple[Edge, ...]:
 
 @cache
 def _version(library: str) -> str:
-    """Version of a library, by the name that is imported; empty where it is not installed."""
+    """Version of a library by its import name; empty if it is not installed."""
     found = []
     for name in _DISTRIBUTIONS.get(library, (library,)):
         with contextlib.suppress(metadata.PackageNotFoundError):

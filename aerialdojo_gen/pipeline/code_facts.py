@@ -1,4 +1,4 @@
-"""What one module's source says: a digest that comments, docstrings and layout do not change, and what it imports."""
+"""Facts of a module's source: a digest independent of comments, docstrings and layout, and its imports."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-# Neither what an expression is used for nor how a string was written changes what the code does.
+# Fields of the syntax tree that do not change what the code does.
 _UNCOUNTED = frozenset({"ctx", "kind", "type_comment", "type_ignores"})
 _IMPORTERS = frozenset({"import_module", "__import__"})
 
 
 @dataclass(frozen=True, order=True)
 class Edge:
-    """Something that is imported."""
+    """An import."""
 
     module: str  # Absolute name of the module
     name: str = ""
@@ -33,13 +33,13 @@ class Definition:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a module's source says."""
+    """Facts of a module's source."""
 
     digest: str  # Of the whole module, hexadecimal
-    edges: tuple[Edge, ...]  # All that it imports, also inside functions; not what it imports for type checkers alone
-    definitions: dict[str, Definition] = field(default_factory=dict)  # By name; empty where they were not asked for
-    unknown: tuple[str, ...] = ()  # Imports whose module is known only when the code runs
-    handed_on: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
+    edges: tuple[Edge, ...]  # All imports, also inside functions; without those for type checkers
+    definitions: dict[str, Definition] = field(default_factory=dict)  # By name; empty unless requested
+    unknown: tuple[str, ...] = ()  # Dynamic imports whose module is unknown
+    reexports: dict[str, tuple[Edge, ...]] = field(default_factory=dict)
 
 
 def module_facts(source: bytes, module: str, is_package: bool, by_definition: bool = False) -> Facts:
@@ -64,7 +64,7 @@ def module_facts(source: bytes, module: str, is_package: bool, by_definition: bo
         if name not in imports.bound
     }
     own = module.split(".")[0]
-    handed_on = {
+    reexports = {
         name: tuple(sorted(edge for edge in imports.bound[name] if edge.module.split(".")[0] == own))
         for name in statements
         if name in imports.bound
@@ -74,12 +74,12 @@ def module_facts(source: bytes, module: str, is_package: bool, by_definition: bo
         edges,
         definitions,
         tuple(sorted(imports.unknown)),
-        {name: edges for name, edges in handed_on.items() if edges},
+        {name: edges for name, edges in reexports.items() if edges},
     )
 
 
 def _bound(statement: ast.stmt) -> Iterator[str]:
-    """Names that a statement at the top level binds."""
+    """Names that a top-level statement binds."""
     if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
         yield statement.name
     elif isinstance(statement, ast.Import | ast.ImportFrom):
@@ -97,7 +97,7 @@ def _read_names(nodes: Sequence[ast.AST]) -> set[str]:
 
 
 class _Imports:
-    """The import statements of a module, wherever they stand."""
+    """All import statements of a module."""
 
     def __init__(self, tree: ast.Module, module: str, package: str) -> None:
         self._module, self._package = module, package
@@ -109,7 +109,7 @@ class _Imports:
             for inner in ast.walk(statement)
         }
         self._typing_only = typing_only
-        # What the names mean that import statements bind, anywhere in the module.
+        # Imports by the name that they bind.
         self.bound: dict[str, list[Edge]] = {}
         self.unknown: set[str] = set()
         for node in ast.walk(tree):
@@ -132,7 +132,7 @@ class _Imports:
             yield alias.asname or alias.name, Edge(origin, alias.name)
 
     def edges(self, nodes: Sequence[ast.AST]) -> tuple[Edge, ...]:
-        """What these nodes import, statically or by `importlib`, and what they use of what the module imports."""
+        """What nodes import, statically or by `importlib`, and what they use of the module's imports."""
         found: set[Edge] = set()
         attributes: dict[str, set[str]] = {}
         mentions: dict[str, int] = {}
@@ -150,12 +150,12 @@ class _Imports:
                 found |= {target} if target else set()
                 self.unknown |= set() if target else {ast.unparse(node.args[0])}
         for name in mentions.keys() & self.bound.keys():
-            # A name that also stands alone, and not before a dot, may be asked for anything.
+            # A name that also occurs without an attribute may be used in any way.
             uses = ("*",) if mentions[name] > 0 else tuple(sorted(attributes.get(name, ())))
             found |= {Edge(edge.module, edge.name, uses) for edge in self.bound[name]}
         own = self._module.split(".")[0]
         inside = {edge for edge in found if edge.module.split(".")[0] == own}
-        # Of another package nothing counts but which one it is.
+        # Other packages count by their name.
         return tuple(sorted(inside | {Edge(edge.module.split(".")[0], "", ()) for edge in found - inside}))
 
     def _dynamic(self, argument: ast.expr) -> Edge | None:
@@ -171,7 +171,7 @@ class _Imports:
                 head += known
             else:
                 break
-        # The rest of the module's name is known only when the code runs: any module below the package, then.
+        # The rest of the name is unknown: any module below the package.
         return Edge(head[:-1], "**") if head.endswith(".") else None
 
     def _own_name(self, node: ast.expr) -> str | None:
@@ -195,34 +195,34 @@ def _called(call: ast.Call) -> str:
 
 
 def _digest(nodes: list[Any]) -> str:
-    words: list[str] = []
+    tokens: list[str] = []
     for node in nodes:
-        _say(node, words)
-    return hashlib.sha256("\x00".join(words).encode("utf-8", "surrogatepass")).hexdigest()
+        _serialize(node, tokens)
+    return hashlib.sha256("\x00".join(tokens).encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _say(node: Any, words: list[str]) -> None:
-    """Write a tree as words; what is empty is left out, so that Python versions agree that know further fields."""
+def _serialize(node: Any, tokens: list[str]) -> None:
+    """Write a tree as tokens, without empty fields, which differ between Python versions."""
     if isinstance(node, ast.AST):
-        words.append(f"({type(node).__name__}")
+        tokens.append(f"({type(node).__name__}")
         for name, value in ast.iter_fields(node):
             if name in _UNCOUNTED or value is None or value == []:
                 continue
             if name == "body" and _has_docstring(node):
                 value = value[1:]
             if isinstance(node, ast.Constant) and name == "value":
-                words.append(f"{type(value).__name__} {value!r}")
+                tokens.append(f"{type(value).__name__} {value!r}")
                 continue
-            words.append(name)
-            _say(value, words)
-        words.append(")")
+            tokens.append(name)
+            _serialize(value, tokens)
+        tokens.append(")")
     elif isinstance(node, list):
-        words.append("[")
+        tokens.append("[")
         for item in node:
-            _say(item, words)
-        words.append("]")
+            _serialize(item, tokens)
+        tokens.append("]")
     else:
-        words.append(f"{type(node).__name__} {node!r}")
+        tokens.append(f"{type(node).__name__} {node!r}")
 
 
 def _has_docstring(node: ast.AST) -> bool:

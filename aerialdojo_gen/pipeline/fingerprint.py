@@ -1,4 +1,4 @@
-"""Fingerprints: what a shard was made from, as one hash."""
+"""Fingerprints: a hash of everything a shard depends on."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from aerialdojo_gen.store.files import file_digest
 
 
 def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, scene: str) -> str:
-    """Hash all that the shards of a scene depend on.
+    """Hash everything that the shards of a scene depend on.
 
-    Inputs count by their content, not by their own fingerprint: where an upstream stage ran again and wrote the
-    same rows, nothing downstream is stale. The code counts as `aerialdojo_gen.pipeline.code_digest` finds it, with
-    the versions of the libraries that it imports; no absolute path counts.
+    Inputs count by content, not by fingerprint: if an upstream stage runs again and writes the same rows, nothing
+    downstream is stale. Code counts as in `aerialdojo_gen.pipeline.code_digest`; absolute paths do not count.
     """
     code = scene_code(stage, roots, scene, pipeline.section(stage.name))
-    # The paper's figures lie beside the package in a checkout, inside it in a wheel.
-    carried = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
-    sources = [*stage.sources(roots, scene), *carried]
+    # The paper's figures are next to the package in a checkout, inside it in a wheel.
+    figures = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
+    sources = [*stage.sources(roots, scene), *figures]
     facts = {
         "stage": stage.name,
         "code": code.digest,
@@ -41,19 +40,19 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, sce
     }
     texts = {name: json.dumps(value, sort_keys=True) for name, value in facts.items()}
     texts["schemas"] = _schemas((*stage.writes, *stage.reads))
-    # What json.dumps makes of them all; the schemas' part is long, and the same for all scenes.
+    # As json.dumps would write it; the schemas are long, and the same for all scenes.
     whole = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
     return hashlib.sha256(f"{{{whole}}}".encode()).hexdigest()
 
 
 def scene_code(stage: Stage, roots: ProjectPaths, scene: str, config: Section | None = None) -> Code:
-    """Return the code that a stage runs for a scene; without a configuration, all that any would run."""
+    """Return the code that a stage runs for a scene; without a configuration, for any configuration."""
     return stage_code(stage.name, stage.imports(roots, scene), () if config is None else stage.idle(config))
 
 
 @lru_cache(maxsize=4096)
 def _short(path: Path, roots: ProjectPaths) -> str:
-    """Name a file by its place in its folder: the same in a checkout, in a wheel, and in a checkout elsewhere."""
+    """Return a file's path relative to its source folder: the same in every checkout and in a wheel."""
     for name in ("recipes", "scene_assets", "annotations"):
         folder = getattr(roots, name)
         if path.is_relative_to(folder):
@@ -69,7 +68,7 @@ def _digest(path: Path) -> str:
 
 
 def _values(section: Section) -> dict[str, Any]:
-    """Values of a section, without its paths: the files behind them count by their bytes."""
+    """Values of a section, without paths: files count by their bytes."""
 
     def without_paths(value: Any) -> Any:
         if isinstance(value, dict):

@@ -1,7 +1,7 @@
-"""Which shards of a stage are fresh, and which are to be computed.
+"""Which shards of a stage are fresh, and which must be computed.
 
-A shard is fresh if all its tables and files are there, whole, and were made by the same code from the same inputs and
-configuration: its fingerprint tells.
+A shard is fresh if all its tables and files exist undamaged and its fingerprint (code, inputs, configuration)
+matches.
 """
 
 from __future__ import annotations
@@ -24,27 +24,24 @@ from aerialdojo_gen.store.root import DataRoot
 
 @dataclass(frozen=True)
 class Limits:
-    """How much of a stage is computed now, and how closely what is there is looked at.
-
-    What is left out is computed when the command is given again.
-    """
+    """How much of a stage to compute now, and whether to verify files; repeating the command does the rest."""
 
     share: tuple[int, int] = (0, 1)  # (int, int)
-    deadline: float | None = None  # Seconds since the epoch after which nothing further is begun
-    verify: bool = False  # Files count as whole if their digests are right, not their sizes alone
+    deadline: float | None = None  # Seconds since the epoch after which no task starts
+    verify: bool = False  # Compare the files' digests, not only their sizes
 
 
 @dataclass(frozen=True)
 class Shards:
     """A stage's shards under one configuration."""
 
-    tasks: list[Task]  # What is to be computed
-    fresh: list[dict[str, Any]]  # The summaries of what need not be
-    errors: dict[str, AerialDojoError]  # What is missing or damaged of the inputs, by scene
+    tasks: list[Task]  # To compute
+    fresh: list[dict[str, Any]]  # Summaries of fresh shards
+    errors: dict[str, AerialDojoError]  # Missing or damaged inputs, by scene
 
     @property
     def all_fresh(self) -> bool:
-        """Whether nothing is to be computed."""
+        """Whether there is nothing to compute."""
         return not self.tasks and not self.errors
 
 
@@ -58,7 +55,7 @@ def shards_of(
     reporter: Reporter,
     limits: Limits,
 ) -> Shards:
-    """Find out which of a stage's shards are fresh, and remove what is none of them."""
+    """Find which of a stage's shards are fresh, and remove surplus shards."""
     pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
     found = Shards([], [], {})
     shard = -1
@@ -75,16 +72,16 @@ def shards_of(
             shard += 1
             if shard % limits.share[1] != limits.share[0]:
                 continue
-            here = (stage, roots.data, scene, part)
-            summary = None if force else _fresh(*here, parts, fingerprint, reporter)
-            if summary is not None and limits.verify and not _verified(*here, reporter):
+            shard_at = (stage, roots.data, scene, part)
+            summary = None if force else _fresh(*shard_at, parts, fingerprint, reporter)
+            if summary is not None and limits.verify and not _verified(*shard_at, reporter):
                 summary = None
             if summary is not None:
                 found.fresh.append(summary)
             else:
-                whole = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+                bare_job = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
                 code = scene_code(stage, roots, scene, config).digest
-                job = replace(whole, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
+                job = replace(bare_job, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
                 found.tasks.append(Task(job, config, fingerprint))
     return found
 
@@ -101,8 +98,8 @@ def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, root
     return all(_fresh(stage, roots.data, scene, k, parts, fingerprint, quiet) is not None for k in range(parts))
 
 
-def look_ahead(stage: Stage, scenes: Sequence[str], roots: ProjectPaths) -> None:
-    """Begin to read the files whose digests tell whether a stage's shards are whole."""
+def prefetch_digests(stage: Stage, scenes: Sequence[str], roots: ProjectPaths) -> None:
+    """Start reading the files whose digests show whether a stage's shards are undamaged."""
     names = []
     for scene in scenes:
         for table in stage.writes:
@@ -112,8 +109,8 @@ def look_ahead(stage: Stage, scenes: Sequence[str], roots: ProjectPaths) -> None
     roots.data.prefetch_digests(names)
 
 
-def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
-    """Let the next run know what the footers of stages' shards say, those that this one has written among them."""
+def cache_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> None:
+    """Cache the footers of stages' shards for the next run."""
     for stage in stages:
         for scene in scenes:
             for table in stage.writes:
@@ -123,7 +120,7 @@ def keep_footers(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectP
 def _fresh(
     stage: Stage, data: DataRoot, scene: str, part: int, parts: int, fingerprint: str, reporter: Reporter
 ) -> dict[str, Any] | None:
-    """Return the shard's stored summary if all its tables and files are there and up to date."""
+    """Return the shard's stored summary if all its tables and files exist and are up to date."""
     summary = None
     for table in stage.writes:
         name = store.shard_name(table, scene, part)
@@ -145,7 +142,7 @@ def _fresh(
 
 
 def _verified(stage: Stage, data: DataRoot, scene: str, part: int, reporter: Reporter) -> bool:
-    """Whether the files that a fresh shard names have the digests that it says."""
+    """Whether the files of a fresh shard have the recorded digests."""
     if stage.digests is None:
         return True
     from aerialdojo_gen.store.parquet_files import read_file

@@ -1,4 +1,4 @@
-"""Ctrl-C that is never lost."""
+"""Reliable Ctrl-C handling."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 class Interrupts:
     """Turns SIGINT into KeyboardInterrupt, and remembers it.
 
-    Python raises KeyboardInterrupt wherever the main thread happens to be; in a callback of a library it is printed
-    and dropped. `check` raises it again at a place where it is heard.
+    Python raises KeyboardInterrupt wherever the main thread is; a library's callback may print and drop it.
+    `check` raises it again.
     """
 
     def __init__(self) -> None:
@@ -20,8 +20,8 @@ class Interrupts:
         self._before: Any = None
 
     def __enter__(self) -> Interrupts:
-        """Listen; only the main thread can, another one leaves things as they are."""
-        # A script's background jobs have it ignored: a Ctrl-C is not meant for them.
+        """Install the handler; only in the main thread."""
+        # Background jobs of a script ignore SIGINT.
         ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
         if threading.current_thread() is threading.main_thread() and not ignored:
             self._before = signal.signal(signal.SIGINT, self._on_signal)
@@ -30,7 +30,7 @@ class Interrupts:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Stop listening."""
+        """Restore the handler."""
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
 
@@ -39,6 +39,6 @@ class Interrupts:
         raise KeyboardInterrupt
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt if there was a Ctrl-C since listening began."""
+        """Raise KeyboardInterrupt if SIGINT arrived since `__enter__`."""
         if self._seen:
             raise KeyboardInterrupt

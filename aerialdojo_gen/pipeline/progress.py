@@ -1,4 +1,4 @@
-"""Progress on a terminal as a bar, elsewhere as plain lines."""
+"""Progress: a bar on a terminal, else plain lines."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from tqdm import tqdm
 
 from aerialdojo_gen.base.terminal import raw, shown
 
-# Its own lock is a semaphore, which needs a /dev/shm that can be written and outlives a process that is killed.
+# tqdm's own lock is a semaphore, which needs a writable /dev/shm and outlives a killed process.
 tqdm.set_lock(threading.RLock())
 
-# Where there is no terminal, lines are at least so far apart, and at most so far while nothing happens.
+# Without a terminal: least interval of lines, and longest silence.
 _PLAIN_EVERY_S, _SILENT_S = 10.0, 30.0
-# So many scenes are named that are under way.
+# How many running scenes are named.
 _NAMED = 3
-# Columns of the bar of a whole run.
+# Width of the bar of a whole run, columns.
 _BAR = 6
 _WITHOUT_SPEED = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
 
 
 class _Tqdm(tqdm):  # type: ignore[misc]  # the package has no types
-    """Leaves speed and time left out until they are known, and shows those of a `Rate`."""
+    """A bar that shows the speed of a `Rate`, once it is known."""
 
     per_s: float | None = None
 
     @property
     def format_dict(self) -> dict[str, Any]:
-        """Return what a line is made of, its format among it."""
+        """Fields and format of the line."""
         known: dict[str, Any] = super().format_dict
         return known | ({"rate": self.per_s} if self.per_s else {"bar_format": _WITHOUT_SPEED})
 
 
 class Rate:
-    """Measures how many things are finished a second, from the first one on: starting up is no part of it."""
+    """Measures items per second from the first item on, without the start-up."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
         self._first: tuple[int, float] | None = None
 
     def per_s(self, done: int) -> float | None:
-        """Return things a second now that `done` are finished; None before it is known.
+        """Return items per second after `done` items; None while unknown.
 
-        Several processes finish their first things almost together. So it is not known before as much time has passed
-        since the first thing as before it.
+        Several processes finish their first items almost together, so the rate is unknown until as much time has
+        passed since the first item as before it.
         """
         now = time.monotonic()
         if self._first is None:
@@ -61,39 +61,39 @@ class Rate:
 
 
 class _Lines:
-    """Prints how far it is where there is no terminal: when something happens, and now and then when nothing does."""
+    """Prints progress lines without a terminal: after items, and occasionally while nothing finishes."""
 
     def __init__(self, text: Callable[[], str], stream: TextIO) -> None:
-        self._text, self._stream, self._said = text, stream, time.monotonic()
+        self._line, self._stream, self._printed_at = text, stream, time.monotonic()
         self._ended = threading.Event()
         threading.Thread(target=self._watch, name="progress", daemon=True).start()
 
-    def happened(self) -> None:
-        if time.monotonic() - self._said >= _PLAIN_EVERY_S:
-            self._say()
+    def update(self) -> None:
+        if time.monotonic() - self._printed_at >= _PLAIN_EVERY_S:
+            self._print()
 
     def close(self) -> None:
         self._ended.set()
 
     def _watch(self) -> None:
-        while not self._ended.wait(max(0.1, self._said + _SILENT_S - time.monotonic())):
-            if time.monotonic() - self._said >= _SILENT_S:
-                self._say()
+        while not self._ended.wait(max(0.1, self._printed_at + _SILENT_S - time.monotonic())):
+            if time.monotonic() - self._printed_at >= _SILENT_S:
+                self._print()
 
-    def _say(self) -> None:
-        self._said = time.monotonic()
-        print(self._text(), file=self._stream, flush=True)
+    def _print(self) -> None:
+        self._printed_at = time.monotonic()
+        print(self._line(), file=self._stream, flush=True)
 
 
 class Bar:
-    """Counts finished shards (or what `unit` says); `advance` counts them."""
+    """Counts finished shards, or items of another `unit`."""
 
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
         label = shown(label)
         self._label, self._total, self._unit = label, total, unit
         self._frames = 0
         self._done, self._rate, self._frame_rate = 0, Rate(), Rate()
-        self._lines = _Lines(self._text, stream) if total and not quiet and not stream.isatty() else None
+        self._lines = _Lines(self._line, stream) if total and not quiet and not stream.isatty() else None
         self._tqdm = _Tqdm(
             total=total,
             desc=label,
@@ -104,7 +104,7 @@ class Bar:
         )
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
-        """Count `n` more, with as many frames of video."""
+        """Count `n` more items and their video frames."""
         self._done += n
         self._frames += frames
         self._tqdm.per_s = self._rate.per_s(self._done)
@@ -113,23 +113,23 @@ class Bar:
             self._tqdm.set_postfix_str(f"{frames_per_s:.1f} frames/s", refresh=False)
         self._tqdm.update(n)
         if self._lines:
-            self._lines.happened()
+            self._lines.update()
 
-    def _text(self) -> str:
+    def _line(self) -> str:
         per_s = self._rate.per_s(self._done) if self._done else None
         frames_per_s = self._frame_rate.per_s(self._frames) if self._frames else None
-        said = [f"{self._label}: {self._done}/{self._total} {self._unit}"]
-        said += [f"{per_s:.2f}/s"] if per_s else []
-        said += [f"{self._frames:,} frames"] if self._frames else []
-        said += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
-        said += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
-        return ", ".join(said)
+        parts = [f"{self._label}: {self._done}/{self._total} {self._unit}"]
+        parts += [f"{per_s:.2f}/s"] if per_s else []
+        parts += [f"{self._frames:,} frames"] if self._frames else []
+        parts += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
+        parts += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
+        return ", ".join(parts)
 
     def refresh(self) -> None:
-        """Show what is known; of shards nothing changes but by `advance`."""
+        """Do nothing: only `advance` changes the bar."""
 
     def close(self) -> None:
-        """Take the bar off the screen."""
+        """Remove the bar."""
         self._tqdm.close()
         if self._lines:
             self._lines.close()
@@ -137,26 +137,26 @@ class Bar:
 
 @dataclass(frozen=True)
 class Overview:
-    """How far a run is."""
+    """Progress of a run."""
 
-    done_s: float  # What was done, and what is expected to be left, seconds of one core
+    done_s: float  # Work done and expected to be left, seconds of one core
     left_s: float
-    scenes_done: int  # Scenes that nothing is to be done of, and all
+    scenes_done: int  # Finished, and all
     scenes: int
-    at_work: list[str]  # What is under way, in words
-    processes: int = 1  # How many are at work when there is enough to do
+    at_work: list[str]  # Names of running tasks
+    processes: int = 1  # Peak number of processes
 
     @property
     def share(self) -> float:
-        """What was done of it all, from 0 to 1."""
+        """Share of the work done, from 0 to 1."""
         return self.done_s / max(self.done_s + self.left_s, 1e-9)
 
     def __str__(self) -> str:
-        """Scenes, time left, and what is under way."""
+        """Scenes, time left, and running tasks."""
         return self.text()
 
     def text(self, width: int | None = None) -> str:
-        """Say scenes, time left, and as much of what is under way as fits a width."""
+        """Describe scenes, time left, and as many running tasks as fit a width."""
         left = duration(self.left_s / max(1, min(self.processes, self.scenes - self.scenes_done)))
         # Short, for 80 columns.
         text = f"{self.scenes_done}/{self.scenes} scenes, ~{left} left"
@@ -169,43 +169,43 @@ class Overview:
 
 
 class Overall:
-    """Shows how far a run through several stages is."""
+    """Shows the progress of a run through several stages."""
 
-    def __init__(self, look: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
-        self._look, self._stream = look, stream
-        seen = look()
-        nothing = quiet or seen.scenes_done == seen.scenes
-        self._lines = None if nothing or stream.isatty() else _Lines(self._text, stream)
+    def __init__(self, get_overview: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
+        self._get_overview, self._stream = get_overview, stream
+        overview = get_overview()
+        nothing = quiet or overview.scenes_done == overview.scenes
+        self._lines = None if nothing or stream.isatty() else _Lines(self._line, stream)
         self._tqdm = tqdm(
             total=1.0, file=stream, leave=False, disable=nothing or self._lines is not None, dynamic_ncols=True,
             bar_format=f"{{percentage:3.0f}}%|{{bar:{_BAR}}}| {{desc}}", mininterval=0.0,
         )  # fmt: skip
 
     def refresh(self) -> None:
-        """Show how far it is now."""
+        """Show the current progress."""
         if self._lines:
-            self._lines.happened()
+            self._lines.update()
         elif not self._tqdm.disable:
-            seen = self._look()
-            self._tqdm.n = seen.share
-            self._tqdm.set_description_str(seen.text(columns(self._stream) - len(f"100%|{' ' * _BAR}| ")))
+            overview = self._get_overview()
+            self._tqdm.n = overview.share
+            self._tqdm.set_description_str(overview.text(columns(self._stream) - len(f"100%|{' ' * _BAR}| ")))
 
-    def _text(self) -> str:
-        seen = self._look()
-        return f"{100 * seen.share:.0f} %, {seen}"
+    def _line(self) -> str:
+        overview = self._get_overview()
+        return f"{100 * overview.share:.0f} %, {overview}"
 
     def advance(self, frames: int = 0) -> None:
-        """Nothing by itself: how far it is is shown when the next shard is begun."""
+        """Do nothing: progress is shown when the next shard starts."""
 
     def close(self) -> None:
-        """Take it off the screen."""
+        """Remove the bar."""
         self._tqdm.close()
         if self._lines:
             self._lines.close()
 
 
 def columns(stream: TextIO) -> int:
-    """Count the columns of a terminal that can be written to without it breaking the line."""
+    """Number of columns of a terminal that can be used without a line break."""
     try:
         found = os.get_terminal_size(stream.fileno()).columns
     except (OSError, ValueError):
@@ -214,7 +214,7 @@ def columns(stream: TextIO) -> int:
 
 
 def duration(seconds: float) -> str:
-    """Say a time in words, e.g. "40 s", "3 min 20 s", "2 h 10 min"."""
+    """Format a duration, e.g. "40 s", "3 min 20 s", "2 h 10 min"."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -231,7 +231,7 @@ class Reporter:
         self.verbose = verbose
 
     def line(self, text: str) -> None:
-        """Write one line, above a bar if there is one."""
+        """Write a line, above a bar if there is one."""
         if not self._quiet:
             text = shown(text)
             if self._stream.isatty():
@@ -247,7 +247,7 @@ class Reporter:
 
     @contextmanager
     def bar(self, label: str, total: int, unit: str = "shards") -> Iterator[Bar]:
-        """Show progress over `total` shards, or things of another kind, for the length of the block."""
+        """Show progress over `total` shards, or items of another unit, during the block."""
         bar = Bar(label, total, self._stream, self._quiet, unit)
         try:
             yield bar
@@ -255,9 +255,9 @@ class Reporter:
             bar.close()
 
     @contextmanager
-    def overall(self, look: Callable[[], Overview]) -> Iterator[Overall]:
-        """Show how far a run is, as `look` tells, for the length of the block."""
-        shown = Overall(look, self._stream, self._quiet)
+    def overall(self, get_overview: Callable[[], Overview]) -> Iterator[Overall]:
+        """Show the progress that `get_overview` returns, during the block."""
+        shown = Overall(get_overview, self._stream, self._quiet)
         try:
             yield shown
         finally:

@@ -1,32 +1,106 @@
-"""The stages, in their order."""
+"""The table of stages, in order. A stage's work is `run` of its module in `aerialdojo_gen.pipeline.stages.work`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from aerialdojo_gen.pipeline.stage import Stage
-from aerialdojo_gen.pipeline.stages import (
-    anchor_sample,
-    annotate_import,
-    build_scenes,
-    filter,
-    pair_objects,
-    plan,
-    reference_images,
-    render,
-    split,
-)
+from aerialdojo_gen.pipeline.stages import hooks
+from aerialdojo_gen.rendering.resolve_config import idle_renderers, renderer_choices, settle_renderer
 
 STAGES: tuple[Stage, ...] = (
-    build_scenes.STAGE,
-    annotate_import.STAGE,
-    anchor_sample.STAGE,
-    reference_images.STAGE,
-    pair_objects.STAGE,
-    plan.STAGE,
-    filter.STAGE,
-    split.STAGE,
-    render.STAGE,
+    Stage(
+        "build-scenes",
+        "Build the scenes' meshes from their recipes.",
+        reads=(),
+        writes=("scenes",),
+        sources=hooks.scene_sources,
+        imports=hooks.layout_of,
+        seconds=(4.0, 0.0),
+    ),
+    Stage(
+        "annotate-import",
+        "Check the annotations against the scenes and import them.",
+        reads=("scenes",),
+        writes=("landmarks", "objects", "chosen_anchors"),
+        sources=hooks.annotation_sources,
+        missing_input=hooks.missing_annotations,
+        seconds=(0.5, 0.0),
+    ),
+    Stage(
+        "anchor-sample",
+        "Find viewpoints 1 m from each object that see it.",
+        reads=("scenes", "objects", "chosen_anchors"),
+        writes=("anchors", "viewpoints"),
+        resolve_config=hooks.resolve_clip,
+        idle=hooks.idle_scorers,
+        seconds=(1.0, 0.1),
+    ),
+    Stage(
+        "reference-images",
+        "Render each object's picture from its selected anchor.",
+        reads=("scenes", "objects", "anchors"),
+        writes=("references",),
+        resolve_config=settle_renderer,
+        choices=renderer_choices,
+        idle=idle_renderers,
+        seconds=(1.0, 0.1),
+    ),
+    Stage(
+        "pair-objects",
+        "Pair start anchors with targets: the candidate tasks.",
+        reads=("scenes", "objects", "anchors"),
+        writes=("pairs",),
+        seconds=(0.1, 0.005),
+    ),
+    Stage(
+        "plan",
+        "Plan a collision-free reference trajectory for every candidate.",
+        reads=("scenes", "objects", "anchors", "pairs"),
+        writes=("plans",),
+        parts=hooks.plan_parts,
+        memory_mb=1500,
+        seconds=(1.0, 0.4),
+    ),
+    Stage(
+        "filter",
+        "Keep the candidates that make tasks, with a reason for every rejection.",
+        reads=("scenes", "objects", "pairs", "plans"),
+        writes=("verdicts",),
+        seconds=(0.1, 0.005),
+    ),
+    Stage(
+        "split",
+        "Write the release: tasks, routes, objects, train and test.",
+        reads=("scenes", "landmarks", "objects", "anchors", "viewpoints", "references", "pairs", "plans", "verdicts"),
+        writes=(
+            "tasks/train",
+            "tasks/test",
+            "routes/train",
+            "routes/test",
+            "release/scenes",
+            "release/landmarks",
+            "release/objects",
+            "release/anchors",
+            "release/viewpoints",
+        ),
+        check=hooks.check_pools,
+        seconds=(0.2, 0.005),
+        barrier=True,
+    ),
+    Stage(
+        "render",
+        "Record four RGB-D views along trajectories of the release.",
+        reads=("scenes", "routes/train", "routes/test"),
+        writes=("recordings", "frames"),
+        parts=hooks.render_parts,
+        resolve_config=settle_renderer,
+        choices=renderer_choices,
+        idle=idle_renderers,
+        digests=("recordings", "path", "sha256"),
+        seconds=(10.0, 0.0),
+        barrier=True,
+    ),
 )
 
 BY_NAME = {stage.name: stage for stage in STAGES}

@@ -1,7 +1,7 @@
-"""Run stages: take each scene through them in one process, as far as scenes need not wait for one another.
+"""Run stages.
 
-A shard with the right fingerprint is never computed again, one with a wrong one always is; so a killed run goes on
-where it stopped, and the tables do not depend on the number of workers, their order, or the kills.
+A shard is computed if and only if its fingerprint is out of date. So a killed run resumes where it stopped, and the
+tables do not depend on the number of workers, their order, or kills.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from aerialdojo_gen.pipeline.chain import SceneScheduler
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
-from aerialdojo_gen.pipeline.freshness import Limits, look_ahead
+from aerialdojo_gen.pipeline.freshness import Limits, prefetch_digests
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
@@ -44,67 +44,67 @@ def run(
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
-    """Run stages in their order on the scenes that are ready for them."""
+    """Run stages in order on the scenes that have their inputs."""
     reporter = reporter or Reporter(quiet=True)
     forced, started = set(force), time.monotonic()
     summaries: list[StageSummary] = []
     for first in stages[:1]:
         if first.name not in forced:
-            look_ahead(first, scenes, roots)
+            prefetch_digests(first, scenes, roots)
     for stage in stages:
-        # All of it now: who edits a file while this runs has loaded the old one, and gets all made anew next time.
+        # Digest all code now, as loaded: edits during the run make the shards stale next time.
         stage_code(stage.name)
-    carried = (roots.scene_assets, roots.recipes, roots.annotations)
-    folders = SharedPaths(on_disk(roots.data), carried, on_disk(roots.data), reporter.line)
+    sources = (roots.scene_assets, roots.recipes, roots.annotations)
+    folders = SharedPaths(on_disk(roots.data), sources, on_disk(roots.data), reporter.line)
     left_out = scenes_missing_input(stages, scenes, roots)
     scenes = [scene for scene in scenes if scene not in left_out]
-    made = make_executor(executor, workers, address, folders)
-    with roots.data.lock(), Interrupts() as interrupts, made as pool:
+    executor_of_run = make_executor(executor, workers, address, folders)
+    with roots.data.lock(), Interrupts() as interrupts, executor_of_run as pool:
         if prepare:
             prepare()
-        expectation = RuntimeEstimate(stages, scenes, roots)
-        for group in chained(stages, alone=limits is not None):
-            # What the stages before wrote, in whatever process, is to be found.
+        estimate = RuntimeEstimate(stages, scenes, roots)
+        for group in group_stages(stages, alone=limits is not None):
+            # Other processes may have written.
             roots.data.refresh()
-            now = limits if limits and group[-1] is stages[-1] else Limits()
-            chain = SceneScheduler(group, scenes, pipeline, roots, forced, now, reporter, expectation)
-            busy = [stage.name for stage in group if any(expectation.left(stage.name, scene) for scene in scenes)]
-            if chain and (cold := uncompiled(busy)):
+            group_limits = limits if limits and group[-1] is stages[-1] else Limits()
+            scheduler = SceneScheduler(group, scenes, pipeline, roots, forced, group_limits, reporter, estimate)
+            busy = [stage.name for stage in group if any(estimate.left(stage.name, scene) for scene in scenes)]
+            if scheduler and (cold := uncompiled(busy)):
                 reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")
-            summaries += _go_through(chain, pool, reporter, interrupts, stages[-1].name)
+            summaries += _run_group(scheduler, pool, reporter, interrupts, stages[-1].name)
             interrupts.check()
         if finish:
             roots.data.refresh()
             finish()
             interrupts.check()
     if len(stages) > 1:
-        reporter.line(_altogether(summaries, time.monotonic() - started))
+        reporter.line(_totals_line(summaries, time.monotonic() - started))
     return summaries
 
 
 def uncompiled(stages: Sequence[str]) -> list[str]:
-    """Name the stages that have machine code for less than half of their modules with kernels."""
+    """Name the stages of which fewer than half of the Numba modules are compiled."""
     from aerialdojo_gen.base.kernel_cache import kernel_folder
 
     def compiled(stage: str) -> list[bool]:
         files = (_PACKAGE.parent.joinpath(*part.split(".")).with_suffix(".py") for part in stage_code(stage).parts)
-        kernels = [file for file in files if file.is_file() and b"common.kernels import njit" in file.read_bytes()]
+        kernels = [file for file in files if file.is_file() and b"base.kernels import njit" in file.read_bytes()]
         return [any(kernel_folder(file).glob("*.nbi")) for file in kernels]
 
     return [stage for stage in stages if 2 * sum(found := compiled(stage)) < len(found)]
 
 
-def _altogether(summaries: Sequence[StageSummary], seconds: float) -> str:
-    """Say what stages did together, those that had nothing to do among them."""
+def _totals_line(summaries: Sequence[StageSummary], seconds: float) -> str:
+    """Summarise a run in a line."""
     idle = sum(not summary.computed for summary in summaries)
     if idle == len(summaries):
         return f"nothing to do: all {idle} stages are up to date ({duration(seconds)})"
-    besides = f"; {idle} of {len(summaries)} stages had nothing to do" if idle else ""
-    return f"{sum(s.computed for s in summaries):,} shards computed in {duration(seconds)}{besides}"
+    idle_note = f"; {idle} of {len(summaries)} stages had nothing to do" if idle else ""
+    return f"{sum(s.computed for s in summaries):,} shards computed in {duration(seconds)}{idle_note}"
 
 
-def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]]:
-    """Group stages that a scene goes through at its own pace; all scenes wait for one another before each group."""
+def group_stages(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]]:
+    """Group stages between barriers: within a group scenes advance independently."""
     groups: list[list[Stage]] = []
     for stage in stages:
         if not groups or stage.waits or (alone and stage is stages[-1]):
@@ -113,55 +113,59 @@ def chained(stages: Sequence[Stage], *, alone: bool = False) -> list[list[Stage]
     return groups
 
 
-def _go_through(
-    chain: SceneScheduler, pool: Executor, reporter: Reporter, interrupts: Interrupts, asked: str
+def _run_group(
+    scheduler: SceneScheduler, pool: Executor, reporter: Reporter, interrupts: Interrupts, requested: str
 ) -> list[StageSummary]:
-    """Take scenes through stages, and say what was done."""
+    """Run a group of stages, and report the summaries."""
     summaries: list[StageSummary] = []
 
-    def say() -> None:
-        for summary in chain.summaries():
-            # What was asked for has its line in any case, what it builds on where there was something to do.
-            if summary.computed or reporter.verbose or summary.stage == asked:
+    def report() -> None:
+        for summary in scheduler.summaries():
+            # The requested stage always has a line, upstream stages only if they computed something.
+            if summary.computed or reporter.verbose or summary.stage == requested:
                 reporter.line(str(summary))
             summaries.append(summary)
 
-    say()
-    with reporter.bar(chain.label, len(chain)) if chain.of_one_stage else reporter.overall(chain.look) as bar:
-        chain.watched_by(bar.refresh)
-        for outcome in pool.run(compute, chain, memory_mb=chain.memory_mb):
+    report()
+    with (
+        reporter.bar(scheduler.label, len(scheduler))
+        if scheduler.of_one_stage
+        else reporter.overall(scheduler.overview) as bar
+    ):
+        scheduler.on_start(bar.refresh)
+        for outcome in pool.run(compute, scheduler, memory_mb=scheduler.memory_mb):
             interrupts.check()
-            say()
+            report()
             if isinstance(outcome, Computed):
                 bar.advance(frames=outcome.summary["counts"].get("frames", 0))
             elif not isinstance(outcome, BudgetSpent):
                 bar.advance()
-    if chain.errors:
-        raise _together(chain.errors)
+    if scheduler.errors:
+        raise _combine(scheduler.errors)
     return summaries
 
 
 def scenes_missing_input(stages: Sequence[Stage], scenes: Sequence[str], roots: ProjectPaths) -> dict[str, str]:
-    """Find the scenes that stages leave out, as these or what they build on want something of its author first."""
+    """Return the scenes that lack an input from their author, e.g. annotations, each with the reason."""
     before = {each.name: each for stage in stages for each in upstream(stage.name)}
     inputs = {table for stage in stages for table in stage.reads} - {t for stage in stages for t in stage.writes}
 
-    def wanting(scene: str) -> str:
+    def missing(scene: str) -> str:
         why = next(filter(None, (stage.missing_input(roots, scene) for stage in stages)), "")
         earlier = next(filter(None, (stage.missing_input(roots, scene) for stage in before.values())), "")
-        # What stages that do not run now made before, or a release brought along, is enough.
-        made = why or not earlier or all(store.shards(roots.data, table, scene) for table in inputs)
-        return why if made else earlier
+        # Tables from an earlier run, or from an imported release, suffice.
+        complete = why or not earlier or all(store.shards(roots.data, table, scene) for table in inputs)
+        return why if complete else earlier
 
-    why = {scene: wanting(scene) for scene in scenes}
+    why = {scene: missing(scene) for scene in scenes}
     left_out = {scene: line for scene, line in why.items() if line}
     if left_out and len(left_out) == len(why):
-        raise _together([AssetError(line) for line in left_out.values()])
+        raise _combine([AssetError(line) for line in left_out.values()])
     return left_out
 
 
-def _together(errors: Sequence[AerialDojoError]) -> AerialDojoError:
-    """Make one error of several, of the first one's kind, that lists them all."""
+def _combine(errors: Sequence[AerialDojoError]) -> AerialDojoError:
+    """Combine errors into one of the first one's type that lists all messages."""
     messages = list(dict.fromkeys(str(error) for error in errors))
     return type(errors[0])("\n".join(messages))
 
@@ -172,7 +176,7 @@ def known_scenes(recipes: Path) -> list[str]:
 
 
 def chosen_scenes(pipeline: Pipeline, roots: ProjectPaths, patterns: Sequence[str] | None = None) -> list[str]:
-    """Resolve names and globs to scenes with a recipe; the pipeline's own scenes where there are none."""
+    """Resolve names and globs to scenes with a recipe; default: the pipeline's scenes."""
     return choose_scenes(patterns or pipeline.scenes, known_scenes(roots.recipes))
 
 

@@ -1,11 +1,12 @@
-"""What a stage is, and what its work is given and gives.
+"""What a stage is, and what its work receives and returns.
 
-A stage is declared by its module in `aerialdojo_gen.pipeline.stages`; its work is a plain function
-``run(job, config) -> Output``. Nothing heavy is imported here: the command line reads the declarations.
+`aerialdojo_gen.pipeline.registry` is the table of stages; the work of one is a plain function
+``run(job, config) -> Output``. Nothing heavy is imported here: the command line reads the table.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -24,16 +25,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ProjectPaths:
-    """The folders that a run works with.
+    """The folders of a run.
 
     Attributes
     ----------
     data : DataRoot
-        Every table and file that stages write; made of a path or URL where one is given.
+        Every table and file that stages write; a path or URL is opened.
     scene_assets : Path
         Props and materials.
     recipes : Path
-        Recipes, one TOML file a scene.
+        Recipes, one TOML file per scene.
     annotations : Path
         Annotation files.
     """
@@ -54,11 +55,11 @@ class Output:
     Attributes
     ----------
     tables : dict of str to pyarrow.Table
-        Every table that the stage writes, also where it has no rows; rows sorted by the table's key.
+        Every table that the stage writes, empty ones included; rows sorted by the table's key.
     rows_in, rows_out : int
         For the summary line.
     counts : dict of str to int
-        Why rows were rejected, or what became of them: stable words, for the summary line.
+        Outcomes and reasons of rejection (stable words), for the summary line.
     """
 
     tables: dict[str, pa.Table]
@@ -69,32 +70,32 @@ class Output:
 
 @dataclass(frozen=True)
 class Job:
-    """One shard's work: where it reads, what it is a part of, and the pipeline's seed.
+    """One shard's work: stage, scene, part, folders and seed.
 
     Attributes
     ----------
     stage, scene : str
         Name of the stage and of the scene.
     part, parts : int
-        Which part of the scene's work this is, and how many there are.
+        Number of the scene's part, and of parts.
     seed : int
         Seed of the pipeline, for `aerialdojo_gen.base.rng.generator`.
     embodiment : Embodiment
         The drone's body.
-    roots : Roots
+    roots : ProjectPaths
         The folders.
     files : list of str
         Files that the shard owns, relative to the data directory; the stage adds them.
     digested : list of str
-        Those of them whose digests the shard's footer keeps, to be fresh by; the others' stand in its rows.
+        Those of them whose digests are in the shard's footer; the digests of the others are in its rows.
     deadline : float, optional
-        Seconds since the epoch after which a stage of long shards begins nothing new, and raises BudgetSpent.
+        Seconds since the epoch after which a stage with long shards starts nothing new and raises BudgetSpent.
     force : bool
-        Whether the stage makes anew what it finds finished.
+        Whether the stage recomputes its finished files.
     code : str
-        Digest of the stage's code, for what a stage itself finds finished.
+        Digest of the stage's code, for stages that check finished files themselves.
     verify : bool
-        Whether it compares the digests of the files that it finds finished.
+        Whether the digests of finished files are compared.
     """
 
     stage: str
@@ -118,7 +119,7 @@ class Job:
         return shards.read_scene(self.roots.data, table, self.scene)
 
     def scene_model(self, keep: int = 1) -> Scene:
-        """Read the scene's mesh; it is kept between the jobs of a process, as `keep` of `open_scene` says."""
+        """Read the scene's mesh, which the process keeps between jobs (`keep` as in `open_scene`)."""
         from aerialdojo_gen.scenes.context import open_scene
         from aerialdojo_gen.scenes.stored import mesh_file
 
@@ -126,7 +127,7 @@ class Job:
         return open_scene(mesh_file(self.roots.data, row["mesh_path"]), row["mesh_sha256"], keep).scene
 
     def output_file(self, relative: str) -> AbstractContextManager[Path]:
-        """Open a file output: a temporary path that takes its name when the block ends without an error.
+        """Open a file output: a temporary path, renamed if the block ends without an error.
 
         Parameters
         ----------
@@ -143,6 +144,11 @@ class Job:
         return self.roots.data.commit(relative)
 
 
+def work_module(stage: str) -> str:
+    """Name the module with a stage's work."""
+    return f"aerialdojo_gen.pipeline.stages.work.{stage.replace('-', '_')}"
+
+
 def _one_part(_data: DataRoot, _scene: str, _config: Any) -> int:
     return 1
 
@@ -151,11 +157,11 @@ def _no_check(_data: DataRoot, _scenes: Sequence[str], _config: Any) -> None:
     pass
 
 
-def _as_it_is(config: Any, _say: Callable[[str], None]) -> Any:
+def _unchanged(config: Any, _say: Callable[[str], None]) -> Any:
     return config
 
 
-def _no_choice(_config: Any) -> list[Any]:
+def _no_choices(_config: Any) -> list[Any]:
     return []
 
 
@@ -163,15 +169,15 @@ def _no_sources(_roots: ProjectPaths, _scene: str) -> list[Path]:
     return []
 
 
-def _no_want(_roots: ProjectPaths, _scene: str) -> str:
+def _no_missing_input(_roots: ProjectPaths, _scene: str) -> str:
     return ""
 
 
-def _any_module(_roots: ProjectPaths, _scene: str) -> Choice | None:
+def _no_module_choice(_roots: ProjectPaths, _scene: str) -> Choice | None:
     return None
 
 
-def _nothing_idle(_config: Any) -> tuple[str, ...]:
+def _no_idle_modules(_config: Any) -> tuple[str, ...]:
     return ()
 
 
@@ -187,67 +193,69 @@ class Stage:
         One line for the command line.
     reads, writes : tuple of str
         Tables (keys of `aerialdojo_gen.store.shards.LAYOUT`), one scene of each.
-    run : callable
-        ``(job, config) -> Output``: computes a shard. It imports what it needs when it is called.
     parts : callable
         ``(data, scene, config) -> int``: number of shards of a scene; may read upstream tables.
     sources : callable
-        ``(roots, scene) -> list of Path``: files of the scene, outside the store, whose bytes the result depends on.
-    wants : callable
-        ``(roots, scene) -> str``: why a scene that is not finished by its author is left out of this stage and
-        of those that build on it, in a line that names the mend; empty where nothing is wanting.
+        ``(roots, scene) -> list of Path``: the scene's input files outside the store; their bytes are fingerprinted.
+    missing_input : callable
+        ``(roots, scene) -> str``: why a scene is left out of this stage and those downstream because its author has
+        not made an input, in a line that says how to make it; empty if nothing is missing.
     imports : callable
-        ``(roots, scene) -> Choice or None``: which modules the scene's work imports of a package by a name made
-        at run time; the others' code makes nothing of the scene stale. None where that is not known: all count.
+        ``(roots, scene) -> Choice or None``: which modules of a package the scene's work imports dynamically; the
+        code of the others does not make the scene stale. None if unknown: all count.
     idle : callable
-        ``(config) -> tuple of str``: modules and libraries that the work does not use with such a configuration,
-        although it has imports of them. They do not count: whoever installs an extra has nothing made again.
+        ``(config) -> tuple of str``: imported modules and libraries that the work does not use with this
+        configuration. They do not count, so that installing an extra makes nothing stale.
     check : callable
-        ``(data, scenes, config)``: raises an `AerialDojoError` where the inputs of all scenes together will not do,
+        ``(data, scenes, config)``: raises an `AerialDojoError` if the inputs of all scenes together are insufficient,
         before anything is written.
-    settle : callable
-        ``(config, say) -> config``: decides what the configuration leaves to the machine, so that the decision is
-        part of the fingerprint, and says it in a line.
+    resolve_config : callable
+        ``(config, say) -> config``: decides what the configuration leaves to the machine, and reports it in a line;
+        the decision is part of the fingerprint.
     choices : callable
-        ``config -> list of config``: what `settle` may make of it, where deciding takes time. Where all shards are
-        fresh by one of them nothing is decided anew.
+        ``config -> list of config``: possible results of `resolve_config`, if it is slow. If all shards are fresh
+        under one of them, it is not called.
     digests : (str, str, str), optional
-        A table that the stage writes and its columns with the path of a file (or folder) and the SHA-256 of it.
-    after_all : bool
-        Whether a scene waits here until all of them have been through the stages before. A stage with a `check` does;
-        through others a scene goes at its own pace, in one process where it can be.
+        A table that the stage writes and its columns with the path and the SHA-256 of a file (or folder).
+    barrier : bool
+        Whether the stage waits until all scenes have passed the stages before; a `check` implies it. Otherwise
+        scenes advance independently.
     seconds : (float, float)
-        What a scene takes, and each of its objects besides, on one ordinary core. It decides which scene is begun
-        first, and the time that is said to be left until the run itself has told better.
+        Time per scene, and per object, on one core. It orders the scenes, and estimates the time left until there
+        are measurements.
     memory_mb : int
-        What a process takes at its peak, megabytes, with room for larger scenes than were measured; a cluster starts
-        no more of them on a node than fit.
+        Peak memory of a process, with a margin for larger scenes; limits the processes per node of a cluster.
     """
 
     name: str
     help: str
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    run: Callable[[Job, Any], Output]
     parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[ProjectPaths, str], list[Path]] = _no_sources
-    missing_input: Callable[[ProjectPaths, str], str] = _no_want
-    imports: Callable[[ProjectPaths, str], Choice | None] = _any_module
-    idle: Callable[[Any], tuple[str, ...]] = _nothing_idle
+    missing_input: Callable[[ProjectPaths, str], str] = _no_missing_input
+    imports: Callable[[ProjectPaths, str], Choice | None] = _no_module_choice
+    idle: Callable[[Any], tuple[str, ...]] = _no_idle_modules
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
-    resolve_config: Callable[[Any, Callable[[str], None]], Any] = _as_it_is
-    choices: Callable[[Any], list[Any]] = _no_choice
+    resolve_config: Callable[[Any, Callable[[str], None]], Any] = _unchanged
+    choices: Callable[[Any], list[Any]] = _no_choices
     digests: tuple[str, str, str] | None = None
     barrier: bool = False
     seconds: tuple[float, float] = (1.0, 0.0)
     memory_mb: int = 1000
 
+    def run(self, job: Job, config: Any) -> Output:
+        """Compute a shard: `run` of the module of the stage's work, which is imported now."""
+        module = importlib.import_module(work_module(self.name))
+        output: Output = module.run(job, config)
+        return output
+
     @property
     def in_parts(self) -> bool:
-        """Whether a scene can have several shards, which several processes may compute."""
+        """Whether a scene can have several shards."""
         return self.parts is not _one_part
 
     @property
     def waits(self) -> bool:
-        """Whether all scenes are to be through the stages before."""
+        """Whether all scenes must have passed the stages before."""
         return self.barrier or self.check is not _no_check

@@ -1,4 +1,4 @@
-"""What a stage did, in figures and in a line."""
+"""Counts of a stage's run, and its summary line."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class StageSummary:
-    """What a stage did."""
+    """Counts of a stage's run."""
 
     stage: str  # Name of the stage
-    rows_in: int  # Over all its shards, also those that were already there
+    rows_in: int  # Over all shards, fresh ones included
     rows_out: int
-    counts: Counter[str] = field(default_factory=Counter)  # Reasons and outcomes, over all its shards
-    shards: int = 0  # Shards in all; shards that were computed now
+    counts: Counter[str] = field(default_factory=Counter)  # Reasons and outcomes, over all shards
+    shards: int = 0  # All, and computed in this run
     computed: int = 0
-    seconds: float = 0.0  # Time that its shards took, in all processes together, and looking which of them are fresh
+    seconds: float = 0.0  # Over all processes, the search for fresh shards included
 
     def __str__(self) -> str:
         """One line: rows in, rows out, why the others were rejected, seconds."""

@@ -1,4 +1,4 @@
-"""A shard to compute: what that takes, and how its tables are committed; executors call `compute`."""
+"""A shard to compute, and how its tables are committed; executors call `compute`."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ from aerialdojo_gen.store.footers import ShardFile
 class Task:
     """A shard to compute."""
 
-    job: Job  # What it is
+    job: Job
     config: Section  # Its stage's section
-    fingerprint: str  # To be stored with it
+    fingerprint: str  # Stored with the shard
     given: CliContext = field(default_factory=given, compare=False)
 
     @property
     def label(self) -> str:
-        """The shard in words, for messages."""
+        """The shard's name in messages."""
         part = f" part {self.job.part} of {self.job.parts}" if self.job.parts > 1 else ""
         return f"{self.job.stage} {self.job.scene}{part}"
 
     @property
     def scene(self) -> str:
-        """The shard's scene, which a process keeps to."""
+        """The shard's scene; a process stays with a scene."""
         return self.job.scene
 
     def moved(self, place: Callable[[Path], Path]) -> Task:
-        """Return the same task for a machine where the folders of the sources lie elsewhere."""
+        """Return the same task for a machine with other source folders."""
         roots = self.job.roots
-        here = replace(
+        paths = replace(
             roots,
             scene_assets=place(roots.scene_assets),
             recipes=place(roots.recipes),
             annotations=place(roots.annotations),
         )
-        return replace(self, job=replace(self.job, roots=here))
+        return replace(self, job=replace(self.job, roots=paths))
 
 
 @dataclass(frozen=True)
 class Computed:
-    """What is told of a shard that was computed."""
+    """Result of a computed shard."""
 
-    summary: dict[str, Any]  # ``rows_in``, ``rows_out``, ``counts``, as its footer has it
-    seconds: float  # Wall time that it took its process
+    summary: dict[str, Any]  # ``rows_in``, ``rows_out``, ``counts``, as in its footer
+    seconds: float  # Wall time in its process
 
 
 def compute(task: Task) -> Computed:
@@ -72,13 +72,13 @@ def compute(task: Task) -> Computed:
         raise
     except Exception as error:
         if why := environment_error(error):
-            # Without the shard: it is no fault of its own, and all of them say the same.
+            # Without the shard's name: the cause is the machine, and all shards report the same.
             raise AerialDojoError(why) from error
         raise RuntimeError(f"{task.label} failed: {type(error).__name__}: {error}") from error
     if set(output.tables) != set(stage.writes):
         raise RuntimeError(f"{task.label} returned tables {sorted(output.tables)}, not {sorted(stage.writes)}")
     summary = {"rows_in": output.rows_in, "rows_out": output.rows_out, "counts": dict(sorted(output.counts.items()))}
-    files = {name: _described(job, name) for name in sorted(job.files)}
+    files = {name: _file_info(job, name) for name in sorted(job.files)}
     for name, table in output.tables.items():
         store.write_shard(
             job.roots.data,
@@ -94,6 +94,6 @@ def compute(task: Task) -> Computed:
     return Computed(summary, time.monotonic() - started)
 
 
-def _described(job: Job, name: str) -> ShardFile:
+def _file_info(job: Job, name: str) -> ShardFile:
     data = job.roots.data
     return ShardFile(data.size(name), data.digest(name) if name in job.digested else "")

@@ -180,9 +180,9 @@ def _key_lines(key: Key, width: int | None) -> list[str]:
         text += f" = {_shown(value)}" + (f" {key.unit}" if key.unit and value is not None else "")
     if changed and not (key.required and key.default is None):
         text += f"  (default: {_shown(key.default)})"
-    told = "; ".join(filter(None, (key.bounds, key.kind if " or " in key.kind else "")))
+    notes = "; ".join(filter(None, (key.bounds, key.kind if " or " in key.kind else "")))
     over = " " * (len(begin) + 4)
-    meaning = f"{over}{key.meaning}" + (f" [{told}]" if told else "")
+    meaning = f"{over}{key.meaning}" + (f" [{notes}]" if notes else "")
     return [*wrapped(text, width, over), *wrapped(meaning, width, over)]
 
 

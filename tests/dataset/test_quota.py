@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.cli.common import open_pipeline, run_until
 from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
-from aerialdojo_gen.pipeline.stages.work.quota import apportion, difficulty_steps, select_quota, train_quotas
+from aerialdojo_gen.pipeline.stages.work.quota import apportion, difficulty_level, select_quota, train_quotas
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -103,22 +103,22 @@ def test_another_seed_releases_other_tasks():
 def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, preference):
     ids, setting, lengths = pool(1500, seed)
     rng = np.random.default_rng(seed)
-    steps = difficulty_steps(rng.choice([1.0, 1.2], 1500), rng.choice([0.0, 0.4], 1500))
-    assert set(steps.tolist()) == {0, 1, 2}
+    levels = difficulty_level(rng.choice([1.0, 1.2], 1500), rng.choice([0.0, 0.4], 1500))
+    assert set(levels.tolist()) == {0, 1, 2}
     wanted = {"base": 150, "standard": 120, "long_horizon": 40}
     path_m = longer * sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
     plain = select_quota(ids, setting, lengths, wanted, path_m, seed)
-    mask = select_quota(ids, setting, lengths, wanted, path_m, seed, steps, preference)
+    mask = select_quota(ids, setting, lengths, wanted, path_m, seed, levels, preference)
     assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
     assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
-    assert steps[mask].sum() > steps[plain].sum()
+    assert levels[mask].sum() > levels[plain].sum()
     # Equal steps are no preference, and the order of rows is none either.
     assert (
         select_quota(ids, setting, lengths, wanted, path_m, seed, np.ones(1500, np.int64), preference) == plain
     ).all()
     order = rng.permutation(1500)
     again = select_quota(
-        [ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, path_m, seed, steps[order],
+        [ids[k] for k in order], [setting[k] for k in order], lengths[order], wanted, path_m, seed, levels[order],
         preference,
     )  # fmt: skip
     assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
@@ -131,7 +131,7 @@ def test_where_all_candidates_are_wanted_nothing_is_preferred():
 
 
 def test_what_is_not_known_is_not_hard():
-    known = difficulty_steps(np.array([1.04, 1.05, np.nan, np.nan]), np.array([0.01, 0.0, 0.0, np.nan]))
+    known = difficulty_level(np.array([1.04, 1.05, np.nan, np.nan]), np.array([0.01, 0.0, 0.0, np.nan]))
     assert known.tolist() == [0, 2, 1, 0]
 
 

@@ -10,7 +10,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from aerialdojo_gen.validate import Asked, validate, write_report
 from support.planting import SMOKE, check, faults_of
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -18,7 +17,7 @@ from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.dataset.contents import check_release, scenes_there
-from aerialdojo_gen.dataset.validate import counts
+from aerialdojo_gen.dataset.validate import ValidationOptions, counts, validate, write_report
 from aerialdojo_gen.dataset.validate.registry import Fault
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS
@@ -123,7 +122,7 @@ def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
     text = machine.read_text()
     assert f"id_train ({rows} rows)" in text
     machine.write_text(text.replace(f"id_train ({rows} rows)", "id_train (7,777 rows)"))
-    report = validate(Asked(planted.release, pipeline=Pipeline(), use_meshes=False))
+    report = validate(ValidationOptions(planted.release, pipeline=Pipeline(), use_meshes=False))
     assert [(f.check, f.part, f.table, f.found) for f in report.faults] == [
         ("card_counts", "README.md", "tasks", "7,777 rows told"),
         ("card_counts", "croissant.json", "tasks", "7,777 rows told"),
@@ -201,7 +200,7 @@ def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(plant
     bare = run("--release", planted.release, "--no-meshes", "--workers", 1, "--verbose")
     assert bare.returncode == 0
     (line,) = [line.split() for line in bare.stdout.splitlines() if line.startswith("oracle_fails ")]
-    assert line == ["oracle_fails", "routes", "0", "0", *["no", "meshes", "asked", "for", "(2", "times)"]]
+    assert line == ["oracle_fails", "routes", "0", "0", *["--no-meshes", "was", "given", "(2", "times)"]]
     brief = run("--release", planted.release, "--no-meshes", "--workers", 1)
     assert brief.returncode == 0
     assert brief.stdout.splitlines()[-1] == bare.stdout.splitlines()[-1]
@@ -211,7 +210,7 @@ def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(plant
     assert checks["routes"] == sum(line.split()[1:2] == ["routes"] for line in bare.stdout.splitlines())
     (line,) = [line for line in lines if line[0] == "routes"]
     assert line[2:4] == [str(routes), "0"]
-    assert "asked" in line, "what was not checked is said here too"
+    assert "--no-meshes" in line, "what was not checked is said here too"
 
 
 def test_the_command_names_every_row_at_fault(planted, tmp_path):
@@ -260,8 +259,8 @@ def test_reports_hold_the_same_faults_in_every_format(tmp_path):
 
 def test_workers_find_the_same_in_the_same_order(planted):
     planted.edit("tasks/train", lambda row: row.update(action_budget=7))
-    asked = Asked(planted.release, pipeline=Pipeline())
-    one, two = validate(asked), validate(asked, workers=2)
+    options = ValidationOptions(planted.release, pipeline=Pipeline())
+    one, two = validate(options), validate(options, workers=2)
     assert one.faults == two.faults
     assert set(faults_of(one)) == {"task_budget"}
     assert one.table_lines() == two.table_lines()

@@ -11,9 +11,9 @@ import pytest
 import aerialdojo_gen
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.pipeline import fingerprint
-from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, stage_code, stage_module
+from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, stage_code
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import ProjectPaths
+from aerialdojo_gen.pipeline.stage import ProjectPaths, work_module
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.recipe import load_recipe
 
@@ -120,7 +120,7 @@ def copied(tmp_path_factory):
 def test_a_change_makes_stale_what_is_built_with_it_and_nothing_else(copied, relative, stale):
     def digests():
         package = Package(copied)
-        return {recipe.stem: package.of(stage_module(BUILD.name), chosen(recipe)).digest for recipe in RECIPES}
+        return {recipe.stem: package.of(work_module(BUILD.name), chosen(recipe)).digest for recipe in RECIPES}
 
     path = copied / "layouts" / relative
     before, text = digests(), path.read_text()

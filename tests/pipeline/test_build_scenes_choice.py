@@ -4,12 +4,12 @@ import pytest
 
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.pipeline.stage import ProjectPaths
-from aerialdojo_gen.pipeline.stages.build_scenes import STAGE
+from aerialdojo_gen.pipeline.stages.hooks import layout_of
 from aerialdojo_gen.scenes import layouts
 
 
 def chosen(folder, scene):
-    choice = STAGE.imports(ProjectPaths(folder, folder, folder, folder), scene)
+    choice = layout_of(ProjectPaths(folder, folder, folder, folder), scene)
     return choice and choice.modules
 
 

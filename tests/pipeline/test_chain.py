@@ -17,7 +17,7 @@ from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
 from aerialdojo_gen.pipeline.freshness import Limits
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
-from aerialdojo_gen.pipeline.runner import chained
+from aerialdojo_gen.pipeline.runner import group_stages
 
 SCENES = ("U_Courtyard_0", "U_Courtyard_1")
 TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
@@ -29,10 +29,10 @@ def names(groups):
 
 def test_scenes_wait_for_one_another_before_the_release_and_before_recordings():
     own = ["build-scenes", "annotate-import", "anchor-sample", "reference-images", "pair-objects", "plan", "filter"]
-    assert names(chained(STAGES)) == [own, ["split"], ["render"]]
-    assert names(chained(STAGES[:6])) == [own[:6]]
+    assert names(group_stages(STAGES)) == [own, ["split"], ["render"]]
+    assert names(group_stages(STAGES[:6])) == [own[:6]]
     # Of the last stage alone a part may be wanted.
-    assert names(chained(STAGES[:6], alone=True)) == [own[:5], ["plan"]]
+    assert names(group_stages(STAGES[:6], alone=True)) == [own[:5], ["plan"]]
 
 
 @pytest.mark.pipeline
@@ -50,7 +50,9 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
         outcomes = list(pool.run(chores.compute_and_sign, chain))
     assert not chain.errors
     pids = {path.name: path.read_text() for path in notes.iterdir()}
-    assert len(pids) == len(outcomes) == chain.look().scenes * 2 + len([name for name in pids if " plan " in name])
+    assert (
+        len(pids) == len(outcomes) == chain.overview().scenes * 2 + len([name for name in pids if " plan " in name])
+    )
     assert len(set(pids.values())) == 2
     for scene in SCENES:
         # A part of `plan` may have been done by who had nothing else to do.

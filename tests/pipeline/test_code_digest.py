@@ -5,18 +5,23 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import aerialdojo_gen
+from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
 from aerialdojo_gen.benchmark.flying_code import flying_code
+from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import code_digest
-from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code, stage_module
+from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code
 from aerialdojo_gen.pipeline.code_facts import module_facts
 from aerialdojo_gen.pipeline.fingerprint import _values
+from aerialdojo_gen.pipeline.freshness import is_fresh
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
+from aerialdojo_gen.pipeline.stage import work_module
 
 NAMES = [stage.name for stage in STAGES]
 SOURCES = Path(aerialdojo_gen.__file__).parent
@@ -47,7 +52,7 @@ def copied(tmp_path_factory):
 
 def digests(folder):
     package = Package(folder)
-    return {name: package.of(stage_module(name)).digest for name in NAMES}
+    return {name: package.of(work_module(name)).digest for name in NAMES}
 
 
 def edited(path, old, new):
@@ -72,11 +77,10 @@ def test_a_copy_elsewhere_has_the_same_digests(copied):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_line_in_the_stages_own_module_makes_it_stale(copied, name):
     before = digests(copied)
-    path = copied / "pipeline" / "stages" / f"{name.replace('-', '_')}.py"
-    work = path.parent / "work" / path.name
+    path = copied / "pipeline" / "stages" / "work" / f"{name.replace('-', '_')}.py"
     run = re.search(r"^def run\(.*?\n    \"\"\"(.*?)\"\"\"\n", path.read_text(), re.DOTALL | re.MULTILINE)
     assert changed(before, edited(path, run[0], run[0] + "    raise RuntimeError\n")) == {name}
-    assert changed(before, edited(work, "\n\n", "\nNEW = 1\n\n")) == {name}
+    assert changed(before, edited(path, "\n\n", "\nNEW = 1\n\n")) == {name}
     # What is said: a comment, other blank lines, another docstring.
     assert edited(path, run[0], "\n\n" + run[0] + "    # A comment.\n\n") == before
     assert edited(path, run[1], "Something else.") == before
@@ -103,7 +107,6 @@ def test_a_constant_of_a_module_that_it_uses_makes_it_stale(copied, name):
 @pytest.mark.parametrize(
     "relative",
     [
-        "cli.py",
         "cli/stages.py",
         "pipeline/progress.py",
         "pipeline/runner.py",
@@ -117,27 +120,15 @@ def test_messages_and_plumbing_make_nothing_stale(copied, relative):
 
 
 def test_plumbing_is_what_it_is_said_to_be():
-    """Whoever lists a module here has thought about whether it decides what is written."""
-    assert set(PLUMBING) == {
-        f"aerialdojo_gen{name}"
-        for name in ("", ".benchmark", ".common", ".common.advice", ".common.disk", ".common.explain",
-                     ".common.names", ".common.secrets",
-                     ".common.terms", ".common.text_table", ".common.trouble", ".common.version", ".config",
-                     ".config.agreement", ".config.pipeline", ".config.sections", ".errors", ".learning", ".pipeline",
-                     ".pipeline.chain", ".pipeline.code_digest", ".pipeline.code_facts", ".pipeline.executors",
-                     ".pipeline.executors.base", ".pipeline.executors.carried", ".pipeline.executors.link",
-                     ".pipeline.executors.local", ".pipeline.executors.ray", ".pipeline.executors.ray_worker",
-                     ".pipeline.expectation", ".pipeline.fingerprint", ".pipeline.freshness", ".pipeline.interrupt",
-                     ".pipeline.progress", ".pipeline.registry", ".pipeline.runner", ".pipeline.stage",
-                     ".pipeline.summary", ".pipeline.task", ".stages",
-                     ".stages.work", ".store", ".store.atomic", ".store.bucket", ".store.cache",
-                     ".store.cloud_errors", ".store.files", ".store.footers",
-                     ".store.footer_cache", ".store.layout",
-                     ".store.lease", ".store.object_folders", ".store.object_root", ".store.object_state",
-                     ".store.parquet_files", ".store.root", ".store.schemas", ".store.schemas.benchmark",
-                     ".store.schemas.columns", ".store.schemas.release",
-                     ".store.schemas.staged", ".store.shards", ".store.staging")
+    """Modules that exist, of rooms that only move rows or serve the user; of few of them anything counts."""
+    assert {name.split(".")[1] for name in PLUMBING if "." in name} == {
+        "base", "benchmark", "learning", "pipeline", "store",
     }  # fmt: skip
+    assert not [
+        name
+        for name in PLUMBING
+        if name.startswith(("aerialdojo_gen.pipeline.scoring", "aerialdojo_gen.pipeline.stages.work."))
+    ]
     assert {name: counted for name, counted in PLUMBING.items() if counted} == {
         "aerialdojo_gen.base.constants": ("*",),
         "aerialdojo_gen.pipeline.stage": ("Job",),
@@ -165,22 +156,32 @@ def test_an_edit_of_a_table_counts_for_who_uses_it(copied):
     assert after == before, "evaluate's tables are no stage's"
 
 
-def test_a_declaration_counts_by_what_it_computes(copied):
-    """What a stage runs, its parts and its sources; not its help, nor what it settles or refuses."""
+def test_the_table_of_stages_and_its_hooks_count_by_what_they_return(copied):
+    """The number of shards and the source files are compared themselves; help, checks and choices shape no rows."""
     before = digests(copied)
-    plan, split = copied / "pipeline" / "stages" / "plan.py", copied / "pipeline" / "stages" / "split.py"
-    assert changed(before, edited(plan, "// config.targets_per_part", "// 2")) == {"plan"}
-    assert changed(
-        before, edited(copied / "pipeline" / "stages" / "build_scenes.py", "materials.toml", "other.toml")
-    ) == {"build-scenes"}
-    assert edited(plan, "Plan a collision-free", "Plan another") == before
-    assert edited(split, "config.paper_counts", "not config.paper_counts") == before
-    assert edited(copied / "rendering" / "settle.py", "say(choice.why)", "pass") == before
+    hooks = copied / "pipeline" / "stages" / "hooks.py"
+    assert edited(hooks, "// config.targets_per_part", "// 2") == before
+    assert edited(hooks, "config.paper_counts", "not config.paper_counts") == before
+    assert edited(copied / "pipeline" / "registry.py", "Plan a collision-free", "Plan another") == before
+    assert edited(copied / "rendering" / "resolve_config.py", "say(choice.why)", "pass") == before
+
+
+def test_another_number_of_shards_or_another_source_makes_a_scene_stale(project, smoke, tmp_path, monkeypatch):
+    config, roots = open_pipeline(load_pipeline(project / "pipelines" / "smoke.toml"), smoke)
+    plan, build = BY_NAME["plan"], BY_NAME["build-scenes"]
+    assert is_fresh(plan, config.section("plan"), "U_Courtyard_0", config, roots)
+    more = replace(plan, parts=lambda *given: plan.parts(*given) + 1)
+    assert not is_fresh(more, config.section("plan"), "U_Courtyard_0", config, roots)
+    other = tmp_path / "other.toml"
+    other.write_text("")
+    moved = replace(build, sources=lambda *given: [*build.sources(*given), other])
+    assert is_fresh(build, config.section("build-scenes"), "U_Courtyard_0", config, roots)
+    assert not is_fresh(moved, config.section("build-scenes"), "U_Courtyard_0", config, roots)
 
 
 def test_what_is_imported_by_a_name_made_at_run_time_counts():
     parts = stage_code("build-scenes").parts
-    for folder in ("layouts", "scenes/builders"):
+    for folder in ("scenes/layouts", "scenes/builders"):
         paths = [path for path in (SOURCES / folder).rglob("*.py") if path.stem != "__init__"]
         assert paths
         for path in paths:
@@ -253,7 +254,7 @@ def test_what_is_idle_is_not_imported(project, smoke, tmp_path):
             cwd=project, env=python, capture_output=True, text=True, check=True,
         )  # fmt: skip
         imported = {line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if "|" in line}
-        assert f"aerialdojo_gen.pipeline.stages.work.{stage.replace('-', '_')}" in imported
+        assert "aerialdojo_gen.pipeline.scoring.views" in imported
         assert len(idle) == 2
         assert not imported & set(idle)
 
@@ -294,7 +295,7 @@ def f():
 def test_an_import_that_cannot_be_told_is_a_defect(copied):
     path = copied / "pipeline" / "stages" / "work" / "filter.py"
     with pytest.raises(
-        RuntimeError, match=r"aerialdojo_gen\.stages\.work\.filter imports name: its source does not tell"
+        RuntimeError, match=r"aerialdojo_gen\.pipeline\.stages\.work\.filter imports name: its source does not tell"
     ):
         edited(path, "\n\n", "\nimport importlib\ndef f(name): importlib.import_module(name)\n\n")
 
@@ -305,7 +306,7 @@ def test_a_damaged_cache_is_none(copied, damage):
     before, raw = digests(copied), cache.read_bytes()
     cache.write_bytes(raw[:-1000] + b"f" + raw[-999:] if damage is None else damage)
     package = Package(copied)
-    assert package.of(stage_module("filter")).digest == before["filter"]
+    assert package.of(work_module("filter")).digest == before["filter"]
     cache.write_bytes(raw)
 
 

@@ -106,18 +106,18 @@ def test_expected_errors_are_results_and_defects_end_it(pool, tmp_path):
 
 def test_workers_tell_while_they_work_and_stop_when_they_are_asked(pool, tmp_path):
     heard = []
-    assert sum(pool.map(chores.talk, tasks(tmp_path, 4), talk=ParentChannel(heard.append, lambda: False))) == 12
+    assert sum(pool.map(chores.talk, tasks(tmp_path, 4), channel=ParentChannel(heard.append, lambda: False))) == 12
     assert sorted(heard) == [(n, k) for n in range(4) for k in range(3)]
     heard.clear()
     # They end by themselves once both have been heard.
-    talk = ParentChannel(heard.append, lambda: len(heard) == 2)
-    done = list(pool.map(chores.go_on_until_stopped, tasks(tmp_path, 2), talk=talk))
+    channel = ParentChannel(heard.append, lambda: len(heard) == 2)
+    done = list(pool.map(chores.go_on_until_stopped, tasks(tmp_path, 2), channel=channel))
     assert sorted(done) == sorted(heard) == [0, 1]
 
 
 def test_turns_are_given_out_over_all_processes(pool, tmp_path):
-    talk = ParentChannel(print, lambda: False)
-    waits = [wait_s for one in pool.map(chores.take_turns, tasks(tmp_path, 3), talk=talk) for wait_s in one]
+    channel = ParentChannel(print, lambda: False)
+    waits = [wait_s for one in pool.map(chores.take_turns, tasks(tmp_path, 3), channel=channel) for wait_s in one]
     # Six turns, a thousand seconds apart; how much of them is over when one is taken does not matter.
     assert sorted(round(w / 1000.0) for w in waits) == [0, 1, 2, 3, 4, 5]
 
@@ -137,7 +137,7 @@ def test_a_task_whose_process_was_lost_is_done_again_elsewhere(ray_pool, tmp_pat
 
 @pytest.mark.ray
 def test_a_task_that_loses_every_process_is_one_line(ray_pool, tmp_path):
-    with pytest.raises(AerialDojoError, match="chore 1: the process that worked at it was lost 4 times") as raised:
+    with pytest.raises(AerialDojoError, match="chore 1: its process was lost 4 times") as raised:
         list(ray_pool.map(chores.die_once, tasks(tmp_path, 2, {1: "always"})))
     assert "\n" not in str(raised.value)
 
@@ -161,16 +161,16 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from support import chores, preload
-from aerialdojo_gen.pipeline.executors import Talk, make_executor
+from aerialdojo_gen.pipeline.executors import ParentChannel, make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 
 def main(executor, work, folder):
     reporter = Reporter()
     tasks = [chores.Chore(k, "", Path(folder)) for k in range(4)]
-    talk = Talk(lambda _: None, lambda: False) if work == "talk" else None
+    channel = ParentChannel(lambda _: None, lambda: False) if work == "talk" else None
     with Interrupts() as interrupts, make_executor(executor, 2) as pool, reporter.bar("chores", len(tasks)) as bar:
-        for _ in pool.map(getattr(chores, work), tasks, talk=talk):
+        for _ in pool.map(getattr(chores, work), tasks, channel=channel):
             interrupts.check()
             bar.advance()
     reporter.line("all done")
@@ -257,7 +257,7 @@ def test_processes_work_where_no_semaphore_can_be_made(tmp_path):
 def test_what_cannot_be_is_said_in_one_line(monkeypatch):
     with pytest.raises(UsageError, match="unknown executor 'slurm'; executors: local, ray"):
         make_executor("slurm")
-    with pytest.raises(UsageError, match="--address is of --executor ray"):
+    with pytest.raises(UsageError, match="--address needs --executor ray"):
         make_executor("local", address="127.0.0.1:6379")
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "ray", None)

@@ -97,7 +97,16 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
     places = found.positions_m[which] + np.where(which[:, None] % 4, [0.3, -0.2, 0.1], 0.0)
     moved = found.moved(which, places, RADIUS, CONFIG)
     anew = Candidates.of(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
-    for name in ("positions_m", "yaw_rad", "elevation_deg", "clearance_m", "seen", "told", "off_front_rad", "rank"):
+    for name in (
+        "positions_m",
+        "yaw_rad",
+        "elevation_deg",
+        "clearance_m",
+        "seen",
+        "part_visibility",
+        "off_front_rad",
+        "rank",
+    ):
         np.testing.assert_array_equal(getattr(moved, name), getattr(anew, name), err_msg=name)
     for name in ("visible_fraction", "framed", "shown", "box_fraction", "off_centre"):
         np.testing.assert_array_equal(getattr(moved.views, name), getattr(anew.views, name), err_msg=name)

@@ -1,4 +1,4 @@
-"""A new stage touches its module, its schema and the registry, and nothing else: CONTRIBUTING's example, run."""
+"""A new stage is a module, a schema and a row of the registry, and nothing else: CONTRIBUTING's example, run."""
 
 import os
 import re
@@ -18,7 +18,7 @@ CHECKOUT = next(folder for folder in Path(__file__).parents if (folder / "pyproj
 SCENE = "U_Courtyard_0"
 
 # The example of CONTRIBUTING, as it stands there.
-MODULE, SCHEMA = re.findall(r"```python\n(.*?)```", (CHECKOUT / "CONTRIBUTING.md").read_text(), re.DOTALL)[:2]
+MODULE, SCHEMA, ROW = re.findall(r"```python\n(.*?)```", (CHECKOUT / "CONTRIBUTING.md").read_text(), re.DOTALL)[:3]
 
 
 @pytest.fixture
@@ -32,11 +32,10 @@ def checkout(tmp_path):
     for folder in ("scene_assets", "annotations", "pipelines"):
         (tmp_path / folder).symlink_to(CHECKOUT / folder)
     package = tmp_path / "aerialdojo_gen"
-    (package / "pipeline" / "stages" / "tally.py").write_text(MODULE)
+    (package / "pipeline" / "stages" / "work" / "tally.py").write_text(MODULE)
     replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{SCHEMA}\n\nSTAGED = (")
     replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
-    replaced(package / "pipeline" / "registry.py", "    split,\n)", "    split,\n    tally,\n)")
-    replaced(package / "pipeline" / "registry.py", "    render.STAGE,\n", "    render.STAGE,\n    tally.STAGE,\n")
+    replaced(package / "pipeline" / "registry.py", "\n)\n\nBY_NAME", f"\n    {ROW.strip()},\n)\n\nBY_NAME")
     return tmp_path
 
 
@@ -54,7 +53,7 @@ def call(checkout, *args):
     return done.stdout + done.stderr
 
 
-def test_a_new_stage_is_a_module_a_table_and_a_line(checkout):
+def test_a_new_stage_is_a_module_a_schema_and_a_row(checkout):
     assert "Count a scene's things by category." in call(checkout, "--help")
     tally = ("tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml")
     assert "1 of 1 shards computed" in call(checkout, *tally)
@@ -63,8 +62,9 @@ def test_a_new_stage_is_a_module_a_table_and_a_line(checkout):
     assert sum(row["things"] for row in rows) == scenes[0]["n_instances"]
     assert len(rows) == scenes[0]["n_categories"] == len(Counter(row["category"] for row in rows))
     # It follows its own code: a word that is shown makes nothing stale, a line that is run does.
-    module = checkout / "aerialdojo_gen" / "pipeline" / "stages" / "tally.py"
-    replaced(module, "Count a scene's things", "Count things")
+    module = checkout / "aerialdojo_gen" / "pipeline" / "stages" / "work" / "tally.py"
+    replaced(checkout / "aerialdojo_gen" / "pipeline" / "registry.py", "Count a scene's things", "Count things")
+    replaced(module, "Count the instances", "Count all instances")
     assert "tally" in (said := call(checkout, *tally))
     assert "shards computed" not in said
     replaced(module, '"things": n}', '"things": n + 1}')

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen.base.config.sections import FilterConfig, ReleasedPlanConfig
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
-from aerialdojo_gen.pipeline.stages.work.quota import difficulty_steps, select_quota
+from aerialdojo_gen.pipeline.stages.work.quota import difficulty_level, select_quota
 from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.planning.planner import Route
 
@@ -25,21 +25,21 @@ def scene(seed: int, n: int) -> tuple[Candidates, np.ndarray, np.ndarray]:
     predicted[rng.random(n) < 0.05] = np.inf
     outcome = np.where(rng.random(n) < 0.03, "BUDGET_EXHAUSTED", "SOLVED")
     euclidean = free * rng.uniform(0.75, 0.93, n)
-    lots = [f"U_Test_0-{k:012x}" for k in rng.permutation(n)]
+    keys = [f"U_Test_0-{k:012x}" for k in rng.permutation(n)]
     visible = np.where(rng.random(n) < 0.4, 0.0, rng.random(n))
-    return Candidates("U_Test_0", lots, euclidean, free, visible, predicted), outcome, length
+    return Candidates("U_Test_0", keys, euclidean, free, visible, predicted), outcome, length
 
 
 def searched(draw: CandidatePolicy, outcome: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Search in rounds as `plan` does; which candidates were."""
     found: list[Route | None] = [None] * len(length)
-    rows = draw.first()
+    rows = draw.initial_batch()
     while len(rows):
         for k in rows.tolist():
             assert found[k] is None, "searched twice"
             solved = outcome[k] == "SOLVED"
             found[k] = Route(outcome[k], length_m=float(length[k]) if solved else 0.0)
-        rows = draw.more(found)
+        rows = draw.next_batch(found)
     return np.array([route is not None for route in found])
 
 
@@ -54,10 +54,10 @@ def kept(c: Candidates, outcome: np.ndarray, length: np.ndarray) -> tuple[np.nda
 def released(
     c: Candidates, rows: np.ndarray, setting: np.ndarray, length: np.ndarray, paper: PaperScene
 ) -> np.ndarray:
-    steps = difficulty_steps(length[rows] / c.free_length_m[rows], c.visible[rows])
+    levels = difficulty_level(length[rows] / c.free_length_m[rows], c.visible[rows])
     mask = select_quota(
-        [c.lots[k] for k in rows], setting[rows].tolist(), length[rows], paper.tasks, paper.path_m, 200, steps,
-        PREFERENCE,
+        [c.sampling_keys[k] for k in rows], setting[rows].tolist(), length[rows], paper.tasks, paper.path_m, 200,
+        levels, PREFERENCE,
     )  # fmt: skip
     return rows[mask]
 
@@ -78,7 +78,7 @@ def test_what_is_searched_holds_the_papers_numbers_and_metres(seed, margin, long
     assert np.count_nonzero(which) < 0.5 * np.isfinite(c.predicted_m).sum()
     # As hard as what all candidates would have given: no more than one task in eight is another kind.
     best = released(c, np.flatnonzero(keep & np.isfinite(c.predicted_m)), setting, length, paper)
-    hard, hardest = (difficulty_steps(length[k] / c.free_length_m[k], c.visible[k]).mean() for k in (rows, best))
+    hard, hardest = (difficulty_level(length[k] / c.free_length_m[k], c.visible[k]).mean() for k in (rows, best))
     assert hard > hardest - 1 / 8
 
 
@@ -99,7 +99,7 @@ def test_rows_in_another_order_are_searched_all_the_same():
     which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
     order = np.random.default_rng(0).permutation(800)
     mixed = Candidates(
-        c.scene, [c.lots[k] for k in order], c.euclidean_m[order], c.free_length_m[order], c.visible[order],
+        c.scene, [c.sampling_keys[k] for k in order], c.euclidean_m[order], c.free_length_m[order], c.visible[order],
         c.predicted_m[order],
     )  # fmt: skip
     assert (
@@ -111,9 +111,9 @@ def test_rows_in_another_order_are_searched_all_the_same():
 def test_a_few_more_are_kept_than_are_released():
     """`filter` may still refuse some: two more a setting, or one in fifty."""
     n = 200
-    lots = [f"U_Test_0-{k:012x}" for k in range(n)]
+    keys = [f"U_Test_0-{k:012x}" for k in range(n)]
     length = np.full(n, 20.0)
-    c = Candidates("U_Test_0", lots, length / 1.2, length / 1.1, np.zeros(n), length)
+    c = Candidates("U_Test_0", keys, length / 1.2, length / 1.1, np.zeros(n), length)
     for wanted, spare in ((40, 2), (150, 3)):
         paper = PaperScene("U_Test_0", 1, 20, wanted, 0, 0, wanted * 20.0)
         config = ReleasedPlanConfig(

@@ -194,5 +194,5 @@ def test_what_travels_is_the_same_bytes_and_comes_to_its_place(tmp_path, project
 def test_what_is_too_large_to_travel_is_one_line(tmp_path):
     with (tmp_path / "large.glb").open("wb") as file:
         file.truncate(bundled.MAX_BYTES + 1)
-    with pytest.raises(UsageError, match=r"have 2\d\d MB: no more than 200 MB are carried"):
+    with pytest.raises(UsageError, match=r"have 2\d\d MB: no more than 200 MB are sent"):
         bundled.pack(tmp_path.parent / "never.zip", [tmp_path])

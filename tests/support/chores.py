@@ -89,7 +89,7 @@ def talk(chore, link):
     for k in range(3):
         if link.stopped():
             break
-        link.tell((chore.number, k))
+        link.send((chore.number, k))
         told += 1
     return told
 
@@ -108,7 +108,7 @@ class Steps(TaskQueue):
     def alone(self):
         return False
 
-    def finished(self, task, _outcome):
+    def on_done(self, task, _outcome):
         self.order.append((task.scene, task.number))
         self._left[task.scene] -= 1
         if not self._left[task.scene] and task.number + 1 < self._steps:
@@ -123,7 +123,7 @@ class Steps(TaskQueue):
 
 
 def go_on_until_stopped(chore, link):
-    link.tell(chore.number)
+    link.send(chore.number)
     until(link.stopped)
     return chore.number
 

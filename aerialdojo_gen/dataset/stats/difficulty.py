@@ -46,7 +46,7 @@ class Tasks:
         return len(self.scene)
 
     @property
-    def told(self) -> bool:
+    def has_columns(self) -> bool:
         """Whether the release says how hard its tasks are: one of an older version does not."""
         return bool(np.isfinite(self.plan_detour).any())
 
@@ -191,7 +191,7 @@ def held_out_table(tasks: Tasks) -> Comparison:
 
 def difficulty_tables(tasks: Tasks) -> list[Comparison]:
     """Make all tables of difficulty and of splits; none of a release that does not tell them."""
-    if not tasks.told:
+    if not tasks.has_columns:
         return []
     made = [setting_table(tasks), scene_table(tasks)]
     if (tasks.target_split != "").any():

@@ -126,12 +126,12 @@ def goal_table(goals: Goals) -> Comparison:
     )  # fmt: skip
 
     def figures(own: NDArray[np.bool_]) -> tuple[Figure, ...]:
-        off, told = goals.off_front_rad[own], goals.tells_shown[own]
+        off, parts_shown = goals.off_front_rad[own], goals.tells_shown[own]
         return (
             int(own.sum()),
             int(np.isfinite(off).sum()),
             _share(off <= FRONT_RAD, np.isfinite(off)),
-            _share(told == 1.0, np.isfinite(told)),
+            _share(parts_shown == 1.0, np.isfinite(parts_shown)),
             _mean(goals.unoccluded[own]),
             _mean(goals.framed[own]),
             quantile(goals.step_back_m[own], 0.5),

@@ -121,8 +121,8 @@ def family_table(made: Sequence[Made]) -> Comparison:
         # The paper counts these by family: of a part of a family's scenes it says nothing.
         named = [f for n, f in family_counts().items() if name in (n, "all")]
         whole = bool(named) and known == sum(int(f["scenes"]) for f in named)
-        told = [sum(int(f[column]) for f in named) if whole else None for column in ("types", "anchors")]
-        theirs = (told[0], known, *paper[:2], told[1], *paper[2:])
+        totals = [sum(int(f[column]) for f in named) if whole else None for column in ("types", "anchors")]
+        theirs = (totals[0], known, *paper[:2], totals[1], *paper[2:])
         rows.append(Row(name, (types, len(group), *ours[:2], anchors, *ours[2:]), theirs))
     columns = (Column("types"), Column("scenes"), *_COUNTS[:2], Column("anchors"), *_COUNTS[2:], _KM)
     title = "Families (the paper's Table 2)" if any(m.paper for m in made) else "Families"

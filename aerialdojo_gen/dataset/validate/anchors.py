@@ -33,10 +33,10 @@ def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     for object_id in np.unique(ids):
         own = np.flatnonzero(ids == object_id)
         own = own[np.argsort(ranks[own], kind="stable")]
-        for wanted, row in enumerate(own.tolist()):
-            before = own[wanted - 1] if wanted else row
-            if ranks[row] != wanted:
-                yield Finding(row, f"rank {ranks[row]}", f"rank {wanted}")
+        for expected, row in enumerate(own.tolist()):
+            before = own[expected - 1] if expected else row
+            if ranks[row] != expected:
+                yield Finding(row, f"rank {ranks[row]}", f"rank {expected}")
                 break
             if score[row] > score[before] and not by_hand[before]:
                 yield Finding(row, f"score {score[row]:.6g}", f"{score[before]:.6g} at most, the rank before")
@@ -74,7 +74,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
         uncalled = sorted(name for name in own if not asked[name] and not by_hand[row])
         total = sum(asked[name] for name in own)
-        wanted = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
+        expected = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
         if uncalled:
             yield Finding(row, f"score_{uncalled[0]} = {own[uncalled[0]]:.6g}", "null: the scorer was not asked")
         elif "geometric" in own and abs(own["geometric"] - geometric[row]) > _SAME_SCORE:
@@ -82,8 +82,8 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
         elif not by_hand[row] and asked["geometric"] and "geometric" not in own:
             yield Finding(row, "score_geometric is null", f"{geometric[row]:.6g} by its parts")
         # What a person placed was compared with nothing: it has the geometric score alone.
-        elif min(abs(score - s) for s in (wanted, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
-            yield Finding(row, f"score = {score:.6g}", f"{wanted:.6g} by its parts")
+        elif min(abs(score - s) for s in (expected, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
+            yield Finding(row, f"score = {score:.6g}", f"{expected:.6g} by its parts")
 
 
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
@@ -105,8 +105,8 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if np.isnan(found) != np.isnan(off[row]) or abs(found - off[row]) > _SAME_RAD:
             yield Finding(row, f"off_front_rad = {off[row]:.6g}", f"{found:.6g}")
         elif bool(reasons[row]) != bool(selected[row] and found > FRONT_RAD):
-            wanted = "a reason: it is not seen from its front" if not reasons[row] else "null"
-            yield Finding(row, f"no_front_reason = {reasons[row]!r}", wanted)
+            expected = "a reason: it is not seen from its front" if not reasons[row] else "null"
+            yield Finding(row, f"no_front_reason = {reasons[row]!r}", expected)
 
 
 @check("anchors", needs=("objects",), after=("unknown_object",))
@@ -116,17 +116,17 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
     item = data["objects"].find("object_id", rows.column("object_id"))
     selected, stored = rows.floats("selected") == 1.0, data["objects"].floats("step_back_m")
     for row, k in enumerate(item.tolist()):
-        wanted = min(back[row], data.pipeline.reference_images.step_back_m)
+        expected = min(back[row], data.pipeline.reference_images.step_back_m)
         if not 0.0 <= back[row] <= most or abs(back[row] * 100.0 - round(back[row] * 100.0)) > _SAME_M:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"0 to {most:g}, in centimetres")
-        elif k >= 0 and selected[row] and np.isfinite(stored[k]) and abs(stored[k] - wanted) > _SAME_SCORE:
+        elif k >= 0 and selected[row] and np.isfinite(stored[k]) and abs(stored[k] - expected) > _SAME_SCORE:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"{stored[k]:g}, as far as its picture was taken")
 
 
 @check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
-    scene, objects, wanted = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
+    scene, objects, expected = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
     item = objects.find("object_id", rows.column("object_id"))
     place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
     centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
@@ -137,8 +137,8 @@ def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
         distance = Surface.of(scene[str(nodes[k])]).distance_m(place[own])
         off = np.abs(wrap_angle_rad(yaw[own] - yaw_towards(place[own], centre[k])))
         for n, row in enumerate(own.tolist()):
-            if abs(distance[n] - wanted) > _STANDOFF_M:
-                yield Finding(row, f"{distance[n]:.4f} m from the object's surface", f"{wanted:g} m")
+            if abs(distance[n] - expected) > _STANDOFF_M:
+                yield Finding(row, f"{distance[n]:.4f} m from the object's surface", f"{expected:g} m")
             elif off[n] > _SAME_RAD:
                 yield Finding(row, f"yaw_rad = {yaw[row]:.6g}", "the yaw that faces the object's centre")
             elif number[row] != n:
@@ -177,7 +177,7 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     scene = scene_mesh(data).scene
     by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
     slack = np.where(by_hand, SLACK_M + _SAME_M, _STANDOFF_M)
-    wanted = data.pipeline.anchor_sample.standoff_m
+    expected = data.pipeline.anchor_sample.standoff_m
     nodes = data["objects"].texts("mesh_node")
     item = data["objects"].find("object_id", rows.column("object_id"))
     place, stored = rows.floats("x_m", "y_m", "z_m"), rows.floats("surface_distance_m")
@@ -187,8 +187,8 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
         own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
         found = Surface.of(scene[str(nodes[k])]).distance_m(place[own]) if len(own) else np.empty(0)
         for row, distance in zip(own.tolist(), found.tolist(), strict=True):
-            if abs(distance - wanted) > slack[row]:
-                yield Finding(row, f"{distance:.4f} m from the object's surface", f"{wanted:g} m")
+            if abs(distance - expected) > slack[row]:
+                yield Finding(row, f"{distance:.4f} m from the object's surface", f"{expected:g} m")
             elif abs(distance - stored[row]) > _SAME_M:
                 yield Finding(row, f"surface_distance_m = {stored[row]:.6g}", f"{distance:.6g}")
 

@@ -58,8 +58,8 @@ def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     route = np.searchsorted(paths.first, pose[buried], side="right") - 1
     for k, first in zip(*np.unique(route, return_index=True), strict=True):
         at = int(np.flatnonzero(buried)[first])
-        told = f"below ground at {_place(points[at])}, after pose {pose[at] - paths.first[k]}"
-        yield Finding(int(paths.rows[k]), f"{told}, {int((route == k).sum())} samples of the way", "above ground")
+        position = f"below ground at {_place(points[at])}, after pose {pose[at] - paths.first[k]}"
+        yield Finding(int(paths.rows[k]), f"{position}, {int((route == k).sum())} samples of the way", "above ground")
 
 
 def _buried(data: SceneData, places: Floats) -> Iterator[Finding]:

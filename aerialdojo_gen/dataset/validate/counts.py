@@ -64,13 +64,13 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
 
     trains = train_quotas(data.scene, inventory(), splits())
     side = store.partition(data.scene)
-    wanted = {"landmarks": paper.landmarks, "objects": paper.objects}
+    expected = {"landmarks": paper.landmarks, "objects": paper.objects}
     found = {"landmarks": len(data["landmarks"]), "objects": len(data["objects"])}
     for setting in SETTINGS:
         for subset, n in (("train", trains[setting]), ("test", paper.tasks[setting] - trains[setting])):
-            wanted[f"{subset} {setting} tasks"] = n
+            expected[f"{subset} {setting} tasks"] = n
             found[f"{subset} {setting} tasks"] = tally.routes[f"{side}_{subset}", setting]
-    for name, n in wanted.items():
+    for name, n in expected.items():
         outcome.rows += 1
         if found[name] != n:
             outcome.faults.append(Fault("scene_counts", data.scene, "", "", name, f"{found[name]:,}", f"{n:,}"))
@@ -81,7 +81,7 @@ def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline,
     """Check what only all scenes together can tell."""
     outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
-        partial = "" if every_scene else "only some scenes were asked for"
+        partial = "" if every_scene else "only some scenes were selected"
         if not partial and not all(tally.complete for tally in tallies):
             partial = "a scene cannot be read"
         outcome.skipped = partial or judge(outcome, release, tallies, pipeline)
@@ -114,11 +114,11 @@ def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipel
 def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
     if why := _not_the_papers(tallies, pipeline):
         return why
-    found, wanted = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
+    found, expected = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
     outcome.rows = 1
-    if abs(found - wanted) > _PATH_SHARE * wanted:
-        told = f"{found / 1000:,.1f} km", f"{wanted / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
-        outcome.faults.append(Fault("path_total", "", "routes", "", "", *told))
+    if abs(found - expected) > _PATH_SHARE * expected:
+        stated = f"{found / 1000:,.1f} km", f"{expected / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
+        outcome.faults.append(Fault("path_total", "", "routes", "", "", *stated))
     return ""
 
 
@@ -128,16 +128,16 @@ def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipelin
         outcome.rows = 1
         outcome.faults.append(Fault("card_counts", "", "", "README.md", "", "no file", "the dataset card"))
         return ""
-    told = _of_card(card)
+    stated = _of_card(card)
     machine = _text(release, "croissant.json")
     if machine is not None:
         try:
-            told += _of_croissant(machine)
+            stated += _of_croissant(machine)
         except (ValueError, KeyError, TypeError):
             outcome.faults.append(
                 Fault("card_counts", "", "", "croissant.json", "", "no record sets", "a Croissant description")
             )
-    for file, table, folder, n in told:
+    for file, table, folder, n in stated:
         outcome.rows += 1
         if table == "tasks":
             found = sum(tally.tasks[folder] for tally in tallies)
@@ -179,8 +179,8 @@ def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipe
         for image_id in tally.images:
             outcome.rows += 1
             if first.setdefault(image_id, tally.scene) != tally.scene:
-                told = f"reference_image_id={image_id}", f"of {first[image_id]} too", "one scene"
-                outcome.faults.append(Fault("image_id_shared", tally.scene, "objects", "", *told))
+                stated = f"reference_image_id={image_id}", f"of {first[image_id]} too", "one scene"
+                outcome.faults.append(Fault("image_id_shared", tally.scene, "objects", "", *stated))
     return ""
 
 

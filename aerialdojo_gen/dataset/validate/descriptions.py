@@ -196,7 +196,7 @@ def _unborne(words: _Words, i: int, text: str) -> str:
 
 def _recoloured(instance: Instance, text: str) -> str:
     """Say which of a thing's attributes with a colour in it stands in a text with another colour alone."""
-    said = " ".join(_split(text))
+    normalized = " ".join(_split(text))
     for key, value in instance.attributes.items():
         words = _split(value)
         # Said of a part that the attribute is called after: a green poster, yellow flowers.
@@ -206,7 +206,7 @@ def _recoloured(instance: Instance, text: str) -> str:
             if word not in _COLOURS or {*rest} <= {*_COLOURS, "and"}:
                 continue
             phrase = " ".join([*words[:k], _ANY_COLOUR, *words[k + 1 :]]).removeprefix("a ")
-            found = re.findall(rf"\b{phrase}\b", said)
+            found = re.findall(rf"\b{phrase}\b", normalized)
             if found and word not in found:
                 return f"{found[0]!r} stands where {value!r} has {word!r}"
     return ""

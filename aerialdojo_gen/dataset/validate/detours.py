@@ -139,11 +139,11 @@ def _pieces(positions: Floats) -> list[tuple[int, int, float, float]]:
     straight = np.hypot(offset[..., 0], offset[..., 1]) + np.abs(offset[..., 2])
     flown = along[None] - along[:, None]
     saved = flown - straight
-    worth = ((saved >= _SAVED_M) & (saved >= _SAVED_SHARE * flown)) | (saved >= _SAVED_ANYWAY_M)
+    saving = ((saved >= _SAVED_M) & (saved >= _SAVED_SHARE * flown)) | (saved >= _SAVED_ANYWAY_M)
     found, end = [], len(positions)
     # From the last start backwards: a piece that holds a shorter one is not looked at.
     for first in range(len(positions) - 2, -1, -1):
-        ends = np.flatnonzero(worth[first, first + 1 : end])
+        ends = np.flatnonzero(saving[first, first + 1 : end])
         if len(ends):
             end = first + 1 + int(ends[0])
             found.append((first, end, float(flown[first, end]), float(straight[first, end])))

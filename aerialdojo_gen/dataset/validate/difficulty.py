@@ -49,7 +49,7 @@ def _known(rows: Rows, name: str) -> Mask:
 
 
 @check("routes", after=_OF_ROUTE)
-def difficulty_known(data: SceneData, rows: Rows) -> Iterator[Finding]:
+def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every route says how hard it is, unless an older version wrote the release and none does."""
     names = [name for name in DIFFICULTY_COLUMNS if name != "visible_view_at_start"]
     known = np.column_stack([_known(rows, name) for name in names])
@@ -65,8 +65,8 @@ def free_length(data: SceneData, rows: Rows) -> Iterator[Finding]:
     bearing = np.arctan2(way[:, 1], way[:, 0]) - paths.starts[:, 3]
     turn = math.pi / 12
     # Two headings enclose the way: flown in turn, they add up to so much.
-    beside = np.mod(bearing, turn)
-    level = np.hypot(way[:, 0], way[:, 1]) * (np.sin(beside) + np.sin(turn - beside)) / math.sin(turn)
+    offset = np.mod(bearing, turn)
+    level = np.hypot(way[:, 0], way[:, 1]) * (np.sin(offset) + np.sin(turn - offset)) / math.sin(turn)
     most = level + np.abs(way[:, 2])
     least = np.maximum(paths.euclidean_m, most - _SAVED_BY_APPROACH * data.pipeline.plan.max_approach_m)
     for k in np.flatnonzero((stored < least - _LENGTH_M) | (stored > np.minimum(most, paths.length_m) + _LENGTH_M)):
@@ -92,10 +92,10 @@ def climb(data: SceneData, rows: Rows) -> Iterator[Finding]:
         yield from _unlike(data, rows, "climb_m", np.add.reduceat(up, paths.first[:-1]))
 
 
-def _unlike(data: SceneData, rows: Rows, name: str, wanted: Floats) -> Iterator[Finding]:
+def _unlike(data: SceneData, rows: Rows, name: str, expected: Floats) -> Iterator[Finding]:
     stored = rows.floats(name)[data.paths.rows]
-    for k in np.flatnonzero(np.abs(stored - wanted) > _LENGTH_M):
-        yield Finding(int(data.paths.rows[k]), f"{name} = {stored[k]:.9g}", f"{wanted[k]:.9g}")
+    for k in np.flatnonzero(np.abs(stored - expected) > _LENGTH_M):
+        yield Finding(int(data.paths.rows[k]), f"{name} = {stored[k]:.9g}", f"{expected[k]:.9g}")
 
 
 @check("routes", after=(*_OF_ROUTE, "difficulty_told"))
@@ -116,22 +116,22 @@ def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
         off = float(np.linalg.norm(replay(paths.starts[k], flown)[-1, :3] - paths.ends[k, :3]))
         budget = budgets.get(str(settings[row]), len(flown))
         if off > most_m or len(flown) > budget:
-            told = f"Stop at {off:.3f} m from the goal after {len(flown)} actions"
-            yield Finding(row, told, f"{most_m:.3g} m and {budget} actions at most")
+            landed = f"Stop at {off:.3f} m from the goal after {len(flown)} actions"
+            yield Finding(row, landed, f"{most_m:.3g} m and {budget} actions at most")
 
 
 @check("routes", needs=("mesh",), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
 def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
-    paths, told = data.paths, rows.floats("straight_line_free")
+    paths, stored = data.paths, rows.floats("straight_line_free")
     skip = data.flagged("routes", _OF_ROUTE)
     for k in data.sampled.tolist():
         row = int(paths.rows[k])
-        if skip[row] or not np.isfinite(told[row]):
+        if skip[row] or not np.isfinite(stored[row]):
             continue
         start, goal = paths.starts[k, :3], paths.ends[k, :3]
-        free = bool(told[row])
+        free = bool(stored[row])
         if free == world.segment_in_collision(start, goal, radius + (-_THICKNESS_M if free else _THICKNESS_M)):
             yield Finding(row, f"straight_line_free = {free}", str(not free))
 
@@ -142,8 +142,8 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     mesh, paths, n = scene_mesh(data), data.paths, data.pipeline.pair_objects.surface_points
     things = {item.node: item for item in mesh.scene.instances}
     nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
-    told, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
-    skip = data.flagged("routes", _OF_ROUTE) | ~np.isfinite(told)
+    stored, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
+    skip = data.flagged("routes", _OF_ROUTE) | ~np.isfinite(stored)
     of_target: dict[int, list[int]] = {}
     for k in data.sampled.tolist():
         if not skip[paths.rows[k]]:
@@ -168,12 +168,12 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
             row = int(paths.rows[k])
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
             whole = max(int(bare.sum()), 1)
-            counted = told[row] * np.arange(max(whole - _EITHER_WAY, 1), whole + _EITHER_WAY + 1)
-            if abs(share - told[row]) > 2.5 / whole or np.abs(counted - np.rint(counted)).min() > _WHOLE:
-                yield Finding(row, f"target_visible_at_start = {told[row]:.3f}", f"{share:.3f}")
-            elif (views[row] is None) != (told[row] == 0.0) or (share and told[row] and views[row] not in best):
-                wanted = " or ".join(sorted(best)) if share else _UNSEEN
-                yield Finding(row, f"visible_view_at_start = {views[row]}", wanted)
+            counted = stored[row] * np.arange(max(whole - _EITHER_WAY, 1), whole + _EITHER_WAY + 1)
+            if abs(share - stored[row]) > 2.5 / whole or np.abs(counted - np.rint(counted)).min() > _WHOLE:
+                yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
+            elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
+                expected = " or ".join(sorted(best)) if share else _UNSEEN
+                yield Finding(row, f"visible_view_at_start = {views[row]}", expected)
 
 
 def _in_picture(camera: Camera, pose: Floats, points: Floats) -> Mask:
@@ -190,10 +190,10 @@ def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
     poses = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
     for name, own in (("target_seen_in_train", target), ("start_seen_in_train", [tuple(pose) for pose in poses])):
         seen = {key for key, trains in zip(own, train, strict=True) if trains}
-        told = rows.floats(name)
-        wanted = np.fromiter((key in seen for key in own), dtype=np.float64, count=len(own))
-        for row in np.flatnonzero(np.isfinite(told) & (told != wanted)):
-            yield Finding(int(row), f"{name} = {bool(told[row])}", str(bool(wanted[row])))
+        stored = rows.floats(name)
+        expected = np.fromiter((key in seen for key in own), dtype=np.float64, count=len(own))
+        for row in np.flatnonzero(np.isfinite(stored) & (stored != expected)):
+            yield Finding(int(row), f"{name} = {bool(stored[row])}", str(bool(expected[row])))
 
 
 @check("tasks", needs=("routes", "objects"), after=_OF_TASK)
@@ -203,20 +203,21 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     ids = data["objects"].ints("object_id").tolist()
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
     out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
-    told = _all_known(rows, *SPLIT_COLUMNS)
-    split, said = rows.texts("target_split"), {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
-    ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in said}
+    complete = _all_known(rows, *SPLIT_COLUMNS)
+    split = rows.texts("target_split")
+    is_held_out = {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
+    ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in is_held_out}
     known: dict[int, bool] = {}
-    for row in np.flatnonzero(told).tolist():
-        side = "test" if said["target"][row] or said["start"][row] else "train"
+    for row in np.flatnonzero(complete).tolist():
+        side = "test" if is_held_out["target"][row] or is_held_out["start"][row] else "train"
         if split[row] != side:
             yield Finding(row, f"target_split = {split[row]}", side)
             continue
         for end, own in ends.items():
             # Without the salt an object is what the first task says it is.
-            wanted = own[row] in out if out is not None else known.setdefault(own[row], bool(said[end][row]))
-            if bool(said[end][row]) != wanted:
-                yield Finding(row, f"{end}_held_out = {bool(said[end][row])}", str(wanted))
+            expected = own[row] in out if out is not None else known.setdefault(own[row], bool(is_held_out[end][row]))
+            if bool(is_held_out[end][row]) != expected:
+                yield Finding(row, f"{end}_held_out = {bool(is_held_out[end][row])}", str(expected))
                 break
 
 
@@ -229,7 +230,7 @@ def _has_salt(data: SceneData, key: bytes) -> bool:
 
 
 @check("tasks")
-def splits_known(_data: SceneData, rows: Rows) -> Iterator[Finding]:
+def splits_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
     known = np.column_stack([_known(rows, name) for name in SPLIT_COLUMNS])
     if not known.any():

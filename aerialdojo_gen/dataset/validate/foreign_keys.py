@@ -61,10 +61,15 @@ def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
     own = landmarks.find("landmark_id", rows.column("landmark_id"))
     centres = np.vstack([landmarks.floats("x_m", "y_m").reshape(-1, 2), np.full((1, 2), np.nan)])
     away = rows.floats("x_m", "y_m") - centres[own]
-    for row, said in enumerate(rows.texts("direction")):
+    for row, stated in enumerate(rows.texts("direction")):
         dx, dy = away[row].tolist()
-        if own[row] >= 0 and math.isfinite(dx + dy) and (dx or dy) and (is_so := compass_direction(dx, dy)) != said:
-            yield Finding(row, str(said), is_so)
+        if (
+            own[row] >= 0
+            and math.isfinite(dx + dy)
+            and (dx or dy)
+            and (actual := compass_direction(dx, dy)) != stated
+        ):
+            yield Finding(row, str(stated), actual)
 
 
 @check("anchors", needs=("objects",))
@@ -156,9 +161,9 @@ def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
     if len(scenes) != 1 or data.flagged("scenes", ALWAYS_AFTER).any():
         raise UncheckedError("the scene's row is at fault")
     for name in ("family", "scene_type", "partition"):
-        wanted = scenes.texts(name)[0]
-        for row in np.flatnonzero(np.asarray(rows.texts(name), dtype=object) != wanted):
-            yield Finding(int(row), f"{name} = {rows.texts(name)[row]!r}", repr(wanted))
+        expected = scenes.texts(name)[0]
+        for row in np.flatnonzero(np.asarray(rows.texts(name), dtype=object) != expected):
+            yield Finding(int(row), f"{name} = {rows.texts(name)[row]!r}", repr(expected))
 
 
 @check("tasks", needs=("routes",))
@@ -175,9 +180,9 @@ def task_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def task_budget(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's action budget is that of its setting."""
     budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
-    wanted = np.array([budgets.get(str(s), -1) for s in rows.texts("setting")])
-    for row in np.flatnonzero(rows.ints("action_budget") != wanted):
-        yield Finding(int(row), str(rows.ints("action_budget")[row]), str(wanted[row]))
+    expected = np.array([budgets.get(str(s), -1) for s in rows.texts("setting")])
+    for row in np.flatnonzero(rows.ints("action_budget") != expected):
+        yield Finding(int(row), str(rows.ints("action_budget")[row]), str(expected[row]))
 
 
 @check("tasks", needs=("routes",), after=("telling_number",))
@@ -198,10 +203,10 @@ def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def goal_of_modality(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A semantic task has a description and no picture, an image task a picture and no description."""
     modality = rows.texts("modality")
-    for name, wanted in (("description", "semantic"), ("reference_image_id", "image")):
+    for name, expected in (("description", "semantic"), ("reference_image_id", "image")):
         for row, (own, value) in enumerate(zip(modality, rows.texts(name), strict=True)):
-            if (own == wanted) != (value is not None):
-                yield Finding(row, f"{name} = {value!r} in a {own} task", "a text" if own == wanted else "null")
+            if (own == expected) != (value is not None):
+                yield Finding(row, f"{name} = {value!r} in a {own} task", "a text" if own == expected else "null")
 
 
 @check("tasks", needs=("routes", "objects", "landmarks"), after=("goal_of_modality", "telling_text", "telling_id"))
@@ -219,10 +224,10 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
     }
     fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
     for name, column in theirs.items():
-        own, wanted = rows.column(name), column.take(_at(target))
+        own, expected = rows.column(name), column.take(_at(target))
         # The other modality's goal is null, and `goal_of_modality` sees to that.
-        for row in np.flatnonzero(unequal(own, wanted) & fit & _valid(own) & _valid(wanted)):
-            yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(wanted[int(row)].as_py()))
+        for row in np.flatnonzero(unequal(own, expected) & fit & _valid(own) & _valid(expected)):
+            yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(expected[int(row)].as_py()))
 
 
 @check("tasks", after=_SAID_OF_ROUTE)

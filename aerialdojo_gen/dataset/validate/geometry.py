@@ -67,8 +67,8 @@ def keeping_rule(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The route passes the rules of `filter`: d_E, L, κ and the action budget of its setting."""
     reason, _, length, euclidean = _judged(data, rows)
     for k in np.flatnonzero(reason != KEPT):
-        told = f"L = {length[k]:.4f} m, d_E = {euclidean[k]:.4f} m, {np.diff(data.paths.first)[k]} actions"
-        yield Finding(int(data.paths.rows[k]), f"{reason[k]}: {told}", KEPT)
+        measured = f"L = {length[k]:.4f} m, d_E = {euclidean[k]:.4f} m, {np.diff(data.paths.first)[k]} actions"
+        yield Finding(int(data.paths.rows[k]), f"{reason[k]}: {measured}", KEPT)
 
 
 @check("routes", after=("list_lengths_differ", "keeping_rule"))

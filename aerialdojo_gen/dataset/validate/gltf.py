@@ -68,9 +68,9 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             0, f"node {name}{others} moved by {_describe(world)}", "z up turned into y up, and no other transform"
         )
     scene = scene_mesh(data).scene
-    wanted = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
-    if shown != wanted:
-        odd = sorted(((shown - wanted) + (wanted - shown)).elements())
+    expected = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
+    if shown != expected:
+        odd = sorted(((shown - expected) + (expected - shown)).elements())
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")
 
 
@@ -86,18 +86,18 @@ def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             seen = slice(None) if material.mask is None or not material.mask.any() else material.mask.ravel()
             mean = material.texture.reshape(-1, 3)[seen].mean(axis=0)
             same = np.abs(mean - material.colour).max() <= _MEAN and np.abs(factor - 1).max() <= _FACTOR
-            wanted = f"its texture's mean, {_rgb(mean)}, and no factor"
+            expected = f"its texture's mean, {_rgb(mean)}, and no factor"
         else:
             linear = _linear(np.array(material.colour, dtype=np.float64))
             same = len(factor) == 4 and np.abs(factor - [*linear, 1.0]).max() <= _FACTOR
-            wanted = f"factor ({', '.join(f'{c:.6g}' for c in linear)}, 1)"
+            expected = f"factor ({', '.join(f'{c:.6g}' for c in linear)}, 1)"
             named = entry["name"].partition("#")[2]
             if len(named) == 6 and not named.strip("0123456789abcdef"):
                 same = same and bytes.fromhex(named) == bytes(material.colour)
-                wanted += f" and #{named}, as its name has it"
+                expected += f" and #{named}, as its name has it"
         if not same:
             found = f"material {entry['name']!r} with {_rgb(material.colour)} and factor {factor.tolist()}"
-            yield Finding(0, found, wanted)
+            yield Finding(0, found, expected)
             return
 
 
@@ -117,12 +117,15 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             continue
         primitives = document["meshes"][node["mesh"]]["primitives"]
         for primitive, part in zip(primitives, instances[node["name"]].parts, strict=True):
-            told = document["accessors"][primitive["attributes"]["POSITION"]]
+            accessor = document["accessors"][primitive["attributes"]["POSITION"]]
             low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
-            off = max(np.abs(low - told.get("min", np.nan)).max(), np.abs(high - told.get("max", np.nan)).max())
+            off = max(
+                np.abs(low - accessor.get("min", np.nan)).max(), np.abs(high - accessor.get("max", np.nan)).max()
+            )
             if not off <= _SAME * max(1.0, float(np.abs([low, high]).max())):
                 found = f"node {node['name']} from {_triple(low)} to {_triple(high)}"
-                yield Finding(0, found, f"{_triple(told.get('min', ()))} to {_triple(told.get('max', ()))} m as told")
+                stated = f"{_triple(accessor.get('min', ()))} to {_triple(accessor.get('max', ()))} m as told"
+                yield Finding(0, found, stated)
                 return
 
 

@@ -69,8 +69,8 @@ def nav_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def image_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture's id is what the pipeline's salt makes of its object."""
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
-    wanted = [reference_id(data.scene, k, key) for k in rows.ints("object_id").tolist()]
-    yield from _unlike(rows.texts("reference_image_id"), wanted)
+    expected = [reference_id(data.scene, k, key) for k in rows.ints("object_id").tolist()]
+    yield from _unlike(rows.texts("reference_image_id"), expected)
 
 
 @check("routes", needs=("objects",), after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
@@ -126,13 +126,13 @@ def _guessed(scene: str, name: str, digits: str) -> bool:
     return any(make(text.encode()) == digits for text in texts for make in _HASHES)
 
 
-def _unlike(ids: Sequence[str | None], wanted: Sequence[str]) -> Iterator[Finding]:
-    off = [row for row, (own, made) in enumerate(zip(ids, wanted, strict=True)) if own != made]
+def _unlike(ids: Sequence[str | None], expected: Sequence[str]) -> Iterator[Finding]:
+    off = [row for row, (own, made) in enumerate(zip(ids, expected, strict=True)) if own != made]
     if 2 * len(off) > len(ids):
         raise UncheckedError("the release was made with another salt than the pipeline's")
     # An id of another form is told by `telling_id`.
     for row in (row for row in off if re.search(r"[-_][0-9a-f]{12}$", str(ids[row]))):
-        yield Finding(row, str(ids[row]), wanted[row])
+        yield Finding(row, str(ids[row]), expected[row])
 
 
 def _codes(values: Sequence[object]) -> Ints:

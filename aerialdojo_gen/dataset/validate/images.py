@@ -32,10 +32,10 @@ _TELLING = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
 @check("objects", needs=("routes",))
 def image_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object that tasks ask for has a picture."""
-    asked = set(data["routes"].ints("target_object_id").tolist())
+    targets = set(data["routes"].ints("target_object_id").tolist())
     held = rows.column("reference_image").is_valid().to_numpy(zero_copy_only=False)
     for row, object_id in enumerate(rows.ints("object_id").tolist()):
-        if object_id in asked and not held[row]:
+        if object_id in targets and not held[row]:
             yield Finding(row, "no reference_image", "a PNG: tasks ask for the object")
 
 
@@ -50,8 +50,8 @@ def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
         kinds = _chunks(png)
         if kinds[-1:] != ["IEND"] or decode_grey(png) is None:
             yield Finding(row, f"{len(png):,} bytes that are no whole PNG", "a PNG")
-        elif told := _TELLING & set(kinds):
-            yield Finding(row, f"a PNG with words in it ({', '.join(sorted(told))})", "pixels alone")
+        elif texts := _TELLING & set(kinds):
+            yield Finding(row, f"a PNG with words in it ({', '.join(sorted(texts))})", "pixels alone")
 
 
 @check("objects", after=("image_missing", "image_damaged"))
@@ -104,8 +104,9 @@ def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if not 0.0 <= backs[row] <= most:
             yield Finding(row, f"step_back_m = {backs[row]:.6g}", f"0 to {most:g}")
         elif not np.abs(pose - behind).max() <= _SAME_PLACE:
-            told = ", ".join(f"{value:.4f}" for value in pose)
-            yield Finding(row, f"a camera at ({told})", f"{backs[row]:g} m behind the selected anchor, with its yaw")
+            pose_text = ", ".join(f"{value:.4f}" for value in pose)
+            expected = f"{backs[row]:g} m behind the selected anchor, with its yaw"
+            yield Finding(row, f"a camera at ({pose_text})", expected)
         elif backs[row] > 0.0 and not rays.visible(behind[:3], places[anchor, :3])[0]:
             yield Finding(
                 row, f"something between the anchor and the camera {backs[row]:g} m behind it", "free sight"
@@ -133,10 +134,10 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
         v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
         u0, v0, u1, v1 = boxes[row].tolist()
         share = float(seen.mean())
-        told = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
+        stored = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
         # A pixel stands for the rays around it: along the object's edge that is a pixel more or less.
-        if abs(share - told) > _SHARE + _EDGE * told**0.5:
-            yield Finding(row, f"image_fraction = {told:.4f}", f"about {share:.4f}")
+        if abs(share - stored) > _SHARE + _EDGE * stored**0.5:
+            yield Finding(row, f"image_fraction = {stored:.4f}", f"about {share:.4f}")
         elif len(u) and not (u0 <= u.min() and v0 <= v.min() and u1 > u.max() and v1 > v.max()):
             box = f"({u.min()}, {v.min()}) to ({u.max() + 1}, {v.max() + 1})"
             yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
@@ -166,13 +167,13 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
         )
         counts = {tell: int(np.isin(hit, mesh.scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
         least = _TELL_SHARE * picture.size
-        told = [word for word in (missing[row] or "").split(", ") if word]
-        wrong = [t for t, n in counts.items() if (t in told) != (n < least) and abs(n - least) > _EDGE * least + 2]
+        stored = [word for word in (missing[row] or "").split(", ") if word]
+        wrong = [t for t, n in counts.items() if (t in stored) != (n < least) and abs(n - least) > _EDGE * least + 2]
         if wrong:
             yield Finding(row, f"tells_missing = {missing[row]!r}", f"{wrong[0]} has {counts[wrong[0]]} pixels")
-        elif abs(shown[row] - (1.0 - len(told) / max(len(tells), 1))) > _SHARE and tells:
-            yield Finding(row, f"tells_shown = {shown[row]:g}", f"{1.0 - len(told) / len(tells):g}")
-        elif told:
+        elif abs(shown[row] - (1.0 - len(stored) / max(len(tells), 1))) > _SHARE and tells:
+            yield Finding(row, f"tells_shown = {shown[row]:g}", f"{1.0 - len(stored) / len(tells):g}")
+        elif stored:
             yield Finding(
                 row, f"a picture that does not show {missing[row]}", "all that tells what it is", warning=True
             )

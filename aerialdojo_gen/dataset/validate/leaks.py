@@ -39,8 +39,8 @@ def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for name in names:
         for row, text in enumerate(rows.texts(name)):
             if text not in judged:
-                told = next((w for w in re.split(r"[^A-Za-z0-9_]+", str(text)) if w in nodes), "")
-                judged[text] = told or (m[0] if (m := _DECIMAL.search(str(text))) else "")
+                leaked = next((w for w in re.split(r"[^A-Za-z0-9_]+", str(text)) if w in nodes), "")
+                judged[text] = leaked or (m[0] if (m := _DECIMAL.search(str(text))) else "")
             if judged[text]:
                 yield Finding(row, f"{name} tells {judged[text]!r}", "words alone")
 
@@ -56,10 +56,10 @@ def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     starts = np.full((len(routes) + 1, 4), np.nan)
     starts[paths.rows] = paths.starts
     own, theirs = rows.floats(*_START), secret[data.route_of_task]
-    told = _leaked(own, theirs, starts[data.route_of_task])
-    for row in np.flatnonzero(told.any(axis=1)):
-        name = _START[int(told[row].argmax())]
-        yield Finding(int(row), f"{name} = {own[row, int(told[row].argmax())]:.9g}", "nothing of the goal")
+    leaked = _leaked(own, theirs, starts[data.route_of_task])
+    for row in np.flatnonzero(leaked.any(axis=1)):
+        name = _START[int(leaked[row].argmax())]
+        yield Finding(int(row), f"{name} = {own[row, int(leaked[row].argmax())]:.9g}", "nothing of the goal")
 
 
 def _leaked(own: Floats, secret: Floats, start: Floats) -> Floats:

@@ -22,14 +22,14 @@ _SAME_M = 1e-4
 def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
     want_meshes(data)
-    told = str(rows.texts("mesh_path")[0])
-    away = Path(told).is_absolute() or ".." in Path(told).parts
+    stored_path = str(rows.texts("mesh_path")[0])
+    away = Path(stored_path).is_absolute() or ".." in Path(stored_path).parts
     # A folder that the user names may be a link to anywhere, the release's own path may not.
     if data.meshes is None and isinstance(data.release.root, LocalRoot):
         root = data.release.root.path.resolve()
-        away = away or not (root / told).resolve().is_relative_to(root)
+        away = away or not (root / stored_path).resolve().is_relative_to(root)
     if away:
-        yield Finding(0, f"mesh_path = {told!r}", "a path below the data directory")
+        yield Finding(0, f"mesh_path = {stored_path!r}", "a path below the data directory")
 
 
 @check("scenes", needs=("mesh",), after=("mesh_outside",))
@@ -71,8 +71,8 @@ def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What the scene's row says is so in its mesh."""
     stored = rows.table.to_pylist()[0]
-    wanted = scene_row(scene_mesh(data).scene, stored["mesh_path"], stored["mesh_sha256"])
-    for name, value in wanted.items():
+    expected = scene_row(scene_mesh(data).scene, stored["mesh_path"], stored["mesh_sha256"])
+    for name, value in expected.items():
         own = stored[name]
         same = abs(own - value) <= _SAME_M if isinstance(value, float) else own == value
         if not same:

@@ -36,12 +36,12 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
     paths = data.paths
     space = FlightSpace(scene_mesh(data).scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
-    told = _Told(data, routes)
+    tasks = _TaskData(data, routes)
     for k in np.flatnonzero(~_left_out(data, _ROUTE_FAULTS)[paths.rows]).tolist():
         row = int(paths.rows[k])
-        if told.task_of_route[row] < 0:
+        if tasks.task_of_route[row] < 0:
             continue
-        reference = told.reference(row, paths.action[paths.of(k)].tolist())
+        reference = tasks.reference(row, paths.action[paths.of(k)].tolist())
         lack = shortcoming(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
         if lack:
             yield Finding(row, lack, _EXPECTED)
@@ -58,14 +58,14 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         raise UncheckedError("the routes have no agent_action, which an older version did not write")
     scene, paths = scene_mesh(data).scene, data.paths
     space = FlightSpace(scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
-    told, nodes = _Told(data, routes), data["objects"].texts("mesh_node")
+    tasks, nodes = _TaskData(data, routes), data["objects"].texts("mesh_node")
     left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
     lists = routes.column("agent_action").to_pylist()
     stops: list[tuple[int, str, tuple[float, float, float]]] = []
     for k in np.flatnonzero(~left_out[paths.rows]).tolist():
         row = int(paths.rows[k])
         target = int(data.target_of_route[row])
-        if told.task_of_route[row] < 0 or target < 0:
+        if tasks.task_of_route[row] < 0 or target < 0:
             continue
         if lists[row] is None:  # an older version wrote it
             continue
@@ -80,13 +80,13 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
             # These have been flown by the check above, to where the Approach begins.
             end = tuple(paths.xyz[where][-2 if own[-2] == APPROACH else -1].tolist())
         else:
-            flown = fly(space, told.reference(row, actions))
+            flown = fly(space, tasks.reference(row, actions))
             lack = shortcoming(flown, 0.0, SUCCESS_RADIUS_M)
             if lack:
                 yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
                 continue
             end = flown.position
-        away = math.dist(end, told.goal[row])
+        away = math.dist(end, tasks.goal[row])
         if away > NEAR_GOAL_M + _REPLAY_M:
             yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
         elif (node := nodes[target]) in scene:
@@ -96,7 +96,7 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         yield Finding(stops[k][0], "a Stop from where no straight line reaches the target", "the target in sight")
 
 
-class _Told:
+class _TaskData:
     """What the tables tell of routes' episodes."""
 
     def __init__(self, data: SceneData, routes: Rows) -> None:

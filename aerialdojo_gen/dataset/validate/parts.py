@@ -80,7 +80,7 @@ def part_path(key: str, scene: str) -> str:
 
 def foreign_files(release: Release, scenes: list[str]) -> Outcome:
     """Find what does not belong: no part of a scene, no card."""
-    wanted = {part_path(key, scene) for keys in release_tables().values() for key in keys for scene in scenes}
+    expected = {part_path(key, scene) for keys in release_tables().values() for key in keys for scene in scenes}
     outcome = Outcome("foreign_file", "files")
     names = release.root.list(release.folder, "**/*")
     folders = {str(parent) for name in names for parent in PurePosixPath(name).parents}
@@ -89,7 +89,7 @@ def foreign_files(release: Release, scenes: list[str]) -> Outcome:
         if name in folders or _is_empty_folder(release.root, name):
             continue
         outcome.rows += 1
-        if relative.as_posix() in wanted or relative.parts[0] in _BESIDE:
+        if relative.as_posix() in expected or relative.parts[0] in _BESIDE:
             continue
         outcome.faults.append(
             Fault("foreign_file", "", "", relative.as_posix(), "", "a file that is no part of a release", "none")
@@ -182,8 +182,8 @@ def _one_run(scene: str, runs: dict[str, str], outcome: Outcome) -> None:
     outcome.rows = len(runs)
     for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
         for part in (part for part, own in runs.items() if own == fingerprint):
-            told = f"written by run {fingerprint[:12] or '(none)'}", "the run of the scene's other parts"
-            outcome.faults.append(Fault(outcome.check, scene, "", part, "", *told))
+            fault_text = f"written by run {fingerprint[:12] or '(none)'}", "the run of the scene's other parts"
+            outcome.faults.append(Fault(outcome.check, scene, "", part, "", *fault_text))
 
 
 def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterator[str]:

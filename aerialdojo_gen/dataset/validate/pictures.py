@@ -61,8 +61,8 @@ def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is what its camera sees, as drawn anew: no other's, no channel swapped."""
     skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format", "image_pose"))
-    asked = [row for row in data.sampled_objects.tolist() if not skip[row]]
-    decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in asked}
+    sampled = [row for row in data.sampled_objects.tolist() if not skip[row]]
+    decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in sampled}
     stored = {row: picture for row, picture in decoded.items() if picture is not None}
     drawn = _drawn(data, rows, stored)
     own = {row: _blocks(stored[row]) for row in drawn}
@@ -114,17 +114,17 @@ def _other(
     if off <= _NEARER:
         return ""
     limit = min(_BETTER * off, off - _NEARER)
-    best, told = limit, ""
+    best, description = limit, ""
     for order in list(permutations(range(3)))[1:]:
         if (d := _off(own, anew[row][..., list(order)])) < best:
-            best, told = d, f"a picture with channels {''.join(_CHANNELS[k] for k in order)}"
+            best, description = d, f"a picture with channels {''.join(_CHANNELS[k] for k in order)}"
     for turned, words in ((np.s_[:, ::-1], "mirrored"), (np.s_[::-1], "upside down"), (np.s_[::-1, ::-1], "turned")):
         if (d := _off(own, anew[row][turned])) < best:
-            best, told = d, f"a picture that is {words}"
+            best, description = d, f"a picture that is {words}"
     for other, picture in anew.items():
         if other != row and (d := _off(own, picture)) < best:
-            best, told = d, f"the picture of {rows.key(other)}"
-    return told
+            best, description = d, f"the picture of {rows.key(other)}"
+    return description
 
 
 def _off(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

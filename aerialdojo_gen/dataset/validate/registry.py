@@ -12,24 +12,25 @@ from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 
 TABLES = ("scenes", "landmarks", "objects", "anchors", "viewpoints", "routes", "tasks")
-# A row without a value, or with one out of this world, is named once and not judged by what builds on it.
+_TABLE_ORDER = ("*", *(table for table in TABLES if table != "routes"), "routes")
+# A row with a missing or impossible value is reported once; checks that depend on the value skip it.
 ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
 
 
 class Fault(NamedTuple):
-    """One row, part or table at fault."""
+    """A row, part or table that fails a check."""
 
     check: str  # Stable name of the check
     scene: str  # Name of the scene, empty for the release as a whole
     table: str  # Name of the table, empty for what is no table
     part: str  # File, relative to the release
     key: str  # Which row, e.g. ``"nav_id=U_Mall_0-3f0c51d2a9be"``; empty for a whole part
-    found: str  # What stands there and what should
+    found: str  # The stored value, and the expected one
     expected: str
 
 
 class Finding(NamedTuple):
-    """A row at fault, by its number: what a check yields; a warning is no fault, and worth knowing."""
+    """What a check yields: the number of a row, the stored value and the expected one; a warning is no fault."""
 
     row: int
     found: str
@@ -45,24 +46,24 @@ class Check:
     """A check of one table's rows."""
 
     name: str  # Stable name; reports and tests go by it
-    table: str  # The table whose rows it judges; ``"*"`` for each of them
+    table: str  # The table whose rows it checks; ``"*"`` for every table
     needs: tuple[str, ...]  # Other tables that it reads; ``"mesh"`` is the scene's mesh
-    after: tuple[str, ...]  # Checks of the same table: rows at fault by them are not judged again
-    about: str  # What must be so
+    after: tuple[str, ...]  # Checks of the same table that run before; rows that fail them are skipped
+    about: str  # The rule
     run: Function  # Yields the rows at fault
     samples: bool = False
 
 
 @dataclass
 class Outcome:
-    """What a check did on a scene, or on the whole release."""
+    """Result of a check on a scene, or on the whole release."""
 
     check: str  # Name of the check and of the table
     table: str
-    rows: int = 0  # Rows that were judged
+    rows: int = 0  # Rows that were checked
     faults: list[Fault] = field(default_factory=list)  # The rows at fault
-    skipped: str = ""  # Why nothing was judged; empty where it was
-    warnings: list[Fault] = field(default_factory=list)  # Rows that are worth knowing of and at no fault
+    skipped: str = ""  # Why nothing was checked; empty if it was
+    warnings: list[Fault] = field(default_factory=list)  # Rows to report that are no fault
 
 
 CHECKS: list[Check] = []
@@ -71,7 +72,7 @@ CHECKS: list[Check] = []
 def check(
     table: str, *, needs: tuple[str, ...] = (), after: tuple[str, ...] = (), samples: bool = False
 ) -> Callable[[Function], Function]:
-    """Register a function as a check: its name is the check's, its docstring says what must be so."""
+    """Register a function as a check: its name is the check's name, its docstring the rule."""
 
     def register(function: Function) -> Function:
         about = (function.__doc__ or "").strip().splitlines()[0]
@@ -81,8 +82,27 @@ def check(
     return register
 
 
+def ordered(checks: Iterable[Check]) -> tuple[Check, ...]:
+    """Order checks so that each one follows those in its `after`.
+
+    Checks of every table come first, then those of `scenes`, which find faults of the mesh. Those of `tasks` come
+    before those of `routes`: the oracle flies no task that is at fault.
+    """
+    every = sorted(checks, key=lambda one: _TABLE_ORDER.index(one.table))
+    result: dict[str, Check] = {}
+    while len(result) < len(every):
+        waiting = [one for one in every if one.name not in result]
+        ready = next((one for one in waiting if result.keys() >= set(one.after)), None)
+        if ready is None:
+            raise ValueError(
+                f"checks name unknown checks in `after`, or one another: {[one.name for one in waiting]}"
+            )
+        result[ready.name] = ready
+    return tuple(result.values())
+
+
 class UncheckedError(Exception):
-    """A check cannot be made, and why."""
+    """Why a check cannot be made."""
 
 
 def run_checks(data: SceneData, checks: Iterable[Check]) -> Iterator[Outcome]:
@@ -109,9 +129,9 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     mask = np.zeros(len(rows), dtype=np.bool_)
     mask[[f.row for f in findings if not f.warning]] = True
     data.faulty[table, one.name] = mask
-    told: dict[bool, list[Fault]] = {False: [], True: []}
+    faults: dict[bool, list[Fault]] = {False: [], True: []}
     for f in findings:
         fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
-        told[f.warning].append(fault)
+        faults[f.warning].append(fault)
     judged = ~left_out[data.sampled_rows(table)] if one.samples else ~left_out
-    return Outcome(one.name, table, int(judged.sum()), told[False], warnings=told[True])
+    return Outcome(one.name, table, int(judged.sum()), faults[False], warnings=faults[True])

@@ -75,9 +75,9 @@ class Rows:
         column = self.table.column(name).combine_chunks()
         return column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
 
-    def find(self, name: str, wanted: pa.Array) -> Ints:
+    def find(self, name: str, keys: pa.Array) -> Ints:
         """First row of each wanted value of a column, -1 where there is none; (len(wanted),) int64."""
-        found = pc.index_in(wanted, value_set=self.column(name))
+        found = pc.index_in(keys, value_set=self.column(name))
         return pc.fill_null(found, -1).to_numpy(zero_copy_only=False).astype(np.int64)
 
 
@@ -240,5 +240,5 @@ class SceneData:
         anchors, routes = self["anchors"], self["routes"]
         known = zip(anchors.ints("object_id").tolist(), anchors.ints("anchor_id").tolist(), strict=True)
         rows = {key: row for row, key in enumerate(known)}
-        wanted = zip(routes.ints("start_object_id").tolist(), routes.ints("start_anchor_id").tolist(), strict=True)
-        return np.array([rows.get(key, -1) for key in wanted], dtype=np.int64)
+        keys = zip(routes.ints("start_object_id").tolist(), routes.ints("start_anchor_id").tolist(), strict=True)
+        return np.array([rows.get(key, -1) for key in keys], dtype=np.int64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,26 +12,6 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.dataset.contents import release_scenes
-from aerialdojo_gen.dataset.validate import (
-    anchors,
-    below_ground,
-    collisions,
-    descriptions,
-    detours,
-    difficulty,
-    endpoints,
-    foreign_keys,
-    geometry,
-    gltf,
-    id_leaks,
-    images,
-    leaks,
-    meshes,
-    oracle,
-    pictures,
-    reachability,
-    tables,
-)
 from aerialdojo_gen.dataset.validate.counts import Tally, scene_counts, tally_of, whole_counts
 from aerialdojo_gen.dataset.validate.parts import (
     Release,
@@ -39,7 +21,7 @@ from aerialdojo_gen.dataset.validate.parts import (
     release_of,
     release_tables,
 )
-from aerialdojo_gen.dataset.validate.registry import CHECKS, Outcome, run_checks
+from aerialdojo_gen.dataset.validate.registry import CHECKS, Outcome, ordered, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
@@ -49,28 +31,10 @@ from aerialdojo_gen.store.root import Where
 
 # What a process is taken to need, megabytes; not measured.
 MEMORY_MB = 1500
-# A check looks at what those before it found fault with, so that their order is fixed here.
-_MODULES = (
-    tables,
-    geometry,
-    leaks,
-    foreign_keys,
-    endpoints,
-    meshes,
-    gltf,
-    descriptions,
-    anchors,
-    collisions,
-    below_ground,
-    reachability,
-    detours,
-    difficulty,
-    oracle,
-    images,
-    pictures,
-    id_leaks,
-)
-SCENE_CHECKS = tuple(one for module in _MODULES for one in CHECKS if one.run.__module__ == module.__name__)
+# Every module of this folder registers its checks.
+for _module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+    importlib.import_module(f"{__package__}.{_module.name}")
+SCENE_CHECKS = ordered(CHECKS)
 
 
 @dataclass(frozen=True)
@@ -88,7 +52,7 @@ class ValidationOptions:
 
 @dataclass(frozen=True)
 class _Work:
-    asked: ValidationOptions
+    options: ValidationOptions
     scene: str
 
     @property
@@ -97,15 +61,15 @@ class _Work:
 
     def moved(self, place: Callable[[Path], Path]) -> _Work:
         """Return the same work for a machine where the props lie elsewhere."""
-        pipeline = self.asked.pipeline
+        pipeline = self.options.pipeline
         if pipeline.scene_assets is None:
             return self
         pipeline = pipeline.model_copy(update={"scene_assets": place(pipeline.scene_assets)})
-        return replace(self, asked=replace(self.asked, pipeline=pipeline))
+        return replace(self, options=replace(self.options, pipeline=pipeline))
 
 
 def validate(
-    asked: ValidationOptions,
+    options: ValidationOptions,
     *,
     workers: int | None = 1,
     executor: str = "local",
@@ -114,18 +78,18 @@ def validate(
 ) -> Report:
     """Check a release."""
     reporter = reporter or Reporter(quiet=True)
-    release = release_of(asked.release)
-    asked = replace(asked, release=release)
+    release = release_of(options.release)
+    options = replace(options, release=release)
     every = release_scenes(release.root, release.folder)
-    chosen = choose_scenes(asked.scenes, every)
+    chosen = choose_scenes(options.scenes, every)
     by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
-    shared = on_disk(release.root, *([asked.meshes] if asked.meshes else []))
-    assets = asked.pipeline.scene_assets
-    made = make_executor(
+    shared = on_disk(release.root, *([options.meshes] if options.meshes else []))
+    assets = options.pipeline.scene_assets
+    executor_of_run = make_executor(
         executor, workers, address, SharedPaths(shared, (assets,) if assets else (), (), reporter.line)
     )
-    work = [_Work(asked, scene) for scene in _large_first(release, chosen)]
-    with Interrupts() as interrupts, made as pool, reporter.bar("validate", len(chosen)) as bar:
+    work = [_Work(options, scene) for scene in _large_first(release, chosen)]
+    with Interrupts() as interrupts, executor_of_run as pool, reporter.bar("validate", len(chosen)) as bar:
         for done in pool.map(_check, work, memory_mb=MEMORY_MB):
             interrupts.check()
             if isinstance(done, AerialDojoError):
@@ -135,16 +99,16 @@ def validate(
     outcomes = [foreign_files(release, every)]
     outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
     tallies = [by_scene[scene][1] for scene in chosen]
-    outcomes += whole_counts(release, tallies, asked.pipeline, len(chosen) == len(every))
+    outcomes += whole_counts(release, tallies, options.pipeline, len(chosen) == len(every))
     return Report(tuple(chosen), tuple(outcomes))
 
 
-def check_scene(asked: ValidationOptions, scene: str) -> tuple[list[Outcome], Tally]:
+def check_scene(options: ValidationOptions, scene: str) -> tuple[list[Outcome], Tally]:
     """Check one scene of a release."""
-    release = release_of(asked.release)
+    release = release_of(options.release)
     found, outcomes = read_tables(release, scene)
-    data = SceneData(scene, release, asked.pipeline, found, asked.meshes, asked.use_meshes, asked.sample,
-                     asked.pictures)  # fmt: skip
+    data = SceneData(scene, release, options.pipeline, found, options.meshes, options.use_meshes, options.sample,
+                     options.pictures)  # fmt: skip
     tally = tally_of(data, len(found) == len(release_tables()))
     outcomes += run_checks(data, SCENE_CHECKS)
     outcomes.append(scene_counts(data, tally))
@@ -152,7 +116,7 @@ def check_scene(asked: ValidationOptions, scene: str) -> tuple[list[Outcome], Ta
 
 
 def _check(work: _Work) -> tuple[list[Outcome], Tally]:
-    return check_scene(work.asked, work.scene)
+    return check_scene(work.options, work.scene)
 
 
 def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:

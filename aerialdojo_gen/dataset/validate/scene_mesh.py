@@ -37,22 +37,22 @@ class SceneMesh:
 
 def mesh_place(data: SceneData) -> str:
     """Where the scene's mesh should lie, as messages say it."""
-    told = str(data["scenes"].texts("mesh_path")[0])
-    return str(data.meshes / Path(told).name) if data.meshes is not None else data.release.root.at(told)
+    stored_path = str(data["scenes"].texts("mesh_path")[0])
+    return str(data.meshes / Path(stored_path).name) if data.meshes is not None else data.release.root.at(stored_path)
 
 
 def mesh_path(data: SceneData) -> Path:
     """Return the scene's mesh on this machine; FileNotFoundError where it is not there."""
-    told = str(data["scenes"].texts("mesh_path")[0])
+    stored_path = str(data["scenes"].texts("mesh_path")[0])
     if data.meshes is None:
-        return data.release.root.local_copy(told)
-    return LocalRoot(data.meshes).local_copy(Path(told).name)
+        return data.release.root.local_copy(stored_path)
+    return LocalRoot(data.meshes).local_copy(Path(stored_path).name)
 
 
 def want_meshes(data: SceneData) -> None:
     """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
     if not data.use_meshes:
-        raise UncheckedError("no meshes asked for")
+        raise UncheckedError("--no-meshes was given")
     if "scenes" not in data.tables or len(data["scenes"]) != 1:
         raise UncheckedError("scenes has not one row of it")
     if data.flagged("scenes", ALWAYS_AFTER).any():

@@ -79,9 +79,9 @@ def wrong_part(data: SceneData, rows: Rows) -> Iterator[Finding]:
     subset = np.asarray(rows.texts("subset"), dtype=object)
     for k, part in enumerate(rows.parts):
         folder = part.split("/")[-2]
-        wanted = folder.removeprefix(f"{partition(data.scene)}_")
-        for row in np.flatnonzero((rows.part_of == k) & (subset != wanted)):
-            yield Finding(int(row), f"subset = {subset[row]!r}", f"{wanted!r}, as its folder {folder}")
+        expected = folder.removeprefix(f"{partition(data.scene)}_")
+        for row in np.flatnonzero((rows.part_of == k) & (subset != expected)):
+            yield Finding(int(row), f"subset = {subset[row]!r}", f"{expected!r}, as its folder {folder}")
 
 
 @check("*")

@@ -1,4 +1,4 @@
-"""The executor's interface: tasks go in, results come back in the order of finishing, wherever they are computed."""
+"""The interface of executors: tasks in, results out in completion order."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ EXECUTORS = ("local", "ray")
 
 
 class Labelled(Protocol):
-    """A task: a picklable thing with a name for messages.
+    """A picklable task with a name for messages.
 
-    Where it holds paths of folders that are carried to other machines (`Folders.carried`), it has besides a method
-    ``moved(place)`` that returns it with ``place(path)`` in their stead.
+    A task with paths of `SharedPaths.bundled` also has a method ``moved(place)``, which returns the task with
+    ``place(path)`` in place of each such path.
     """
 
     @property
     def label(self) -> str:
-        """The task in words."""
+        """The task's name in messages."""
 
 
 T = TypeVar("T", bound=Labelled)
@@ -35,33 +35,33 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class SharedPaths:
-    """The folders that tasks name."""
+    """The folders that tasks refer to."""
 
-    shared: tuple[Path, ...] = ()
-    carried: tuple[Path, ...] = ()
-    written: tuple[Path, ...] = ()  # Those of `shared`, or in them, that are held and written to
-    say: Callable[[str], None] = print  # Told in a line what a run waits for
+    shared: tuple[Path, ...] = ()  # On a file system that all machines share
+    bundled: tuple[Path, ...] = ()  # Read only, sent to other machines
+    written: tuple[Path, ...] = ()  # Those of `shared`, or in them, that the run locks and writes to
+    say: Callable[[str], None] = print  # Called with a line on what a run waits for
 
 
 def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
-    """Return those places, or what is `below` them, that are folders of a file system, not of an object store."""
+    """Return the places, or the folders `below` them, that are on a file system and not in an object store."""
     paths = (place.path if isinstance(place, LocalRoot) else place for place in places)
     return tuple(path / below for path in paths if isinstance(path, Path))
 
 
 @dataclass(frozen=True)
 class ParentChannel:
-    """The parent's side of the links that its workers have."""
+    """The parent's side of its workers' channels."""
 
-    hear: Callable[[Any], None]  # Called in this process with what a worker tells
+    on_message: Callable[[Any], None]  # Called in this process with a worker's message
     stopped: Callable[[], bool]
 
 
 class Executor(ABC):
-    """Does work on tasks in several processes; a context manager.
+    """Runs tasks in several processes; a context manager.
 
-    Nothing is started before the first tasks need it. The processes are kept until the block ends; where it ends by
-    an error or Ctrl-C they are ended at once (`cancel`) and are gone when the block has been left.
+    Processes start with the first tasks and live until the block ends; on an error or Ctrl-C they are terminated
+    (`cancel`) before the block is left.
     """
 
     def __enter__(self) -> Executor:
@@ -71,7 +71,7 @@ class Executor(ABC):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the processes; at once where an error is under way."""
+        """End the processes, immediately on an error."""
         if kind is None:
             self.close()
         else:
@@ -80,7 +80,7 @@ class Executor(ABC):
     @property
     @abstractmethod
     def workers(self) -> int:
-        """Processes that work at a time, as far as that is known before."""
+        """Number of processes."""
 
     def map(
         self,
@@ -88,31 +88,36 @@ class Executor(ABC):
         tasks: Sequence[T],
         scene_of: Callable[[T], str] | None = None,
         *,
-        talk: ParentChannel | None = None,
+        channel: ParentChannel | None = None,
         memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks that are known from the start: `run` of `TaskQueue`."""
-        return self.run(work, TaskQueue(tasks, scene_of), talk=talk, memory_mb=memory_mb)
+        """Run tasks that are known from the start: `run` of a `TaskQueue`."""
+        return self.run(work, TaskQueue(tasks, scene_of), channel=channel, memory_mb=memory_mb)
 
     @abstractmethod
     def run(
-        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
+        self,
+        work: Callable[..., R],
+        waiting: TaskQueue[T],
+        *,
+        channel: ParentChannel | None = None,
+        memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
+        """Run tasks and yield results or expected errors in completion order."""
 
     @abstractmethod
     def close(self) -> None:
-        """End the processes when they have done what they are at."""
+        """End the processes after their current tasks."""
 
     @abstractmethod
     def cancel(self) -> None:
-        """End the processes now, and wait until they are gone."""
+        """Terminate the processes, and wait for them."""
 
 
-def guarded(work: Callable[..., R], task: Any, link: WorkerChannel | None) -> R | AerialDojoError:
-    """Do work on a task; an expected error is returned."""
+def guarded(work: Callable[..., R], task: Any, channel: WorkerChannel | None) -> R | AerialDojoError:
+    """Run a task; an expected error is returned."""
     try:
-        return work(task) if link is None else work(task, link)
+        return work(task) if channel is None else work(task, channel)
     except AerialDojoError as error:
         return error
 
@@ -120,7 +125,7 @@ def guarded(work: Callable[..., R], task: Any, link: WorkerChannel | None) -> R 
 def make_executor(
     name: str, workers: int | None = None, address: str | None = None, folders: SharedPaths | None = None
 ) -> Executor:
-    """Make an executor; nothing is started yet."""
+    """Create an executor; it starts nothing yet."""
     if name not in EXECUTORS:
         raise UsageError(f"unknown executor {name!r}; executors: {', '.join(EXECUTORS)}")
     if name == "ray":
@@ -128,14 +133,14 @@ def make_executor(
 
         return RayExecutor(workers, address, folders or SharedPaths())
     if address is not None:
-        raise UsageError("--address is of --executor ray: leave it out, or give both")
+        raise UsageError("--address needs --executor ray")
     from aerialdojo_gen.pipeline.executors.local import LocalExecutor
 
     return LocalExecutor(workers)
 
 
 class TaskQueue(Generic[T]):
-    """Tasks that nobody has begun, by scene; `Executor.run` takes them from here."""
+    """Tasks not started yet, by scene."""
 
     def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str] | None) -> None:
         self._scene_of = scene_of or (lambda _: "")
@@ -149,18 +154,18 @@ class TaskQueue(Generic[T]):
 
     @property
     def alone(self) -> bool:
-        """Whether there is never more than one task at a time, so that one process is enough."""
+        """Whether there is never more than one task at a time, so that one process suffices."""
         return self._alone
 
     def give(self, idle: Sequence[int]) -> Iterator[tuple[int, T]]:
-        """Give idle processes their next tasks, as far as there are: first those who stay with their scene."""
+        """Yield the next tasks of idle processes, first for those that stay with their scene."""
         for lane in sorted(idle, key=lambda lane: self._at.get(lane) not in self._scenes):
             task = self.take(lane)
             if task is not None:
                 yield lane, task
 
     def take(self, lane: int) -> T | None:
-        """Give a process its next task: of its scene, else of one that no other works at, else of the fullest."""
+        """Return a process's next task: of its scene, else of one without a process, else of the heaviest."""
         scene = self._at.get(lane)
         if scene not in self._scenes:
             others = {at for other, at in self._at.items() if other != lane}
@@ -173,21 +178,21 @@ class TaskQueue(Generic[T]):
         return self._pop(scene)
 
     def one_by_one(self) -> Iterator[T]:
-        """Yield the tasks for one process that does all, scene after scene in their order."""
+        """Yield all tasks for a single process, scene by scene."""
         scene = ""
         while self._scenes:
             scene = scene if scene in self._scenes else next(iter(self._scenes))
             yield self._pop(scene)
 
     def on_done(self, task: T, outcome: Any) -> None:
-        """Hear what became of a task, an error that was expected among it."""
+        """Record a task's result or expected error."""
 
     def put_back(self, task: T) -> None:
-        """Take back a task whose process is gone; it is the next of its scene."""
+        """Queue a task again whose process is gone, as the first of its scene."""
         self._scenes.setdefault(self._scene_of(task), deque()).appendleft(task)
 
     def leave(self, lane: int) -> None:
-        """Forget where a process that is gone was."""
+        """Forget the scene of a process that is gone."""
         self._at.pop(lane, None)
 
     def _add(self, tasks: Sequence[T]) -> None:
@@ -201,9 +206,9 @@ class TaskQueue(Generic[T]):
         return task
 
     def _weight(self, scene: str) -> float:
-        """How much there is to do of a scene: the heaviest goes first."""
+        """Work left for a scene: the heaviest goes first."""
         return len(self._scenes[scene])
 
     def _worth_joining(self, _scene: str) -> bool:
-        """Whether a second process should work at a scene."""
+        """Whether a second process should work on a scene."""
         return True

@@ -1,7 +1,7 @@
-"""What travels to the machines of a cluster: the package and the folders that are only read, as one archive.
+"""The archive sent to the machines of a cluster: the package and the read-only folders.
 
-The archive is a function of the files' content, so that a cluster that has it already gets it no second time. Numba's
-compiled kernels travel too: a machine of the same kind need not compile them, which takes half a minute.
+Its bytes depend on the files' content alone, so that a cluster that has it already does not receive it again. It
+includes Numba's compiled kernels: compiling them takes half a minute.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.kernel_cache import folder_name
 
 MAX_BYTES = 200 << 20
-_NAMES = "carried.json"
+_NAMES = "bundled.json"
 _KERNELS = (".nbi", ".nbc")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
@@ -26,26 +26,26 @@ def pack(target: Path, folders: Sequence[Path]) -> None:
     package = Path(__file__).resolve().parents[2]
     files: dict[str, Path] = {}
     names: dict[str, str] = {}
-    # Machine code of other versions of the sources stays here.
+    # Without machine code of other versions of the sources.
     kernels = {folder for folder in package.rglob("__pycache__/kernels/*") if _is_current(folder)}
     for path in _files(package):
         if "__pycache__" not in path.relative_to(package).parts or (
             path.parent in kernels and path.suffix in _KERNELS
         ):
             files[f"{package.name}/{path.relative_to(package).as_posix()}"] = path
-    # What a command finds beside the package, or in it where a wheel is installed.
-    beside = [package.parent / name for name in ("pipelines",) if (package.parent / "scene_assets").is_dir()]
-    for number, folder in enumerate(dict.fromkeys([*beside, *folders])):
+    # In a checkout these folders are next to the package, in a wheel inside it.
+    siblings = [package.parent / name for name in ("pipelines",) if (package.parent / "scene_assets").is_dir()]
+    for number, folder in enumerate(dict.fromkeys([*siblings, *folders])):
         if folder.is_relative_to(package):
             names[str(folder)] = f"{package.name}/{folder.relative_to(package).as_posix()}"
             continue
-        names[str(folder)] = folder.name if folder in beside else f"carried/{number}"
+        names[str(folder)] = folder.name if folder in siblings else f"bundled/{number}"
         files |= {f"{names[str(folder)]}/{p.relative_to(folder).as_posix()}": p for p in _files(folder)}
     size = sum(path.stat().st_size for path in files.values())
     if size > MAX_BYTES:
         raise UsageError(
             f"the package and {', '.join(map(str, folders))} have {size >> 20} MB: no more than {MAX_BYTES >> 20} MB "
-            "are carried to a cluster; leave out of these folders what is no recipe, prop or annotation"
+            "are sent to a cluster; remove files that are no recipe, prop or annotation"
         )
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr(zipfile.ZipInfo(_NAMES, _EPOCH), json.dumps(names, sort_keys=True))
@@ -70,7 +70,7 @@ def _bytes(path: Path) -> bytes:
 
 
 class Unpacked:
-    """An archive where Ray has unpacked it."""
+    """An archive that Ray has unpacked."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -79,7 +79,7 @@ class Unpacked:
             self._names = json.loads((folder / _NAMES).read_text(encoding="utf-8"))
 
     def place(self, path: Path) -> Path:
-        """Return where a folder that was packed is here, or what is in it; any other path as it is."""
+        """Return the unpacked location of a path in a packed folder; any other path unchanged."""
         for above in (path, *path.parents):
             if str(above) in self._names:
                 return self._folder / self._names[str(above)] / path.relative_to(above)

@@ -1,6 +1,6 @@
-"""What a worker process has of its parent while it works, and what it does at its end.
+"""Channels from a worker to its parent, and callbacks for the end of a process.
 
-Nothing heavy is imported: every worker process begins with this.
+Nothing heavy is imported: every worker process starts with this.
 """
 
 from __future__ import annotations
@@ -12,22 +12,22 @@ from typing import Protocol
 
 
 class WorkerChannel(Protocol):
-    """A worker's way to the process that gave it its task."""
+    """A worker's channel to its parent."""
 
-    every_s: float  # How far messages should be apart, seconds; 0 where each costs nothing
+    every_s: float  # Least interval of messages, seconds; 0 if they are free
 
-    def tell(self, message: object) -> None:
-        """Send a small message; the parent hears it while the task goes on."""
+    def send(self, message: object) -> None:
+        """Send a small message to the parent while the task runs."""
 
     def stopped(self) -> bool:
-        """Whether the parent wants nothing more to be begun."""
+        """Whether the parent has asked to start nothing more."""
 
     def turn(self, interval_s: float) -> float:
-        """Return how many seconds to wait for a turn; turns of all workers are at least `interval_s` apart."""
+        """Return how many seconds to wait; turns of all workers are at least `interval_s` apart."""
 
 
 class RateLimiter:
-    """Turns at even intervals, seconds of one clock that all who ask share; `next` is when the next one is."""
+    """Gives out turns at even intervals; `next` is the time of the next one, seconds of a shared clock."""
 
     def __init__(self, following: float = 0.0) -> None:
         self.next = following
@@ -40,12 +40,12 @@ class RateLimiter:
 
 
 class InProcessChannel:
-    """The link of a worker that is its own parent."""
+    """The channel of a worker that runs in the parent's process."""
 
     every_s = 0.0
 
-    def __init__(self, hear: Callable[[object], None], stopped: Callable[[], bool]) -> None:
-        self.tell, self.stopped = hear, stopped
+    def __init__(self, on_message: Callable[[object], None], stopped: Callable[[], bool]) -> None:
+        self.send, self.stopped = on_message, stopped
         self._turns = RateLimiter()
 
     def turn(self, interval_s: float) -> float:
@@ -57,12 +57,12 @@ _closers: list[Callable[[], object]] = []
 
 
 def at_end(close: Callable[[], object]) -> None:
-    """Have something called when this process has done its last task for its executor."""
+    """Register a callback for the end of this process's work for its executor."""
     _closers.append(close)
 
 
 def end() -> None:
-    """Call what waits for the end, the last first; what it raises now is of no task."""
+    """Call the registered callbacks, the last first; their errors are ignored."""
     while _closers:
         with contextlib.suppress(Exception):
             _closers.pop()()

@@ -1,7 +1,7 @@
-"""Tasks in processes of this machine, or in this one.
+"""Tasks in processes of this machine, or in this process.
 
-A worker process and its parent talk by a pipe alone. Semaphores would need a ``/dev/shm`` that can be written, and a
-parent that was killed would leave them behind.
+A worker and its parent communicate by a pipe. Semaphores would need a writable ``/dev/shm``, and a killed parent
+would leave them behind.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, T, TaskQueue, guarded
 from aerialdojo_gen.pipeline.executors.link import InProcessChannel, RateLimiter, end
 
-# How often the parent looks whether workers are to stop, seconds.
+# How often the parent checks whether workers must stop, seconds.
 _LOOK_EVERY_S = 0.2
-# How long a worker that was terminated may take to end before it is killed, seconds.
+# Time from termination to a kill, seconds.
 _END_WITHIN_S = 5.0
 # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
 _CONTEXT = multiprocessing.get_context("spawn")
 
 
 def own_cores() -> int:
-    """Count the cores that this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class LocalExecutor(Executor):
-    """Does work in `workers` processes; in this one where that is 1."""
+    """Runs tasks in `workers` processes; in this process if that is 1."""
 
     def __init__(self, workers: int | None = None) -> None:
         self._workers = workers or own_cores()
@@ -45,11 +45,11 @@ class LocalExecutor(Executor):
 
     @property
     def workers(self) -> int:
-        """Processes."""
+        """Number of processes."""
         return self._workers
 
     def close(self) -> None:
-        """End the processes when they have done what they are at."""
+        """End the processes after their current tasks."""
         for lane in self._lanes.values():
             lane.pipe.close()
         try:
@@ -62,7 +62,7 @@ class LocalExecutor(Executor):
         end()
 
     def cancel(self) -> None:
-        """End the processes now; one that does not end by itself (stopped, or waiting for a disk) is killed."""
+        """Terminate the processes; one that does not end (stopped, or waiting for a disk) is killed."""
         lanes = [*self._lanes.values()]
         self._lanes.clear()
         for lane in lanes:
@@ -80,35 +80,40 @@ class LocalExecutor(Executor):
         end()
 
     def run(
-        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
+        self,
+        work: Callable[..., R],
+        waiting: TaskQueue[T],
+        *,
+        channel: ParentChannel | None = None,
+        memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
+        """Run tasks and yield results or expected errors in completion order."""
         if self._workers <= 1 or waiting.alone:
-            here = InProcessChannel(talk.hear, talk.stopped) if talk else None
+            in_process = InProcessChannel(channel.on_message, channel.stopped) if channel else None
             for task in waiting.one_by_one():
-                outcome = guarded(work, task, here)
+                outcome = guarded(work, task, in_process)
                 waiting.on_done(task, outcome)
                 yield outcome
             return
         turns, running, stopping = RateLimiter(), dict[int, T](), set[int]()
         try:
             while True:
-                # One task a process keeps a Ctrl-C from waiting for what has not begun.
+                # One task per process: a Ctrl-C does not wait for queued tasks.
                 for number, task in waiting.give([n for n in range(self._workers) if n not in running]):
                     running[number] = task
                     stopping.discard(number)
-                    self._lane(number).send((work, task, talk is not None))
+                    self._lane(number).send((work, task, channel is not None))
                 pipes = {self._lanes[number].pipe: number for number in running}
-                ready = wait([*pipes], _LOOK_EVERY_S if talk else None)
-                if talk and talk.stopped():
+                ready = wait([*pipes], _LOOK_EVERY_S if channel else None)
+                if channel and channel.stopped():
                     for number in running.keys() - stopping:
                         stopping.add(number)
                         self._lanes[number].send(_STOP)
                 for number in (pipes[pipe] for pipe in ready if isinstance(pipe, Connection)):
                     match self._lanes[number].receive():
-                        case "told", message:
-                            if talk:
-                                talk.hear(message)
+                        case "message", message:
+                            if channel:
+                                channel.on_message(message)
                         case "turn", interval_s:
                             self._lanes[number].send(turns.take(interval_s, time.monotonic()))
                         case "raised", error, origin:
@@ -126,11 +131,11 @@ class LocalExecutor(Executor):
             ) from None
         finally:
             if running:
-                # What they still send is of no run that follows.
+                # Their remaining messages must not reach a later run.
                 self.cancel()
 
     def _lane(self, number: int) -> _Lane:
-        """Return a worker process, started by its first task."""
+        """Return a worker process; it starts with its first task."""
         if number not in self._lanes:
             self._lanes[number] = _Lane()
         return self._lanes[number]
@@ -141,18 +146,18 @@ class _LostError(Exception):
 
 
 class _Lane:
-    """A worker process that does one task at a time, and this end of its pipe."""
+    """A worker process and this end of its pipe."""
 
     def __init__(self) -> None:
-        self.pipe, theirs = _CONTEXT.Pipe()
-        self.process = _CONTEXT.Process(target=_serve, args=(os.getpid(), theirs))
-        # It inherits a blocked SIGINT, so that a Ctrl-C while it starts is the parent's alone.
+        self.pipe, child_end = _CONTEXT.Pipe()
+        self.process = _CONTEXT.Process(target=_serve, args=(os.getpid(), child_end))
+        # It inherits a blocked SIGINT: the parent alone handles a Ctrl-C while it starts.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process.start()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        theirs.close()
+        child_end.close()
 
     def send(self, message: object) -> None:
         try:
@@ -167,23 +172,23 @@ class _Lane:
             raise _LostError from None
 
 
-# Sent to a worker that is to begin nothing more.
+# Tells a worker to start nothing more.
 _STOP = "stop"
 
 
-class _PipeLink:
-    """The link of a worker process."""
+class _PipeChannel:
+    """The channel of a worker process."""
 
     every_s = 0.1
 
     def __init__(self, pipe: Connection[Any, Any]) -> None:
         self._pipe, self._stopped = pipe, False
 
-    def tell(self, message: object) -> None:
-        self._pipe.send(("told", message))
+    def send(self, message: object) -> None:
+        self._pipe.send(("message", message))
 
     def stopped(self) -> bool:
-        # The parent sends nothing else while nobody waits for a turn.
+        # The parent sends nothing else unless the worker waits for a turn.
         if not self._stopped and self._pipe.poll():
             self._stopped = self._pipe.recv() == _STOP
         return self._stopped
@@ -196,8 +201,8 @@ class _PipeLink:
 
 
 def _serve(parent: int, pipe: Connection[Any, Any]) -> None:
-    """Do tasks until the parent closes the pipe or is gone."""
-    # Ctrl-C goes to the whole process group: the parent alone answers it, and ends the workers itself.
+    """Run tasks until the parent closes the pipe or is gone."""
+    # Ctrl-C goes to the whole process group: the parent alone handles it, and ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A worker must not outlive a parent that was killed with SIGKILL.
     if sys.platform == "linux":
@@ -215,10 +220,10 @@ def _serve(parent: int, pipe: Connection[Any, Any]) -> None:
         end()
 
 
-def _answer(pipe: Connection[Any, Any], work: Callable[..., Any], task: Any, linked: bool) -> memoryview:
-    """Do work on a task; gives the message that tells how it ended."""
+def _answer(pipe: Connection[Any, Any], work: Callable[..., Any], task: Any, has_channel: bool) -> memoryview:
+    """Run a task; returns the message with its result."""
     try:
-        return ForkingPickler.dumps(("done", guarded(work, task, _PipeLink(pipe) if linked else None)))
+        return ForkingPickler.dumps(("done", guarded(work, task, _PipeChannel(pipe) if has_channel else None)))
     except BaseException as error:
         text = traceback.format_exc()
         try:

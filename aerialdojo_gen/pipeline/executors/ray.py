@@ -1,7 +1,7 @@
-"""Tasks on a Ray cluster, or on one of this machine's own: an actor a process, which stays with a scene.
+"""Tasks on a Ray cluster, or on a local one: one actor per process, which stays with a scene.
 
-What is lost with a node or a process is done again elsewhere: a task's result is committed by whoever computes it, so
-that only what was under way is lost. Messages and results that travel are small.
+Tasks lost with a node or a process run again elsewhere: a task commits its own result, so that only running tasks are
+lost. Messages and results are small.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 from aerialdojo_gen.pipeline.executors.ray_worker import Expected, MessageBoard, Worker, listing, versions
 from aerialdojo_gen.store.staging import scratch_folder, staged
 
-# How often a task is begun before its fault is taken for its own.
+# Attempts of a task before its failure is final.
 _TRIES = 4
-# So many processes may end one after the other before one has done anything.
+# Consecutive processes that may end before any has started.
 _FALSE_STARTS = 6
 _LOOK_EVERY_S, _SAY_AFTER_S, _END_WITHIN_S = 0.3, 30.0, 20.0
 _FORWARDED = re.compile(r"(AWS|AERIALDOJO)_\w+|\w+_API_KEY|(OPENAI|ANTHROPIC)_BASE_URL|HF_TOKEN")
 
 
 def _import_ray(own: bool) -> Any:
-    """Import Ray, quiet; a cluster of our own listens on the loopback interface alone."""
+    """Import Ray without its messages; a local cluster listens on the loopback interface only."""
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     os.environ.setdefault("RAY_BACKEND_LOG_LEVEL", "error")
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     if own:
-        # Ray's own switch against firewalls that ask: it takes 127.0.0.1 for the node's address.
+        # Makes Ray use 127.0.0.1 as the node's address.
         os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
     try:
         import ray
@@ -54,7 +54,7 @@ def _import_ray(own: bool) -> Any:
 
 @dataclass(eq=False)
 class _Lane:
-    """A process that does one task at a time."""
+    """A process that runs one task at a time."""
 
     number: int
     actor: Any
@@ -62,13 +62,13 @@ class _Lane:
 
 
 class RayExecutor(Executor):
-    """Does work in actors of a Ray cluster."""
+    """Runs tasks in actors of a Ray cluster."""
 
     def __init__(self, workers: int | None, address: str | None, folders: SharedPaths) -> None:
         if address is not None and not re.fullmatch(r"(ray://)?[^\s:/]+:\d{1,5}", address):
-            raise UsageError(f"--address {address}: write HOST:PORT, as `ray start --head` says it")
+            raise UsageError(f"--address {address}: write HOST:PORT, as `ray start --head` prints it")
         self._ray = _import_ray(address is None)
-        self._asked, self._address, self._folders = workers, address, folders
+        self._requested, self._address, self._folders = workers, address, folders
         self._stack = contextlib.ExitStack()
         self._lanes: list[_Lane] = []
         self._refs: dict[Any, _Lane] = {}
@@ -79,16 +79,21 @@ class RayExecutor(Executor):
 
     @property
     def workers(self) -> int:
-        """Actors that work at a time; connects."""
-        if self._asked is None:
+        """Number of actors; connects to the cluster."""
+        if self._requested is None:
             self._connect()
             return max(1, int(self._ray.cluster_resources().get("CPU", 1)))
-        return self._asked
+        return self._requested
 
     def run(
-        self, work: Callable[..., R], waiting: TaskQueue[T], *, talk: ParentChannel | None = None, memory_mb: int = 0
+        self,
+        work: Callable[..., R],
+        waiting: TaskQueue[T],
+        *,
+        channel: ParentChannel | None = None,
+        memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
-        """Do work on tasks and yield what it returns, or the expected error, in the order of finishing."""
+        """Run tasks and yield results or expected errors in completion order."""
         if not waiting:
             return
         self._connect()
@@ -103,15 +108,15 @@ class RayExecutor(Executor):
             for number, task in waiting.give(tuple(idle)):
                 tries[id(task)] += 1
                 lane = idle[number]
-                running[lane.actor.do.remote(work, task, talk is not None)] = (lane, task)
+                running[lane.actor.do.remote(work, task, channel is not None)] = (lane, task)
             if not running and not waiting:
                 return
             done, _ = self._ray.wait([*running, *self._refs], timeout=_LOOK_EVERY_S)
-            if talk:
-                self._hear(talk)
+            if channel:
+                self._pass_messages(channel)
             for reference in done:
                 if reference in self._refs:
-                    self._welcome(reference)
+                    self._on_started(reference)
                     continue
                 lane, task = running.pop(reference)
                 try:
@@ -121,23 +126,23 @@ class RayExecutor(Executor):
                     self._replace(lane)
                     if tries[id(task)] >= _TRIES:
                         raise AerialDojoError(
-                            f"{task.label}: the process that worked at it was lost {_TRIES} times (out of memory, or "
-                            "nodes that went): run again, what was finished is kept"
+                            f"{task.label}: its process was lost {_TRIES} times (out of memory, or "
+                            "lost nodes): run again, finished shards are kept"
                         ) from None
                     waiting.put_back(task)
                 except self._ray.exceptions.RayTaskError as error:
                     raise error.cause from error
                 else:
-                    if talk:
-                        self._hear(talk)
+                    if channel:
+                        self._pass_messages(channel)
                     waiting.on_done(task, outcome)
                     yield outcome
             if not running and time.monotonic() - begun_s > _SAY_AFTER_S:
                 begun_s = float("inf")
-                self._folders.say(f"no process of the cluster has started yet: {self._room()}")
+                self._folders.say(f"no process of the cluster has started yet: {self._free_resources()}")
 
     def close(self) -> None:
-        """End the actors when they have done what they are at."""
+        """End the actors after their current tasks."""
         with contextlib.suppress(Exception):
             ends = [lane.actor.end.remote() for lane in self._lanes if lane.ready]
             if ends:
@@ -145,7 +150,7 @@ class RayExecutor(Executor):
         self.cancel()
 
     def cancel(self) -> None:
-        """End the actors now, and wait until they are gone."""
+        """Kill the actors, and wait for them."""
         self._end_lanes()
         self._stack.close()
 
@@ -157,22 +162,22 @@ class RayExecutor(Executor):
         ray, folders = self._ray, self._folders
         if ray.is_initialized():
             raise UsageError("this process has a Ray cluster already: call ray.shutdown() before")
-        # What a killed command leaves there is removed by the next one that carries an archive.
+        # The next command removes what a killed one leaves there.
         place = _short_folder() if self._address is None else scratch_folder()
         scratch = self._stack.enter_context(place)
         common = {"log_to_driver": False, "logging_level": logging.CRITICAL}
         if self._address is None:
-            own = {"num_cpus": self._asked or own_cores(), "include_dashboard": False, "_temp_dir": str(scratch)}
-            # Their package is this one, where it is: its compiled kernels are used.
+            own = {"num_cpus": self._requested or own_cores(), "include_dashboard": False, "_temp_dir": str(scratch)}
+            # Workers import this package in place, with its compiled kernels.
             python_path = os.pathsep.join(path for path in sys_path() if path)
             options = common | own | {"runtime_env": {"env_vars": {"PYTHONPATH": python_path}}}
         else:
             _check_answers(self._address)
-            archive = scratch / "carried.zip"
-            pack(archive, folders.carried)
+            archive = scratch / "bundle.zip"
+            pack(archive, folders.bundled)
             options = common | {"address": self._address, "runtime_env": {"working_dir": str(archive)}}
         where = f"the Ray cluster at {self._address}" if self._address else "a Ray cluster on this machine"
-        # A machine that has much else to do may not start one within Ray's half a minute, but in the next.
+        # On a loaded machine the first start may exceed Ray's half a minute.
         for left in reversed(range(2 if self._address is None else 1)):
             try:
                 ray.init(**options)
@@ -182,11 +187,11 @@ class RayExecutor(Executor):
                 if not left:
                     self._stack.close()
                     raise AerialDojoError(f"cannot use {where}: {first_line(error)}") from error
-        # Run in the order in which they are not listed: Ray first, then its folder.
+        # Callbacks run in reverse order: Ray first, then its folder.
         self._stack.callback(ray.shutdown)
-        here = ray.get_runtime_context().get_node_id()
-        stay = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(here, soft=False)
-        self._board = ray.remote(MessageBoard).options(num_cpus=0, scheduling_strategy=stay).remote()
+        node_id = ray.get_runtime_context().get_node_id()
+        pin_to_driver = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(node_id, soft=False)
+        self._board = ray.remote(MessageBoard).options(num_cpus=0, scheduling_strategy=pin_to_driver).remote()
         own_names = {name for name in os.environ if _FORWARDED.fullmatch(name)}
         self._expected = Expected(
             seen={
@@ -202,7 +207,7 @@ class RayExecutor(Executor):
         )  # fmt: skip
 
     def _mark(self, folders: Sequence[Path]) -> dict[str, str]:
-        """Put a file into the folders that are written to, for as long as this runs: who works has to see it."""
+        """Put a marker file into the written folders during the run: every node must see it."""
         marks = {}
         for folder in folders:
             item = self._stack.enter_context(staged(folder, folder / "marker"))
@@ -211,7 +216,7 @@ class RayExecutor(Executor):
             marks[str(marker)] = text
         return marks
 
-    def _room(self) -> str:
+    def _free_resources(self) -> str:
         nodes = [node for node in self._ray.nodes() if node["Alive"]]
         free = self._ray.available_resources()
         return f"{len(nodes)} nodes, {free.get('CPU', 0):g} cores and {free.get('memory', 0) / 1e6:,.0f} MB free"
@@ -219,19 +224,19 @@ class RayExecutor(Executor):
     # ----- its processes
 
     def _require(self, memory_mb: int) -> None:
-        """Have no actors with less memory than that."""
+        """Restart the actors if they have less memory."""
         memory_mb = self._possible(memory_mb)
         if memory_mb > self._memory_mb:
             self._end_lanes()
             self._memory_mb = memory_mb
 
     def _grow(self, tasks: int) -> None:
-        """Have as many actors as so many tasks need."""
+        """Start actors for a number of tasks."""
         while len(self._lanes) < min(self.workers, tasks):
             self._add(len(self._lanes))
 
     def _possible(self, memory_mb: int) -> int:
-        """Check that a node can give so much memory; 0 where the cluster does not say what it has."""
+        """Check that a node has that much memory; 0 if the cluster does not report its memory."""
         nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
         most = max((node["memory"] for node in nodes if "memory" in node), default=None)
         if most is None:
@@ -251,8 +256,8 @@ class RayExecutor(Executor):
         self._lanes.append(lane)
         self._refs[lane.actor.hello.remote(self._expected)] = lane
 
-    def _welcome(self, reference: Any) -> None:
-        """Take a process into use that has started, or another one where it has ended since."""
+    def _on_started(self, reference: Any) -> None:
+        """Use a process that has started, or replace it if it has ended since."""
         lane = self._refs.pop(reference)
         try:
             wrong = self._ray.get(reference)
@@ -278,7 +283,7 @@ class RayExecutor(Executor):
         self._add(lane.number)
 
     def _end_lanes(self) -> None:
-        """Kill the actors, and wait until all that they were at has come back as lost."""
+        """Kill the actors, and wait until their tasks are reported lost."""
         if self._lanes and self._ray.is_initialized():
             with contextlib.suppress(Exception):
                 last = [lane.actor.hello.remote(self._expected) for lane in self._lanes if lane.ready]
@@ -289,13 +294,13 @@ class RayExecutor(Executor):
         self._lanes.clear()
         self._refs.clear()
 
-    def _hear(self, talk: ParentChannel) -> None:
-        for message in self._ray.get(self._board.take.remote(talk.stopped())):
-            talk.hear(message)
+    def _pass_messages(self, channel: ParentChannel) -> None:
+        for message in self._ray.get(self._board.take.remote(channel.stopped())):
+            channel.on_message(message)
 
 
 def _check_answers(address: str) -> None:
-    """Find out in five seconds what Ray needs a minute for, and then says in its own words."""
+    """Check the address in five seconds; Ray's own check takes a minute."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     try:
         socket.create_connection((host, int(port)), timeout=5.0).close()
@@ -307,7 +312,7 @@ def _check_answers(address: str) -> None:
 
 @contextlib.contextmanager
 def _short_folder() -> Iterator[Path]:
-    # Ray's sockets lie in it, and their paths have room for 107 characters.
+    # Ray's sockets are in it, and socket paths are limited to 107 characters.
     folder = Path(tempfile.mkdtemp(prefix="ad-ray-"))
     try:
         yield folder
@@ -316,14 +321,14 @@ def _short_folder() -> Iterator[Path]:
 
 
 def sys_path() -> list[str]:
-    """Return where this process imports from, absolute."""
+    """Return this process's import path, absolute."""
     import sys
 
     return [os.path.abspath(path) for path in sys.path]
 
 
 def _required() -> set[str]:
-    """Names of the distributions that the package needs, without its extras."""
+    """Names of the package's required distributions, without extras."""
     try:
         texts = metadata.requires("aerialdojo-gen") or []
     except metadata.PackageNotFoundError:
@@ -332,6 +337,6 @@ def _required() -> set[str]:
 
 
 def last_line(error: BaseException) -> str:
-    """Return the last line of an error's text, where Ray says the cause."""
+    """Return the last line of an error's text, in which Ray gives the cause."""
     lines = str(error).strip().splitlines()
     return lines[-1][:300] if lines else type(error).__name__

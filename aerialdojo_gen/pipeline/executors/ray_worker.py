@@ -1,7 +1,4 @@
-"""What runs on a Ray cluster: the actor that does one task after the other, and the one that passes messages.
-
-Ray itself is imported only where it runs.
-"""
+"""The actors on a Ray cluster: one runs tasks, one passes messages. Ray is imported only where it runs."""
 
 from __future__ import annotations
 
@@ -19,14 +16,14 @@ from aerialdojo_gen.pipeline.executors.base import guarded
 from aerialdojo_gen.pipeline.executors.bundled import Unpacked
 from aerialdojo_gen.pipeline.executors.link import RateLimiter, end
 
-_ASK_EVERY_S = 0.5
+_POLL_EVERY_S = 0.5
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What a machine must see and have to work."""
+    """What a machine must have to run tasks."""
 
-    seen: Mapping[str, str]  # Folders, with what `listing` gives of them
+    seen: Mapping[str, str]  # Folders, with their `listing`
     marked: Mapping[str, str]  # Files, with their text
     versions: Mapping[str, str]  # Libraries by the name of their distribution
     environment: Mapping[str, str]
@@ -36,7 +33,7 @@ class Expected:
 
 
 def listing(folder: Path) -> str:
-    """Digest the names in a folder that are not hidden; empty where there is no such folder."""
+    """Digest the names of a folder's visible files; empty if there is no such folder."""
     try:
         names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     except OSError:
@@ -56,14 +53,14 @@ def versions(names: Mapping[str, str] | set[str]) -> dict[str, str]:
 
 
 class Worker:
-    """Does tasks, one at a time; Ray makes an actor of it, a process each."""
+    """Runs tasks, one at a time; a Ray actor in its own process."""
 
     def __init__(self, board: Any) -> None:
-        self._link = BoardLink(board)
+        self._channel = BoardChannel(board)
         self._unpacked = Unpacked(Path(__file__).resolve().parents[3])
 
     def hello(self, expected: Expected) -> str:
-        """Say what is wrong with this machine; nothing where it can work."""
+        """Return what this machine lacks; empty if it can run tasks."""
         os.environ.update(expected.environment)
         where = f"node {socket.gethostname()}"
         for path, text in expected.marked.items():
@@ -76,24 +73,26 @@ class Worker:
         for folder, digest in expected.seen.items():
             if listing(Path(folder)) != digest:
                 return f"{where} does not see {folder}, or another one of that name: {_SHARE}"
-        here = versions(expected.versions)
-        other = [f"{n} {here[n]}, not {v}" for n, v in sorted(expected.versions.items()) if here[n] != v]
-        if other:
-            return f"{where} has {'; '.join(other)}: install what constraints.txt pins on every node"
+        installed = versions(expected.versions)
+        mismatches = [
+            f"{n} {installed[n]}, not {v}" for n, v in sorted(expected.versions.items()) if installed[n] != v
+        ]
+        if mismatches:
+            return f"{where} has {'; '.join(mismatches)}: install what constraints.txt pins on every node"
         return ""
 
-    def do(self, work: Callable[..., Any], task: Any, linked: bool) -> Any:
-        """Do work on a task; an expected error is returned."""
+    def do(self, work: Callable[..., Any], task: Any, has_channel: bool) -> Any:
+        """Run a task; an expected error is returned."""
         moved = getattr(task, "moved", None)
         if moved is not None:
             task = moved(self._unpacked.place)
         try:
-            return guarded(work, task, self._link if linked else None)
+            return guarded(work, task, self._channel if has_channel else None)
         finally:
-            self._link.flush()
+            self._channel.flush()
 
     def end(self) -> None:
-        """Close what the tasks have kept open."""
+        """Close what the tasks have left open."""
         end()
 
 
@@ -106,25 +105,25 @@ def _above_marker(path: str) -> Path:
 
 
 class MessageBoard:
-    """Keeps what workers tell until the driver takes it; Ray makes an actor of it."""
+    """Keeps workers' messages until the driver fetches them; a Ray actor."""
 
     def __init__(self) -> None:
-        self._told: list[object] = []
+        self._messages: list[object] = []
         self._stopped = False
         self._turns = RateLimiter()
 
-    def tell(self, message: object) -> None:
+    def send(self, message: object) -> None:
         """Keep a message."""
-        self._told.append(message)
+        self._messages.append(message)
 
     def take(self, stop: bool) -> list[object]:
-        """Give out the messages, and hear whether workers are to begin nothing more."""
+        """Return the messages, and set whether workers must start nothing more."""
         self._stopped = stop
-        told, self._told = self._told, []
-        return told
+        messages, self._messages = self._messages, []
+        return messages
 
     def stopped(self) -> bool:
-        """Whether workers are to begin nothing more."""
+        """Whether workers must start nothing more."""
         return self._stopped
 
     def turn(self, interval_s: float) -> float:
@@ -132,19 +131,19 @@ class MessageBoard:
         return self._turns.take(interval_s, time.monotonic())
 
 
-class BoardLink:
-    """A worker's link by way of the board."""
+class BoardChannel:
+    """A worker's channel through the message board."""
 
     every_s = 0.5
 
     def __init__(self, board: Any) -> None:
         self._board = board
         self._last: Any = None
-        self._asked_s, self._stopped = -1e9, False
+        self._polled_s, self._stopped = -1e9, False
 
-    def tell(self, message: object) -> None:
+    def send(self, message: object) -> None:
         """Send a small message."""
-        self._last = self._board.tell.remote(message)
+        self._last = self._board.send.remote(message)
 
     def flush(self) -> None:
         """Wait until what was sent has arrived."""
@@ -153,10 +152,10 @@ class BoardLink:
             self._last = None
 
     def stopped(self) -> bool:
-        """Whether the parent wants nothing more to be begun, as of half a second ago at most."""
-        if time.monotonic() - self._asked_s > _ASK_EVERY_S:
+        """Whether the parent has asked to start nothing more; at most half a second old."""
+        if time.monotonic() - self._polled_s > _POLL_EVERY_S:
             self._stopped = _get(self._board.stopped.remote())
-            self._asked_s = time.monotonic()
+            self._polled_s = time.monotonic()
         return self._stopped
 
     def turn(self, interval_s: float) -> float:

@@ -1,4 +1,4 @@
-"""What a scorer sees of a viewpoint, and what it says of it."""
+"""Input and interface of scorers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class AnchorView:
     shown: float  # Share of the object that the picture tells, in [0, 1] (`aerialdojo_gen.geometry.viewpoints.Views`)
     elevation_deg: float  # Of the viewpoint, seen from the object's centroid
     clearance_m: float  # From the viewpoint to the nearest surface
-    told: tuple[float, ...] = ()
+    part_visibility: tuple[float, ...] = ()
     off_front_rad: float | None = None
     framed: float = 1.0
     nearer: NDArray[np.bool_] | None = None  # (H, W) bool or None
@@ -36,12 +36,12 @@ class AnchorView:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of a candidate anchor before it is pictured."""
+    """Measurements of a candidate anchor before it is pictured."""
 
     shown: float  # See `AnchorView`
     elevation_deg: float
     clearance_m: float
-    told: tuple[float, ...]  # By ray casts: at least what the picture's would be
+    part_visibility: tuple[float, ...]  # By ray casts: at least what the picture's would be
     off_front_rad: float | None
     framed: float  # See `AnchorView`: from here, and from behind, None where there is no picture from there
     framed_behind: float | None

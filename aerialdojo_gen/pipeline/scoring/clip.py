@@ -104,9 +104,9 @@ def _session(onnxruntime: Any, path: Path) -> Any:
         raise AssetError(f"{path} is no ONNX model that onnxruntime can read: {error}") from None
 
 
-def _run(session: Any, feed: dict[str, NDArray[Any]], wanted: str) -> NDArray[np.float64]:
+def _run(session: Any, feed: dict[str, NDArray[Any]], output: str) -> NDArray[np.float64]:
     outputs = [o.name for o in session.get_outputs()]
-    name = wanted if wanted in outputs else outputs[0]
+    name = output if output in outputs else outputs[0]
     try:
         return np.asarray(session.run([name], feed)[0], dtype=np.float64)
     except Exception as error:  # as above

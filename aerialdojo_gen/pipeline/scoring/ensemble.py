@@ -1,4 +1,4 @@
-"""The scorers that a configuration asks for, and how their opinions make one score."""
+"""The configured scorers, and the weighted mean of their scores."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SCORERS = ("geometric", "clip", "vlm")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the panel says of a view."""
+    """The ensemble's result for a view."""
 
-    score: float  # Mean of the scorers that have an opinion, weighted; in [0, 1]
+    score: float  # Weighted mean of the scorers that gave a score; in [0, 1]
     parts: dict[str, float | None]
 
 
@@ -46,14 +46,14 @@ class ScorerEnsemble:
             self._weighted.append((weights.vlm, VlmScorer(config.vlm)))
 
     def judge(self, name: str, views: Sequence[AnchorView]) -> list[Verdict]:
-        """Ask all scorers."""
+        """Run all scorers."""
         if not views:
             return []
         opinions = {scorer.name: (weight, scorer.score(name, views)) for weight, scorer in self._weighted}
         verdicts = []
         for k in range(len(views)):
-            said = [(weight, scores[k]) for weight, scores in opinions.values()]
-            known = [(weight, score) for weight, score in said if score is not None]
+            opinions_of_view = [(weight, scores[k]) for weight, scores in opinions.values()]
+            known = [(weight, score) for weight, score in opinions_of_view if score is not None]
             total = sum(weight for weight, _ in known)
             parts = {f"score_{name}": opinions[name][1][k] if name in opinions else None for name in SCORERS}
             verdicts.append(Verdict(sum(w * s for w, s in known) / total if total else 0.0, parts))
@@ -62,5 +62,5 @@ class ScorerEnsemble:
 
 @lru_cache(maxsize=2)
 def scorer_ensemble(config: AnchorSampleConfig, radius_m: float) -> ScorerEnsemble:
-    """Return the panel of a configuration, kept in memory: a model takes seconds to load."""
+    """Return the ensemble of a configuration, cached: a model takes seconds to load."""
     return ScorerEnsemble(config, radius_m)

@@ -19,16 +19,16 @@ WEIGHTS = {
     "unoccluded": 0.25, "shown": 0.25, "size": 0.1, "centred": 0.1, "contrast": 0.05, "sky": 0.025, "level": 0.1,
     "clear": 0.125,
 }  # fmt: skip
-# The weighted mean is multiplied by the `clarity_score` (module knowing) of these, of `unoccluded` and of `level`.
+# The weighted mean is multiplied by the `clarity_score` of these, of `unoccluded` and of `level`.
 FACTORS = ("framed", "open")
 
-# Of a term of the picture, what is that of the reference picture where this is taken from further back.
+# Share of the reference picture in a term, if it is taken from further back.
 _BEHIND = 0.7
 # Full marks from half of the picture's edge on, and from this CIE76 difference on: orange on grey asphalt has 60.
 _FULL_SIZE, _FULL_CONTRAST = 0.5, 50.0
-# A view is judged by the scorer, and again for what the table says of it.
+# A view is scored by the scorer, and again for the table's columns.
 _TAKEN: WeakKeyDictionary[AnchorView, dict[str, Any]] = WeakKeyDictionary()
-# More than the sums of a score round by.
+# Above the rounding error of a score.
 _ROUNDING = 1e-9
 # What surrounds the object: as far as this share of the picture's edge.
 _RING = 1 / 16
@@ -95,7 +95,7 @@ def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, st
     level = float(level_marks(known.elevation_deg))
     room = standoff_m - radius_m
     clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
-    tells = float(part_score(np.array([known.told]))[0]) if known.told else None
+    tells = float(part_score(np.array([known.part_visibility]))[0]) if known.part_visibility else None
     off = front_score(None if known.off_front_rad is None else np.array([known.off_front_rad]))
     return Parts(
         shown=known.shown,

@@ -1,4 +1,4 @@
-"""What a viewpoint is worth for telling what an object is: its front, and the parts that make its name true."""
+"""How recognisable an object is from a viewpoint: its front and its identifying parts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ TELLS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
 _ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 
 
-def part_score(told: Floats) -> Floats:
+def part_score(part_visibility: Floats) -> Floats:
     """Score how well identifying parts (n, t), 0 to 1, are seen: half the worst one, half their mean."""
-    return np.asarray((told.min(axis=1) + told.mean(axis=1)) / 2.0)
+    return np.asarray((part_visibility.min(axis=1) + part_visibility.mean(axis=1)) / 2.0)
 
 
 def front_score(off_front_rad: Floats | None) -> Floats | None:

@@ -38,7 +38,7 @@ def take_view(
     shown: float,
     elevation_deg: float,
     clearance_m: float,
-    told: Sequence[float] = (),
+    part_visibility: Sequence[float] = (),
     tells: Sequence[NDArray[np.int64]] = (),
     off_front_rad: float | None = None,
     framed: float = 1.0,
@@ -58,7 +58,9 @@ def take_view(
     if len(hidden):
         silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
     shares = part_shares(alone, thing, tells, camera, pose, visible)
-    marks = tuple(seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(told, shares, strict=True))
+    marks = tuple(
+        seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(part_visibility, shares, strict=True)
+    )
     return AnchorView(
         picture.rgb,
         visible,
@@ -87,10 +89,10 @@ def standing_nearer(
     if not visible.any():
         return np.zeros_like(visible)
     nearer = (depth < _NEARER * np.percentile(depth[visible], 2.0)) & ~visible
-    asked = np.flatnonzero(nearer & wide)
-    if len(asked):
+    to_check = np.flatnonzero(nearer & wide)
+    if len(to_check):
         turn = np.ascontiguousarray(world_from_camera[:3, :3])
-        nearer.flat[asked] = ~_level(asked, depth, pixel_rays(camera)[0].reshape(*depth.shape, 3), turn)
+        nearer.flat[to_check] = ~_level(to_check, depth, pixel_rays(camera)[0].reshape(*depth.shape, 3), turn)
     return np.asarray(nearer)
 
 

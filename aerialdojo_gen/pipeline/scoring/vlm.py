@@ -27,16 +27,16 @@ _ASK = (
     'The object: "{name}". There are {n} pictures, numbered 1 to {n} in the order in which they were shown. Put all '
     'of them in order, the best first: {{"order": [...]}} with each of the numbers 1 to {n} once.'
 )
-_AGAIN = "That is not what was asked for ({why}). Answer with the JSON object alone."
-# What wraps an answer without being part of it.
+_RETRY = "That is not what was asked for ({why}). Answer with the JSON object alone."
+# Wrappers around an answer.
 _WRAPPED = re.compile(r"\A\s*(?:<think>.*?</think>)?\s*(?:```(?:json)?[ \t]*\n)?(.*?)(?:\n?```)?\s*\Z", re.DOTALL)
 
 
 class VlmScorer:
     """Scores by the order that a model answers with; see `aerialdojo_gen.pipeline.scoring.base.Scorer`.
 
-    The best has 1, the worst 0, the others are spaced evenly between. An answer that is no order is asked for once
-    more; after that the scorer has no opinion, and says so in the log.
+    The best has 1, the worst 0, the others are spaced evenly between. After an invalid answer the request is
+    repeated once; then the scorer gives no score, and logs it.
     """
 
     name = "vlm"
@@ -56,17 +56,20 @@ class VlmScorer:
             content.append({"type": "text", "text": f"Picture {k}:"})
             content.append({"type": "image_url", "image_url": {"url": picture.data_url}})
         content.append({"type": "text", "text": _ASK.format(name=name, n=n)})
-        said: list[dict[str, Any]] = [{"role": "system", "content": _SYSTEM}, {"role": "user", "content": content}]
+        messages: list[dict[str, Any]] = [
+            {"role": "system", "content": _SYSTEM},
+            {"role": "user", "content": content},
+        ]
         why = ""
         for _ in range(2):
-            text = self._ask(said)
+            text = self._complete(messages)
             try:
                 order = read_order(text, n)
             except ValueError as error:
                 why = str(error)
-                said += [
+                messages += [
                     {"role": "assistant", "content": text},
-                    {"role": "user", "content": _AGAIN.format(why=why)},
+                    {"role": "user", "content": _RETRY.format(why=why)},
                 ]
                 continue
             scores: list[float | None] = [None] * n
@@ -76,14 +79,16 @@ class VlmScorer:
         log.warning("the model gave no order for %s: %s", name, why)
         return [None] * n
 
-    def _ask(self, said: list[dict[str, Any]]) -> str:
+    def _complete(self, messages: list[dict[str, Any]]) -> str:
         # OpenAI's newer models take no max_tokens, many other servers nothing else.
         limit = "max_completion_tokens" if self._service.base_url is None else "max_tokens"
         body: dict[str, Any] = {limit: self._config.max_tokens}
         if self._config.temperature is not None:
             body["temperature"] = self._config.temperature
         completion = self._service.call(
-            lambda client: client.chat.completions.create(model=self._config.model, messages=said, extra_body=body)
+            lambda client: client.chat.completions.create(
+                model=self._config.model, messages=messages, extra_body=body
+            )
         )
         choices = getattr(completion, "choices", None)
         message = getattr(choices[0], "message", None) if isinstance(choices, list) and choices else None

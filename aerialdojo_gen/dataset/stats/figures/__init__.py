@@ -27,7 +27,7 @@ def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]
         "shares": shares(routes),
         "lengths": lengths(routes),
         "detours": detours(routes),
-        **({"difficulty": difficulty(tasks)} if tasks.told else {}),
+        **({"difficulty": difficulty(tasks)} if tasks.has_columns else {}),
         "categories": categories(root, scenes),
         "names": names(root, scenes),
         "maps": maps(root, scenes),

@@ -1,4 +1,4 @@
-"""Anchors that people chose: whether one will do, and its place among the sampled ones."""
+"""Anchors chosen by a person: their checks, and their rank among the sampled anchors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World
 
 Floats = NDArray[np.float64]
 
-# "About" a metre: a person places by hand, and the surface there may be a branch.
+# Tolerance of the distance for hand-placed anchors.
 SLACK_M = 0.5
 # Files hold millimetres and hundredths of a degree.
 _SAME_M, _SAME_RAD = 2e-3, math.radians(0.02)
@@ -32,10 +32,10 @@ _SAME_M, _SAME_RAD = 2e-3, math.radians(0.02)
 
 @dataclass(frozen=True)
 class Judged:
-    """A viewpoint as the checks of anchors see it."""
+    """Result of the checks of a viewpoint."""
 
     row: dict[str, Any]
-    faults: tuple[str, ...]  # Why it will not do, in words; empty where it will
+    faults: tuple[str, ...]  # Messages; empty if it is valid
 
 
 def judge_anchor(
@@ -74,16 +74,16 @@ def judge_anchor(
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    looked = CandidateViews.of(found, np.zeros(1, np.int64), radius, config)
-    (picture,) = looked.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
+    candidate_views = CandidateViews.of(found, np.zeros(1, np.int64), radius, config)
+    (picture,) = candidate_views.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {
         "scene": job.scene,
         "object_id": item["object_id"],
         **found.row(0, distance),
         "no_front_reason": None,
-        "step_back_m": float(looked.step_back_m[0]),
-        # The other scorers compare candidates, and this one stands alone.
+        "step_back_m": float(candidate_views.step_back_m[0]),
+        # The other scorers compare candidates; there is only one here.
         "score": parts.score,
         **{f"score_{name}": parts.score if name == "geometric" else None for name in SCORERS},
         **parts.columns,
@@ -100,7 +100,7 @@ def with_choice(
     job: Job,
     config: AnchorSampleConfig,
 ) -> list[dict[str, Any]]:
-    """Put the anchor that a person chose first among an object's anchors, and select it."""
+    """Put the chosen anchor first among an object's anchors, and select it."""
     same = [row for row in rows if is_same(row, choice)]
     if same:
         first = same[0]
@@ -131,7 +131,7 @@ def _off_front(row: dict[str, Any]) -> str | None:
 
 
 def is_same(row: dict[str, Any], choice: dict[str, Any]) -> bool:
-    """Whether a choice is that sampled anchor, as far as the annotation file's digits tell."""
+    """Whether a choice equals a sampled anchor to the annotation file's precision."""
     turn = abs(float(wrap_angle_rad(row["yaw_rad"] - choice["yaw_rad"])))
     return turn <= _SAME_RAD and math.dist(
         [row[a] for a in ("x_m", "y_m", "z_m")], [choice[a] for a in ("x_m", "y_m", "z_m")]

@@ -1,4 +1,4 @@
-"""The pictures that candidates are scored by: from where they are, and from where the reference picture is taken."""
+"""Pictures for scoring candidates: from the candidate itself, and from the pulled-back reference camera."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from aerialdojo_gen.pipeline.stages.work.camera_pullback import steps_back_m, te
 
 Floats = NDArray[np.float64]
 
-# Models that look at pictures are made for such.
+# Least picture size for models.
 _LOOKED_AT_PX = 320
 
 
 @dataclass(frozen=True)
 class CandidateViews:
-    """Candidates of an object, each with the place behind it that its reference picture is taken from."""
+    """Candidates of an object, each with the pulled-back camera of its reference picture."""
 
     found: Candidates  # All of the object
-    which: NDArray[np.int64]  # (k,) int64; those that are meant
-    step_back_m: Floats  # (k,) float64; how far behind each the picture is taken
-    behind: Candidates  # From there
-    rank: Floats  # (k,) float64; score of the ray casts from both places
+    which: NDArray[np.int64]  # (k,) int64; rows of `found`
+    step_back_m: Floats  # (k,) float64; camera pullback, metres
+    behind: Candidates  # The pulled-back positions
+    rank: Floats  # (k,) float64; ray-cast score of both positions
 
     @classmethod
     def of(
@@ -62,8 +62,8 @@ class CandidateViews:
         view = self.found.picture(int(self.which[n]), size_px, fov_deg)
         if self.has_back(n):
             back = back or self.behind.picture(n, size_px, fov_deg)
-            told = _mean(view.told, back.told)
-            view = replace(view, shown=(view.shown + back.shown) / 2.0, told=told, behind=back)
+            part_visibility = _mean(view.part_visibility, back.part_visibility)
+            view = replace(view, shown=(view.shown + back.shown) / 2.0, part_visibility=part_visibility, behind=back)
         return view
 
     def has_back(self, n: int) -> bool:
@@ -76,15 +76,17 @@ class CandidateViews:
         Where there is one from behind it already, the bound is that much tighter.
         """
         k, found, behind = int(self.which[n]), self.found, self.behind
-        shown, told = float(found.views.shown[k]), tuple(found.told[k].tolist())
+        shown, part_visibility = float(found.views.shown[k]), tuple(found.part_visibility[k].tolist())
         if self.has_back(n):
             shown = (shown + float(behind.views.shown[n])) / 2.0
-            told = _mean(told, behind.told[n].tolist() if back is None else back.told)
+            part_visibility = _mean(
+                part_visibility, behind.part_visibility[n].tolist() if back is None else back.part_visibility
+            )
         known = Known(
             shown,
             float(found.elevation_deg[k]),
             float(found.clearance_m[k]),
-            told,
+            part_visibility,
             None if found.off_front_rad is None else float(found.off_front_rad[k]),
             float(found.views.framed[k]),
             float(behind.views.framed[n]) if self.has_back(n) else None,
@@ -94,7 +96,7 @@ class CandidateViews:
 
 def best_pictured(
     name: str,
-    looked: CandidateViews,
+    candidate_views: CandidateViews,
     few: NDArray[np.int64],
     azimuth_rad: Floats,
     front: NDArray[np.bool_],
@@ -105,30 +107,30 @@ def best_pictured(
 
     Indices (k,) into `few` and their verdicts.
     """
-    scorers, apart = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
+    scorers, separation_rad = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
     weights = config.weights
     if weights.clip or weights.vlm:
-        views = looked.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)
+        views = candidate_views.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)
         found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
         score = np.array([verdict.score for _, verdict in found.values()])
     else:
         found = {}
-        score = np.array([looked.most(n, radius_m, config.standoff_m) for n in few.tolist()])
+        score = np.array([candidate_views.most(n, radius_m, config.standoff_m) for n in few.tolist()])
     backs: dict[int, AnchorView] = {}
     while True:
-        # A choice among scores and bounds is that among scores, as soon as it falls on scores alone.
-        best = shortlist(score, azimuth_rad, config.shortlist, apart, front)
-        chosen = (*shortlist(score, azimuth_rad, config.shortlist, apart).tolist(), *best.tolist())
+        # A shortlist of exact scores only is final: bounds are never below scores.
+        best = shortlist(score, azimuth_rad, config.shortlist, separation_rad, front)
+        chosen = (*shortlist(score, azimuth_rad, config.shortlist, separation_rad).tolist(), *best.tolist())
         open_ones = [n for n in chosen if n not in found]
         if not open_ones:
             return best, [found[n] for n in best.tolist()]
         n = open_ones[0]
         which = int(few[n])
-        if looked.has_back(which) and n not in backs:
-            backs[n] = looked.behind.picture(which, config.picture_px, config.fov_deg)
-            score[n] = looked.most(which, radius_m, config.standoff_m, backs[n])
+        if candidate_views.has_back(which) and n not in backs:
+            backs[n] = candidate_views.behind.picture(which, config.picture_px, config.fov_deg)
+            score[n] = candidate_views.most(which, radius_m, config.standoff_m, backs[n])
             continue
-        view = looked.picture(which, config.picture_px, config.fov_deg, backs.get(n))
+        view = candidate_views.picture(which, config.picture_px, config.fov_deg, backs.get(n))
         found[n] = view, scorers.judge(name, [view])[0]
         score[n] = found[n][1].score
 

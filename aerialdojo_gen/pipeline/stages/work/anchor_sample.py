@@ -116,15 +116,17 @@ def shortlisted(
     away = found.positions_m - world.scene.instances[found.instance].centroid
     azimuth = np.arctan2(away[:, 1], away[:, 0])
     front = found.before_front
-    apart = math.radians(config.separation_deg)
+    separation_rad = math.radians(config.separation_deg)
     pictured = max(config.pictured, config.shortlist)
     # Several a side: what stands before the object from one place does not from the next.
     looked_at = seen[np.argsort(-found.rank[seen], kind="stable")[: _LOOKED_AT * pictured]]
-    of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, apart, front[seen])]
-    looked = CandidateViews.of(found, np.union1d(looked_at, of_sides), radius, config)
-    of_looked = shortlist(looked.rank, azimuth[looked.which], pictured, apart, front[looked.which])
-    few, backs = looked.which[of_looked], looked.step_back_m[of_looked].tolist()
-    best, shown = best_pictured(item["name"], looked, of_looked, azimuth[few], front[few], radius, config)
+    of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, separation_rad, front[seen])]
+    candidate_views = CandidateViews.of(found, np.union1d(looked_at, of_sides), radius, config)
+    of_looked = shortlist(
+        candidate_views.rank, azimuth[candidate_views.which], pictured, separation_rad, front[candidate_views.which]
+    )
+    few, backs = candidate_views.which[of_looked], candidate_views.step_back_m[of_looked].tolist()
+    best, shown = best_pictured(item["name"], candidate_views, of_looked, azimuth[few], front[few], radius, config)
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
     why = None
     if len(best) and front[seen].any() and not front[few[best[0]]]:

@@ -1,4 +1,4 @@
-"""A scene as anchors are judged in it: what collides, what is reachable, what is seen."""
+"""Collision, reachability and visibility of candidate anchors in a scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LEAST_POINTS = 32
 
 @dataclass(frozen=True)
 class World:
-    """A scene, and what is asked of it for every object."""
+    """A scene with its collision world, clearance grid and ray caster."""
 
     scene: Scene  # The scene
     collisions: CollisionWorld  # For collision and clearance
@@ -40,7 +40,7 @@ class World:
 
     @classmethod
     def of(cls, scene: Scene, radius_m: float, margin_m: float) -> World:
-        """Build it all for a body of a radius that keeps a margin to surfaces."""
+        """Build them for a body radius and a margin to surfaces."""
         return cls(
             scene,
             collision_world(scene),
@@ -54,14 +54,14 @@ class World:
         return self.collisions.distance_m(position_m, self.free.nearest(position_m).tolist())
 
     def ball_collides(self, position_m: Floats, radius_m: float) -> bool:
-        """Whether a ball in the flight volume touches a surface: FCL is asked where the grid cannot tell."""
+        """Whether a ball in the flight volume touches a surface; FCL decides where the grid cannot."""
         proven = self.free.ball_proven_free(position_m, radius_m)
         return not proven and self.collisions.sphere_in_collision(position_m, radius_m)
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Viewpoints of one object, and what ray casts tell of them."""
+    """Viewpoints of one object with their ray-cast measurements."""
 
     world: World
     instance: int  # The object's index in the scene
@@ -75,7 +75,7 @@ class Candidates:
     points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
     patches: tuple[Patch, ...]  # Points of each of the object's identifying parts
     seen: Floats  # Share that they see of each of those parts (`part_visibility.visible_shares`)
-    told: Floats  # (n, t) float64
+    part_visibility: Floats  # (n, t) float64
     off_front_rad: Floats | None  # (n,) float64 or None
     rank: Floats  # (n,) float64; score of the ray casts alone, which decides what is pictured at all
 
@@ -105,14 +105,16 @@ class Candidates:
         away = positions_m - thing.centroid
         elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
         rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
-        told = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
+        part_visibility = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
         off_front = None
         if thing.anatomy is not None and thing.anatomy.fronts_rad:
             off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
-        rank = recognisability(rank, part_score(told) if told.shape[1] else None, front_score(off_front))
+        rank = recognisability(
+            rank, part_score(part_visibility) if part_visibility.shape[1] else None, front_score(off_front)
+        )
         return cls(
             world, instance, alone, positions_m, yaw_rad, elevation, clearance, sight, views, points, patches, seen,
-            told, off_front, rank,
+            part_visibility, off_front, rank,
         )  # fmt: skip
 
     def moved(
@@ -169,7 +171,7 @@ class Candidates:
             shown=float(self.views.shown[k]),
             elevation_deg=float(self.elevation_deg[k]),
             clearance_m=float(self.clearance_m[k]),
-            told=tuple(float(share) for share in self.told[k]),
+            part_visibility=tuple(float(share) for share in self.part_visibility[k]),
             tells=tells_of(self.world.scene.instances[self.instance]),
             off_front_rad=None if self.off_front_rad is None else float(self.off_front_rad[k]),
             framed=float(self.views.framed[k]),
@@ -196,7 +198,7 @@ def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
 def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]:
     """Points of each of an instance's telling parts, drawn by the number of its surface's points."""
     thing = world.scene.instances[instance]
-    # The same points whoever asks: the draw hangs on nothing but the node.
+    # The draw depends on scene and node only.
     rng = generator(0, "anchor-sample", world.scene.name, thing.node)
     n = max(_LEAST_POINTS, len(points) // 4)
     return tuple(

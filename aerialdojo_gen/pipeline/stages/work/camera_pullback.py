@@ -73,24 +73,24 @@ def steps_back_m(
     steps = np.zeros(len(positions_m))
     vertices = world.scene.instances[instance].vertices
     fitting = [fitting_m(vertices, p, yaw, fov_deg) for p, yaw in zip(positions_m, yaw_rad.tolist(), strict=True)]
-    wanted = np.minimum(fitting, most_m)
-    some = np.flatnonzero(wanted >= _WORTH_M)
+    distance_m = np.minimum(fitting, most_m)
+    some = np.flatnonzero(distance_m >= _WORTH_M)
     if not len(some):
         return steps
-    wanted, places, yaws = wanted[some], positions_m[some], yaw_rad[some]
+    distance_m, places, yaws = distance_m[some], positions_m[some], yaw_rad[some]
     back = -np.array([[math.cos(yaw), math.sin(yaw), 0.0] for yaw in yaws.tolist()])
     free = world.rays.first_hit(places, back)[0] - _KEPT_M
     low, high = world.scene.bounds
     with np.errstate(divide="ignore", invalid="ignore"):
         edges = np.where(back != 0.0, (np.where(back > 0, high, low) - places) / back, np.inf)
-    wanted = np.minimum(np.minimum(wanted, free), edges.min(axis=1) - _CAMERA_M)
-    far = wanted >= _WORTH_M
-    some, wanted, places, yaws, back = some[far], wanted[far], places[far], yaws[far], back[far]
+    distance_m = np.minimum(np.minimum(distance_m, free), edges.min(axis=1) - _CAMERA_M)
+    far = distance_m >= _WORTH_M
+    some, distance_m, places, yaws, back = some[far], distance_m[far], places[far], yaws[far], back[far]
     best, chosen = np.full(len(some), -np.inf), np.zeros(len(some))
     # From the farthest on, so that of equals the farthest is taken, which leaves room around it; the anchor's own
     # place is asked last, and taken only where it is the better one.
     for share in (*_TRIED, 0.0):
-        tried = np.floor(100.0 * share * wanted) / 100.0
+        tried = np.floor(100.0 * share * distance_m) / 100.0
         # What sees all of the points cannot be bettered, and casts no more rays.
         left = np.flatnonzero(best < len(points))
         if not len(left):

@@ -1,4 +1,4 @@
-"""What `filter` kept of each scene, beside what the paper wants of it."""
+"""How many candidates `filter` kept of each scene, compared with the paper's counts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aerialdojo_gen.store.schemas import SETTINGS
 
 @dataclass(frozen=True)
 class Pool:
-    """What `filter` kept of a scene, and what the paper wants of it."""
+    """A scene's kept candidates, and the paper's counts."""
 
     scene: str  # Name
     candidates: int
@@ -28,20 +28,20 @@ class Pool:
 
     @property
     def short(self) -> dict[str, int]:
-        """How many tasks each setting lacks; settings that lack none are left out."""
-        wanted = self.paper.tasks if self.paper else {}
-        return {s: n - self.kept[s] for s, n in wanted.items() if self.kept[s] < n}
+        """Missing tasks per setting; settings with enough are left out."""
+        required = self.paper.tasks if self.paper else {}
+        return {s: n - self.kept[s] for s, n in required.items() if self.kept[s] < n}
 
     @property
     def reaches_path(self) -> bool:
-        """Whether a choice of tasks can have the paper's summed length to within 1 %."""
+        """Whether a selection can have the paper's total length to within 1 %."""
         if self.paper is None or self.path_m is None:
             return False
         return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
 
 
 def pool_of(root: Where, scene: str) -> Pool:
-    """Read what `filter` kept of a scene."""
+    """Count the candidates that `filter` kept of a scene."""
     verdicts = store.read_scene(root, "verdicts", scene)
     keep = verdicts["keep"].to_numpy(zero_copy_only=False)
     setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
@@ -59,26 +59,26 @@ def pool_of(root: Where, scene: str) -> Pool:
 
 def require_pools(root: Where, scenes: Sequence[str]) -> None:
     """Raise a `PoolError` that names every scene and setting with fewer kept candidates than the paper has tasks."""
-    lacking = [
+    shortages = [
         f"{pool.scene}: {n} {setting} tasks short: {pool.kept[setting]} are kept, "
         f"the paper has {pool.kept[setting] + n}"
         for pool in (pool_of(root, scene) for scene in scenes)
         for setting, n in pool.short.items()
     ]
-    if lacking:
-        mend = "move objects or obstacles in the recipe, or draft the annotations anew with another --within"
-        raise PoolError("\n".join([*lacking, f"nothing is released; {mend}"]))
+    if shortages:
+        remedy = "move objects or obstacles in the recipe, or draft the annotations anew with another --within"
+        raise PoolError("\n".join([*shortages, f"nothing is released; {remedy}"]))
 
 
 def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
-    """Set pools as a table for the terminal: kept / wanted, and kilometres that a choice can reach."""
+    """Format pools as a table: kept / required, and the range of kilometres that a selection can reach."""
     heads = ["candidates", "judged", *(s.replace("_horizon", "") for s in SETTINGS), "km reachable/paper"]
     rows = []
     for pool in pools:
         cells = [f"{pool.candidates}", f"{pool.judged}"]
         for s in SETTINGS:
-            wanted = f"/{pool.paper.tasks[s]}" if pool.paper else ""
-            cells.append(f"{pool.kept[s]}{wanted}{'!' if s in pool.short else ' '}")
+            required = f"/{pool.paper.tasks[s]}" if pool.paper else ""
+            cells.append(f"{pool.kept[s]}{required}{'!' if s in pool.short else ' '}")
         reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
         paper = f"/{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else " "
         cells.append(reach + paper)

@@ -1,4 +1,4 @@
-"""filter: which candidates become tasks, and a stable reason for every other one."""
+"""`filter`: keep candidates, or reject them with a reason."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 
 def _stops(plans: pa.Table) -> NDArray[np.float64]:
-    """Where routes end without their Approach, which agents have not, (n, 3) float64."""
+    """End positions of routes without the Approach, which agents do not have, (n, 3) float64."""
     starts = np.cumsum([0, *pc.list_value_length(plans["action"]).to_pylist()])
     actions = pc.list_flatten(plans["action"]).to_numpy()
     last = starts[1:] - 1
@@ -29,7 +29,7 @@ def _stops(plans: pa.Table) -> NDArray[np.float64]:
 
 
 def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.bool_]:
-    """Which of some routes end, flown without their Approach, where nothing of the target is in sight."""
+    """Which routes, without their Approach, end where nothing of the target is in sight."""
     if not plans.num_rows:
         return np.zeros(0, dtype=np.bool_)
     objects = job.read("objects").select(["object_id", "mesh_node"])
@@ -44,10 +44,12 @@ def run(job: Job, config: FilterConfig) -> Output:
     And then by what its agent sees at the end (``"target_hidden"``).
     """
     pairs = job.read("pairs")
-    told = [field.name for field in DIFFICULTY]
+    difficulty_names = [field.name for field in DIFFICULTY]
     flown = ["x_m", "y_m", "z_m", "action"]
     plans = (
-        job.read("plans").select(["pair_id", "outcome", "length_m", "n_actions", *told, *flown]).sort_by("pair_id")
+        job.read("plans")
+        .select(["pair_id", "outcome", "length_m", "n_actions", *difficulty_names, *flown])
+        .sort_by("pair_id")
     )
     if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
         raise StoreError(
@@ -75,7 +77,7 @@ def run(job: Job, config: FilterConfig) -> Output:
             "length_m": pa.array(length, mask=~solved),
             "detour_ratio": pa.array(length / np.maximum(euclidean, 1e-12), mask=~solved),
             "n_actions": pa.array(n_actions, pa.int32(), mask=~solved),
-            **{name: plans.column(name) for name in told},
+            **{name: plans.column(name) for name in difficulty_names},
             **{field.name: pairs.column(field.name) for field in START_VIEW},
             "keep": reason == KEPT,
             "reason": pa.array(reason.tolist(), pa.string()),

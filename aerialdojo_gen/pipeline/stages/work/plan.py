@@ -27,19 +27,19 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
 Floats = NDArray[np.float64]
-# Most that the goals' cost-to-go takes between foreseeing and searching, as it is and compressed to a tenth; what
-# does not fit is expanded once more.
+# Memory for goals' cost-to-go fields between estimation and search, plain and compressed to a tenth; fields that do
+# not fit are expanded again.
 _FIELDS_MB = 300.0, 250.0
 
 
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
-    """Return the targets of one shard: a slice of the scene's objects in the order of their ids."""
+    """Return the targets of one shard: a slice of the scene's objects by id."""
     first = part * config.targets_per_part
     return sorted(object_ids)[first : first + config.targets_per_part]
 
 
 def run(job: Job, config: PlanConfig) -> Output:
-    """Plan the candidates of a slice of the scene's targets; where a release is planned for, as many as it needs."""
+    """Plan the candidates of a slice of the scene's targets, or as many as the release needs."""
     paper = paper_scene(job.scene, config)
     targets = job.read("objects")["object_id"].to_pylist()
     if paper is None:
@@ -65,14 +65,14 @@ def run(job: Job, config: PlanConfig) -> Output:
 
 
 def paper_scene(scene: str, config: PlanConfig) -> PaperScene | None:
-    """Return what is released of a scene, where no more than that is searched."""
+    """Return the paper's row of a scene if only released candidates are searched."""
     return inventory().get(scene) if config.search == "released" else None
 
 
 def _by_goal(
     plan: Callable[[Floats, Floats], list[Route]], goals: Floats, starts: Floats, rows: NDArray[np.int64]
 ) -> list[Route]:
-    """Plan some rows of (n, 4) goals and starts, one goal after the other; in the order of `rows`."""
+    """Plan rows of (n, 4) goals and starts, goal by goal; results in the order of `rows`."""
     found: list[Route | None] = [None] * len(rows)
     _, which = np.unique(goals[rows], axis=0, return_inverse=True)
     for goal in range(which.max(initial=-1) + 1):
@@ -91,19 +91,19 @@ def _released(
     config: ReleasedPlanConfig,
     seed: int,
 ) -> list[Route]:
-    """Search what the release needs; the others' outcome is what the goals' cost-to-go tells, or NOT_NEEDED."""
+    """Search the candidates that the release needs; the others get the outcome of the estimate, or NOT_NEEDED."""
     with planner.keeping_fields(*_FIELDS_MB):
         routes = _by_goal(planner.estimate_routes, goals, starts, np.arange(pairs.num_rows))
         open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
         predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)
         free = free_lengths_m(starts, goals[:, :3], config.max_approach_m)
-        draw = CandidatePolicy(Candidates.of(pairs, free, predicted), paper, config, seed)
+        policy = CandidatePolicy(Candidates.of(pairs, free, predicted), paper, config, seed)
         found: list[Route | None] = [None] * len(routes)
-        rows = draw.first()
+        rows = policy.initial_batch()
         while len(rows):
             for row, route in zip(rows.tolist(), _by_goal(planner.plan_target, goals, starts, rows), strict=True):
                 found[row] = route
-            rows = draw.more(found)
+            rows = policy.next_batch(found)
     return [route or foreseen for route, foreseen in zip(found, routes, strict=True)]
 
 
@@ -146,7 +146,7 @@ def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
 
 
 def _difficulty_columns(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
-    """What the table says of the routes there are, null elsewhere: their difficulty, and an agent's actions."""
+    """Difficulty columns and agent actions of solved routes, null elsewhere."""
     solved = [i for i, route in enumerate(routes) if route.outcome == "SOLVED"]
     values: dict[str, Any] = {name: np.empty(0) for name in Difficulty._fields}
     if planner is not None and solved:
@@ -159,17 +159,17 @@ def _difficulty_columns(planner: Planner | None, routes: list[Route], schema: pa
     place = np.full(len(routes), -1)
     place[solved] = np.arange(len(solved))
     rows = pa.array(place, pa.int32(), mask=place < 0)
-    told = {name: pa.array(v, schema.field(name).type).take(rows) for name, v in values.items()}
+    route_columns = {name: pa.array(v, schema.field(name).type).take(rows) for name, v in values.items()}
     flown = [agent_actions(routes[i].actions) for i in solved]
     ends = np.cumsum([0, *map(len, flown)], dtype=np.int32)
     kind = schema.field("agent_action").type
     flat = pa.array(np.concatenate([np.empty(0, np.int8), *flown]), kind.value_type)
-    told["agent_action"] = pa.ListArray.from_arrays(pa.array(ends), flat, type=kind).take(rows)
-    return told
+    route_columns["agent_action"] = pa.ListArray.from_arrays(pa.array(ends), flat, type=kind).take(rows)
+    return route_columns
 
 
 def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planner | None) -> pa.Table:
-    """Put routes into a table; the lists go over as flat arrays, for millions of poses as objects take too long."""
+    """Make a table of routes; lists are passed as flat arrays, since millions of Python objects are slow."""
     ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
     poses = np.concatenate([np.empty((0, 4)), *(r.poses for r in routes)])
     actions = np.concatenate([np.empty(0, np.int8), *(r.actions for r in routes)])

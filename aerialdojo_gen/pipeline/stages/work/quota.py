@@ -1,4 +1,4 @@
-"""The paper's numbers as quotas: which of a scene's kept candidates are released, and how many of them train."""
+"""Selection by the paper's counts: which kept candidates are released, and how many of them train."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from aerialdojo_gen.store.layout import partition
 
 Floats = NDArray[np.float64]
 _HALVINGS = 60
-# Metres over which a tilt of 1 changes a route's odds by e; tilts are searched for between -_STEEPEST and _STEEPEST.
+# Metres over which a tilt of 1 changes a route's odds by e; tilts are searched between -_STEEPEST and _STEEPEST.
 _SCALE_M = 10.0
 _STEEPEST = 1e4
 
 
 def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
-    """Share a total out in proportion to sizes, in whole numbers (largest remainders, ties by name)."""
+    """Apportion a total in proportion to sizes (largest remainders, ties by name)."""
     whole = sum(sizes.values())
     if not whole:
         return dict.fromkeys(sizes, 0)
@@ -37,14 +37,14 @@ def train_quotas(
 ) -> dict[str, int]:
     """Return a scene's share of the paper's training tasks of its partition.
 
-    The shares hang on the paper's figures alone, so that each scene's part of the release can be written on its own.
+    The shares depend on the paper's figures alone, so that each scene can be written separately.
     """
     alike = [row for row in scenes.values() if partition(row.scene) == partition(scene)]
     totals = splits[partition(scene).upper(), "train"]
     return {s: apportion(total, {row.scene: row.tasks[s] for row in alike})[scene] for s, total in totals.items()}
 
 
-def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
+def difficulty_level(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
     """Difficulty level (n,), 0 to 2.
 
     One for a plan detour of `DETOUR` or more, one for a target that the start does not see.
@@ -53,13 +53,13 @@ def difficulty_steps(plan_detour: Floats, visible_at_start: Floats) -> NDArray[n
 
 
 def select_quota(
-    lots: Sequence[str],
+    keys: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
-    wanted: Mapping[str, int],
+    counts: Mapping[str, int],
     path_m: float,
     seed: int,
-    steps: NDArray[np.int64] | Floats | None = None,
+    levels: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> NDArray[np.bool_]:
     """Weighted sample without replacement (Gumbel's trick), (n,) bool.
@@ -67,60 +67,60 @@ def select_quota(
     The counts of each setting hold, lengths sum to `path_m` by tilting the weights, harder tasks are preferred. A
     task's chance depends on its key, length and level, never on its row.
     """
-    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
-    mask = np.zeros(len(lots), dtype=bool)
-    for rows, n in _groups(settings, wanted):
-        mask[_best(scores, place, rows)[:n]] = True
+    scores, tie_rank = _score(keys, settings, length_m, counts, path_m, seed, levels, preference)
+    mask = np.zeros(len(keys), dtype=bool)
+    for rows, n in _groups(settings, counts):
+        mask[_best(scores, tie_rank, rows)[:n]] = True
     return mask
 
 
 def rank_candidates(
-    lots: Sequence[str],
+    keys: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
-    wanted: Mapping[str, int],
+    counts: Mapping[str, int],
     path_m: float,
     seed: int,
-    steps: NDArray[np.int64] | Floats | None = None,
+    levels: NDArray[np.int64] | Floats | None = None,
     preference: float = 0.0,
 ) -> dict[str, NDArray[np.int64]]:
-    """Rows of each setting's tasks in the order in which `select_quota` takes them."""
-    scores, place = _drawn(lots, settings, length_m, wanted, path_m, seed, steps, preference)
-    return {name: _best(scores, place, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(wanted)}
+    """Rows of each setting's tasks in the order of selection by `select_quota`."""
+    scores, tie_rank = _score(keys, settings, length_m, counts, path_m, seed, levels, preference)
+    return {name: _best(scores, tie_rank, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(counts)}
 
 
-def _groups(settings: Sequence[str], wanted: Mapping[str, int]) -> list[tuple[NDArray[np.int64], int]]:
-    return [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(wanted.items())]
+def _groups(settings: Sequence[str], counts: Mapping[str, int]) -> list[tuple[NDArray[np.int64], int]]:
+    return [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(counts.items())]
 
 
-def _best(scores: Floats, place: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def _best(scores: Floats, tie_rank: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Sort rows by their scores, the largest first."""
-    return rows[np.lexsort((place[rows], -scores[rows]))]
+    return rows[np.lexsort((tie_rank[rows], -scores[rows]))]
 
 
-def _drawn(
-    lots: Sequence[str],
+def _score(
+    keys: Sequence[str],
     settings: Sequence[str],
     length_m: Floats,
-    wanted: Mapping[str, int],
+    counts: Mapping[str, int],
     path_m: float,
     seed: int,
-    steps: NDArray[np.int64] | Floats | None,
+    levels: NDArray[np.int64] | Floats | None,
     preference: float,
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """What the tasks have drawn, tilted as the metres need it, (n,) float64; and their places among equals, (n,)."""
-    gumbel_scores = np.array([_gumbel(seed, lot) for lot in lots])
-    if steps is not None:
-        gumbel_scores = gumbel_scores + preference * steps
-    # Ties are broken by the lot, so that the order of rows decides nothing.
-    place = np.argsort(np.argsort(np.asarray(lots)))
-    groups = _groups(settings, wanted)
+    """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`; and the ranks (n,) that break ties."""
+    gumbel_scores = np.array([_gumbel(seed, key) for key in keys])
+    if levels is not None:
+        gumbel_scores = gumbel_scores + preference * levels
+    # Ties are broken by key, not by row order.
+    tie_rank = np.argsort(np.argsort(np.asarray(keys)))
+    groups = _groups(settings, counts)
 
     def tilted(tilt: float) -> Floats:
         return np.asarray(gumbel_scores + tilt * length_m / _SCALE_M)
 
     def total(scores: Floats) -> float:
-        return float(sum(length_m[_best(scores, place, rows)[:n]].sum() for rows, n in groups))
+        return float(sum(length_m[_best(scores, tie_rank, rows)[:n]].sum() for rows, n in groups))
 
     low, high = -_STEEPEST, _STEEPEST
     best = tilted(0.0)
@@ -137,9 +137,9 @@ def _drawn(
             high = middle
         if abs(reached - path_m) <= 1e-4 * path_m:
             break
-    return best, place
+    return best, tie_rank
 
 
-def _gumbel(seed: int, lot: str) -> float:
-    uniform = (rank(seed, "quota", lot) + 0.5) / 2**64
+def _gumbel(seed: int, key: str) -> float:
+    uniform = (rank(seed, "quota", key) + 0.5) / 2**64
     return -math.log(-math.log(uniform))

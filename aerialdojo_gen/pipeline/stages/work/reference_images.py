@@ -121,16 +121,16 @@ def _mended(
     mask = drawn == instance
     shown = mask.astype(np.uint8)
     near = np.ones((2 * _NEAR_PX + 1, 2 * _NEAR_PX + 1), np.uint8)
-    asked = cv2.dilate(shown, near) != cv2.erode(shown, near)
-    asked[::_EVERY_PX, ::_EVERY_PX] = True
+    to_check = cv2.dilate(shown, near) != cv2.erode(shown, near)
+    to_check[::_EVERY_PX, ::_EVERY_PX] = True
     cast = np.zeros_like(mask)
-    while asked.any():
-        cast |= asked
-        says = rays.first_hit(eye, directions[asked])[1] == instance
+    while to_check.any():
+        cast |= to_check
+        hit = rays.first_hit(eye, directions[to_check])[1] == instance
         wrong = np.zeros_like(shown)
-        wrong[asked] = says != mask[asked]
-        mask[asked] = says
-        asked = (cv2.dilate(wrong, near) > 0) & ~cast
+        wrong[to_check] = hit != mask[to_check]
+        mask[to_check] = hit
+        to_check = (cv2.dilate(wrong, near) > 0) & ~cast
     return mask
 
 

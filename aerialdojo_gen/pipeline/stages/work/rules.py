@@ -1,4 +1,4 @@
-"""The rules by which candidates are kept, and the stable words for why others are not (paper: filtering)."""
+"""The filter rules, and the reasons of rejection (paper: filtering)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def judge(
         inside = solved & (length_m >= rule.min_length_m) & (length_m < rule.max_length_m)
         setting[inside] = name
         over |= inside & (n_actions > rule.action_budget)
-    # A product, not a ratio: it has no division by a d_E of zero.
+    # A product instead of a ratio: d_E may be zero.
     near_straight = length_m < config.min_detour_ratio * euclidean_m
     none = np.full(len(outcome), np.nan)
     small = ~((none if plan_detour is None else plan_detour) >= config.min_plan_detour)

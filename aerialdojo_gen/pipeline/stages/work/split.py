@@ -1,4 +1,4 @@
-"""split: write one scene's part of the release (DESIGN: `tasks` an agent may know, `routes` only the evaluator)."""
+"""`split`: write a scene's part of the release (`tasks` for agents, `routes` for the evaluator only)."""
 
 from __future__ import annotations
 
@@ -54,17 +54,17 @@ def routes_table(
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
     routes = routes.append_column("action_budget", kept.column("action_budget"))
-    routes = routes.append_column("lot", pa.array([sampling_key(scene, p) for p in pair_ids], pa.string()))
+    routes = routes.append_column("sampling_key", pa.array([sampling_key(scene, p) for p in pair_ids], pa.string()))
     return routes.sort_by([(column, "ascending") for column in ROUTES.order])
 
 
 def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
-    """What training has seen of the ends of routes, and their side of the split by objects.
+    """Whether routes' ends occur in training, and their side of the split by objects.
 
     (n,) columns of `SPLIT_COLUMNS`.
     """
     target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
-    # A scene has few anchors an object: one number is both.
+    # Object and anchor ids packed into one number.
     pose = start.astype(np.int64) << 32 | routes.column("start_anchor_id").to_numpy()
     gone = np.fromiter(out, dtype=np.int64, count=len(out))
     target_out, start_out = np.isin(target, gone), np.isin(start, gone)
@@ -80,11 +80,11 @@ def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict
 def tasks_table(
     routes: pa.Table, train: NDArray[np.bool_], scene: dict[str, Any], objects: pa.Table, out: set[int]
 ) -> pa.Table:
-    """Make both instances of every navigation task, 2n rows of `TASKS`: what an agent may know."""
+    """Make both instances of every navigation task, 2n rows of `TASKS`."""
     n = routes.num_rows
     target = _take(objects, "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
-    told = splits_of(routes, train, out)
+    seen_and_split = splits_of(routes, train, out)
     instances = []
     for modality in ("image", "semantic"):
         columns: dict[str, Any] = {
@@ -102,25 +102,25 @@ def tasks_table(
             "direction": target.column("direction"),
             "description": target.column("description") if modality == "semantic" else nulls,
             "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
-            **told,
+            **seen_and_split,
         }
         instances.append(pa.table(columns, schema=TASKS.schema))
     return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
 
 
-def _chosen(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -> NDArray[np.bool_]:
+def _select_routes(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -> NDArray[np.bool_]:
     detour, visible = (
         routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
         for name in ("plan_detour", "target_visible_at_start")
     )
     return quota.select_quota(
-        routes.column("lot").to_pylist(),
+        routes.column("sampling_key").to_pylist(),
         routes.column("setting").to_pylist(),
         routes.column("length_m").to_numpy(),
         paper.tasks,
         paper.path_m,
         seed,
-        quota.difficulty_steps(detour, visible),
+        quota.difficulty_level(detour, visible),
         preference,
     )
 
@@ -151,15 +151,17 @@ def run(job: Job, config: SplitConfig) -> Output:
     )
     paper = inventory().get(job.scene) if config.paper_counts else None
     if paper is not None:
-        routes = routes.filter(pa.array(_chosen(routes, paper, job.seed, config.prefer_harder)))
+        routes = routes.filter(pa.array(_select_routes(routes, paper, job.seed, config.prefer_harder)))
         trains = quota.train_quotas(job.scene, inventory(), splits())
     else:
         fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
         trains = train_counts(routes.column("setting").to_pylist(), fraction)
-    train = train_mask(routes.column("lot").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed)
+    train = train_mask(
+        routes.column("sampling_key").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed
+    )
     out = held_out(job.scene, objects.column("object_id").to_pylist(), config.held_out_fraction, key)
     tasks = tasks_table(routes, train, scene, named, out)
-    routes = routes.drop_columns(["action_budget", "lot"])
+    routes = routes.drop_columns(["action_budget", "sampling_key"])
     is_train = pc.equal(tasks.column("subset"), "train")
     tables = {
         "tasks/train": tasks.filter(is_train),

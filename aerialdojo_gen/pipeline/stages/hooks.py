@@ -1,0 +1,118 @@
+"""What a stage decides before it runs: source files, shards, configuration, checks. Nothing heavy is imported."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import AssetError, Malformed
+from aerialdojo_gen.base.safe_parse import loads_toml, read_toml
+from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.scenes.catalogue_files import catalogue_files
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.base.config.sections import AnchorSampleConfig, PlanConfig, RenderConfig, SplitConfig
+    from aerialdojo_gen.pipeline.code_digest import Choice
+    from aerialdojo_gen.pipeline.stage import ProjectPaths
+    from aerialdojo_gen.store.root import DataRoot
+
+
+def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
+    """List a scene's recipe, the mesh next to it, materials and catalogue."""
+    mesh = roots.recipes / f"{scene}.glb"
+    return [
+        roots.recipes / f"{scene}.toml",
+        *([mesh] if mesh.is_file() else []),
+        roots.scene_assets / "materials.toml",
+        *catalogue_files(roots.scene_assets),
+    ]
+
+
+def layout_of(roots: ProjectPaths, scene: str) -> Choice | None:
+    """Return the layout that a recipe names; None for a malformed recipe, which the stage reports itself."""
+    from aerialdojo_gen.pipeline.code_digest import Choice
+
+    try:
+        recipe = _recipe_header(roots.recipes / f"{scene}.toml")
+    except (AssetError, OSError, UnicodeDecodeError):
+        return None
+    if "imported" in recipe:
+        return Choice(layouts.__name__, ())
+    module = layouts.layout_modules().get(str(recipe.get("layout")))
+    return Choice(layouts.__name__, (f"{layouts.__name__}.{module}",)) if module else None
+
+
+def _recipe_header(path: Path) -> dict[str, Any]:
+    """Parse a recipe up to its first table where that suffices: its lists of things are slow to parse."""
+    text = path.read_text(encoding="utf-8")
+    if "imported" not in text:
+        # No table begins inside a string or a list: text cut there is not valid TOML.
+        with contextlib.suppress(Malformed):
+            return loads_toml(text.partition("\n[")[0])
+    return read_toml(path, AssetError)
+
+
+def annotation_sources(roots: ProjectPaths, scene: str) -> list[Path]:
+    """List the annotation file and the catalogue; AssetError if the file is missing."""
+    if missing := missing_annotations(roots, scene):
+        raise AssetError(missing)
+    return [_annotation_file(roots, scene), *catalogue_files(roots.scene_assets)]
+
+
+def missing_annotations(roots: ProjectPaths, scene: str) -> str:
+    """Explain that a scene has no annotation file, and how to make one; empty if it has."""
+    file = _annotation_file(roots, scene)
+    if file.is_file():
+        return ""
+    return (
+        f"{scene} has no annotations: {file} is missing; draft them: {command('annotate-draft', scene)} "
+        f"or make them by hand: {command('annotate', scene=scene)}"
+    )
+
+
+def _annotation_file(roots: ProjectPaths, scene: str) -> Path:
+    return roots.annotations / f"{scene}.json"
+
+
+def resolve_clip(config: AnchorSampleConfig, _say: Callable[[str], None]) -> AnchorSampleConfig:
+    """Add the digest of the CLIP model's files if the CLIP scorer has a weight."""
+    if config.clip is None or not config.weights.clip:
+        return config
+    from aerialdojo_gen.pipeline.scoring.clip import digest
+
+    return config.model_copy(update={"clip": config.clip.model_copy(update={"sha256": digest(config.clip)})})
+
+
+def idle_scorers(config: AnchorSampleConfig) -> tuple[str, ...]:
+    """Name the modules of scorers without a weight."""
+    return tuple(
+        f"aerialdojo_gen.pipeline.scoring.{name}" for name in ("clip", "vlm") if not getattr(config.weights, name)
+    )
+
+
+def plan_parts(data: DataRoot, scene: str, config: PlanConfig) -> int:
+    """Count a scene's shards: `targets_per_part` targets each, or one if all candidates are selected together."""
+    from aerialdojo_gen.base.paper_figures import inventory
+    from aerialdojo_gen.store import shards
+
+    if config.search == "released" and scene in inventory():
+        return 1
+    return -(-shards.count_rows(data, "objects", scene) // config.targets_per_part)
+
+
+def render_parts(data: DataRoot, scene: str, config: RenderConfig) -> int:
+    """Count a scene's shards: `trajectories_per_part` recordings each."""
+    from aerialdojo_gen.rendering.sample import n_parts
+
+    return n_parts(data, scene, config)
+
+
+def check_pools(data: DataRoot, scenes: Sequence[str], config: SplitConfig) -> None:
+    """Raise a PoolError if the paper's counts are required and there are too few candidates."""
+    if config.paper_counts:
+        from aerialdojo_gen.pipeline.stages.work.candidate_pool import require_pools
+
+        require_pools(data, scenes)
