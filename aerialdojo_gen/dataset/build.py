@@ -133,7 +133,7 @@ def pipeline_file(given: str | Path | None = None) -> Path:
 
 
 def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = False) -> Path | None:
-    """Find the file of a release's pipeline, shipped or beside the data directory; None where there is no release.
+    """Find the file of a release's pipeline, shipped or beside the data directory; None if there is no release.
 
     Raises
     ------

@@ -75,7 +75,7 @@ def files_there(where: Where) -> list[str]:
 
 
 def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
-    """List the scenes that any table of a release has a part of, by name; none where there is no release.
+    """List the scenes that any table of a release has a part of, by name; none if there is no release.
 
     A scene that lacks a part is listed too, so that whoever reads it is told.
     """
@@ -102,12 +102,12 @@ def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
 
 
 def scenes_in_release(where: Where, patterns: Sequence[str] | None = None, folder: str = FOLDER) -> list[str]:
-    """Resolve names and globs to scenes of a release, by name; all of them where there are no patterns."""
+    """Resolve names and globs to scenes of a release, by name; all of them if there are no patterns."""
     return choose_scenes(patterns, release_scenes(where, folder))
 
 
 def no_release(where: Where, folder: str = FOLDER) -> StoreError:
-    """Say where no release is, what lacks there, and what to do: an error to be raised."""
+    """Return the error for a missing release: the folder, what is missing, and what to do."""
     root = open_root(where)
     place = root.url if folder in ("", FOLDER) else root.at(folder)
     return StoreError(
@@ -117,7 +117,7 @@ def no_release(where: Where, folder: str = FOLDER) -> StoreError:
 
 
 def _making() -> str:
-    """Say what makes the dataset here: a wheel brings no Makefile."""
+    """Return the command that makes the dataset; a wheel has no Makefile."""
     here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
     return "make dataset" if here else f"{given().program} run aerialdojo-200k"
 

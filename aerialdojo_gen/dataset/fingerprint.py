@@ -1,4 +1,4 @@
-"""Which scenes a release has, as one number: what a policy knows by heart."""
+"""A digest of a release's scenes, which a trained policy depends on."""
 
 from __future__ import annotations
 

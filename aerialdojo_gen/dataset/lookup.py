@@ -29,7 +29,7 @@ _SIDES = ("train", "test")
 
 
 class ReleasedScene:
-    """One scene of a release; tables and mesh are read when they are first asked for.
+    """One scene of a release; tables and mesh are read on first access.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class ReleasedScene:
         return open_scene(path, self.row["mesh_sha256"], SEVERAL).scene
 
     def route(self, nav_id: str) -> dict[str, Any]:
-        """Return the row of `routes`, with ``split``; UsageError where there is none."""
+        """Return the row of `routes`, with ``split``; UsageError if there is none."""
         found = self.routes.filter(pc.equal(self.routes["nav_id"], nav_id)).to_pylist()
         if not found:
             raise UsageError(unknown("no navigation task", nav_id, self.routes["nav_id"].to_pylist()))
@@ -131,14 +131,14 @@ class ReleasedScene:
         return self.both_sides("tasks")
 
     def object(self, object_id: int) -> dict[str, Any]:
-        """Return the row of `objects`; UsageError where there is none."""
+        """Return the row of `objects`; UsageError if there is none."""
         for row in self.objects:
             if row["object_id"] == object_id:
                 return row
         raise UsageError(f"{self.name} has no object {object_id}")
 
     def landmark(self, landmark_id: int) -> dict[str, Any]:
-        """Return the row of `landmarks`; UsageError where there is none."""
+        """Return the row of `landmarks`; UsageError if there is none."""
         for row in self.landmarks:
             if row["landmark_id"] == landmark_id:
                 return row

@@ -1,4 +1,4 @@
-"""Objects with their reference pictures: of a pipeline's tables as far as they are there, else of the release."""
+"""Objects with their reference pictures, from the pipeline's tables if they exist, else from the release."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerialdojo_gen.store.shards import read_scene, shards
 
 
 def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) -> list[str]:
-    """List the scenes of which there are reference pictures, by name."""
+    """List the scenes that have reference pictures."""
     root = open_root(where)
     folders = {PurePosixPath(path).name for path in root.list("references")}
     staged = {scene for scene in folders if shards(root, "references", scene)}

@@ -1,4 +1,4 @@
-"""Which pipeline made which scenes of a release, so that another one does not replace them unasked."""
+"""Which pipeline made which scenes of a release, so that another pipeline does not overwrite them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Maker:
 
 
 def maker_of(pipeline: Pipeline) -> Maker:
-    """Return what a release remembers of a pipeline."""
+    """Return a release's record of a pipeline."""
     settings = pipeline.model_dump(mode="json", exclude=_BESIDE)
     settings["anchor_sample"].pop("clip")  # where the model's files lie
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
@@ -54,7 +54,7 @@ def pipeline_names(data: Where, folder: str = FOLDER) -> list[str]:
 
 
 def _recorded(root: DataRoot, path: str = RECORD) -> list[dict[str, Any]]:
-    """Read what a release says of its pipelines; nothing where the record is missing or damaged."""
+    """Read the record of a release's pipelines; empty if it is missing or damaged."""
     try:
         entries = json.loads(root.local_copy(path).read_text(encoding="utf-8"))["pipelines"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -77,7 +77,7 @@ def makers(data: Where) -> dict[str, Maker]:
 
 
 def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
-    """Read what a release holds of scenes, in the paper's order, beside the paper's figures where it follows them."""
+    """Count what a release has of scenes, in the paper's order, with the paper's figures if it follows them."""
     root = open_root(data)
     follow = {scene for scene, maker in makers(root).items() if maker.paper_counts}
     found = (made_of(root, scene) for scene in scenes)
@@ -85,7 +85,7 @@ def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
 
 
 def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:
-    """Write down that a pipeline made these scenes of the release; what says so already stays as it is."""
+    """Record that a pipeline made these scenes of the release."""
     root = open_root(data)
     found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}

@@ -1,4 +1,4 @@
-"""Recordings beside a release: which of them belong to none of its trajectories."""
+"""Recordings that belong to no trajectory of the release."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The self-test of the dataset: every reference trajectory, flown as an agent would, ends in success."""
+"""The dataset's self-test: an agent that flies a reference trajectory succeeds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, Point
 from aerialdojo_gen.store.schemas import APPROACH
 
-# A reference that is flown as it is told has the length that it is told to have, but for the Approach.
+# Least SPL of a reference that is flown exactly; the Approach is not flown.
 LEAST_SPL = 0.99
 
 
@@ -19,7 +19,7 @@ class Reference(NamedTuple):
     start: tuple[float, float, float, float]  # x, y, z in metres, world frame, and yaw in radians
     goal: Point  # Position of the goal anchor, metres, world frame
     action_budget: int  # Most actions, Stop included
-    length_m: float  # Told length of the trajectory
+    length_m: float  # Recorded length of the trajectory
     actions: Sequence[int]  # Of the trajectory; an Approach among them is not flown, for agents have none
 
 

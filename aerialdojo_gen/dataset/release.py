@@ -28,7 +28,7 @@ _MOST_SCENES = 4
 
 
 class Release:
-    """A release that was made, or copied here; everything is read when it is asked for.
+    """A release that was made, or copied here; everything is read on first access.
 
     Parameters
     ----------
@@ -148,11 +148,11 @@ class Release:
         return self.table("anchors", scene=scene)
 
     def task(self, task_id: str) -> FoundTask:
-        """Find a task by its ``task_id`` or ``nav_id``; UsageError where there is none, with the nearest."""
+        """Find a task by its ``task_id`` or ``nav_id``; UsageError if there is none, with the nearest."""
         return find_task(self._data, task_id)
 
     def scene(self, name: str) -> ReleasedScene:
-        """Open a scene; UsageError where there is none, with the nearest."""
+        """Open a scene; UsageError if there is none, with the nearest."""
         opened: ReleasedScene = self._scene(name)
         return opened
 

@@ -1,4 +1,4 @@
-"""What of a pipeline's tables is fresh, stale or missing, without computing or writing anything."""
+"""Which of a pipeline's tables are fresh, stale or missing; nothing is computed or written."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _status(stage: Stage, scenes: Sequence[str], pipeline: Pipeline, roots: Proj
     missing = [s for s in scenes if not any(store.shards(roots.data, table, s) for table in stage.writes)]
     made = [scene for scene in scenes if scene not in missing]
     section = pipeline.section(stage.name)
-    # A run settles on one of these choices for all scenes: it keeps what was made by the best.
+    # A run uses one of these choices for all scenes; the best is counted.
     choices = stage.choices(section) or [stage.resolve_config(section, lambda _: None)]
     fresh = max(([s for s in made if is_fresh(stage, choice, s, pipeline, roots)] for choice in choices), key=len)
     return StageStatus(stage.name, tuple(fresh), tuple(s for s in made if s not in fresh), tuple(missing))

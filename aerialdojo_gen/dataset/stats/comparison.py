@@ -1,4 +1,4 @@
-"""A table that sets our figures beside the paper's, and what it looks like on a terminal, in Markdown and in CSV."""
+"""A table of our figures and the paper's, for a terminal, Markdown and CSV."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Column:
     digits: int = 1  # Of a measure, after the point
 
     def show(self, figure: Figure) -> str:
-        """Format a figure; a dash where there is none."""
+        """Format a figure; a dash if there is none."""
         if figure is None:
             return "–"
         return f"{figure:,}" if isinstance(figure, int) else f"{figure:,.{self.digits}f}"
@@ -95,7 +95,7 @@ class Comparison:
         return cells
 
     def terminal(self, width: int | None = None) -> list[str]:
-        """Lines for a terminal of so many columns; below a row the figures in which the paper differs."""
+        """Lines for a terminal of a width; below a row the figures in which the paper differs."""
         rows = []
         for row in self.rows:
             rows.append(self._cells(row))
@@ -135,7 +135,7 @@ class Comparison:
         return {"title": self.title, "key": self.key, "units": units, "rows": rows, "notes": self._verdict()}
 
     def records(self) -> list[list[str]]:
-        """One record a figure: table, row, column, unit, ours, paper; empty where there is none."""
+        """One record per figure: table, row, column, unit, ours, paper; empty if there is none."""
         return [
             [self.title, row.name, column.name, column.unit, *("" if f is None else repr(f) for f in (ours, paper))]
             for row in self.rows
@@ -171,7 +171,7 @@ class Listing:
     notes: tuple[str, ...] = ()  # What must be known to read it
 
     def terminal(self, width: int | None = None) -> list[str]:
-        """Lines for a terminal of so many columns."""
+        """Lines for a terminal of a width."""
         columns = [text_table.Column(head, words=True) for head in self.heads[1:]]
         named = [(name, cells) for name, *cells in self.rows]
         return TextTable(self.heads[0], columns, named, self.title, self.notes).lines(width)

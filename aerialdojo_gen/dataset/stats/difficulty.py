@@ -25,7 +25,7 @@ _NAMES = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
 
 @dataclass(frozen=True)
 class Tasks:
-    """One entry a navigation task; what the release does not say is NaN."""
+    """One entry per navigation task; NaN if the release has no value."""
 
     scene: NDArray[np.str_]  # (n,) arrays of str; `target_split` is empty where the release does not say
     setting: NDArray[np.str_]

@@ -26,7 +26,7 @@ _NAMES = dict(zip(SETTINGS, ("base", "standard", "long-horizon"), strict=True))
 
 @dataclass(frozen=True)
 class Goals:
-    """One entry an object; what the release does not say is NaN."""
+    """One entry per object; NaN if the release has no value."""
 
     family: NDArray[np.str_]  # (n,) array of str; of its scene
     off_front_rad: Floats  # (n,) float64; of the selected anchor; NaN for an object without a front
@@ -118,7 +118,7 @@ def _mean(values: Floats) -> Figure:
 
 
 def goal_table(goals: Goals) -> Comparison:
-    """Say by family what goals show."""
+    """Table of the quality of goals by family."""
     columns = (
         Column("objects", exact=False), Column("fronts", exact=False), Column("front %", "%", exact=False),
         Column("parts %", "%", exact=False), Column("unhidden %", "%", exact=False),

@@ -1,4 +1,4 @@
-"""What the release holds, beside the paper's tables: in all, by family, by scene (its Table 10) and by split."""
+"""Tables of a release and the paper's figures: in total, by family, by scene (its Table 10) and by split."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def in_paper_order(made: Sequence[Made]) -> list[Made]:
 
 
 def scene_table(made: Sequence[Made]) -> Comparison:
-    """Set the scenes beside the paper's Table 10; settings count instances."""
+    """Table of the scenes and the paper's Table 10; settings count instances."""
     rows = [Row(m.scene, _figures([m]), _paper_figures([m])) for m in made]
     rows.append(Row("all", _figures(made), _paper_figures(made)))
     title = "Scenes (the paper's Table 10)" if any(m.paper for m in made) else "Scenes"
@@ -108,7 +108,7 @@ def scene_table(made: Sequence[Made]) -> Comparison:
 
 
 def family_table(made: Sequence[Made]) -> Comparison:
-    """Sum the scenes by family, beside the paper's Table 2 (its Types and Anchors) and the sums of its Table 10."""
+    """Table of the families, the paper's Table 2 (Types and Anchors) and the sums of its Table 10."""
     groups = [(family, [m for m in made if m.family == family]) for family in FAMILIES.values()]
     groups += [
         (f, [m for m in made if m.family == f]) for f in sorted({m.family for m in made} - {*FAMILIES.values()})
@@ -183,7 +183,7 @@ def benchmark_table(made: Sequence[Made]) -> Listing:
 
 
 def split_table(made: Sequence[Made]) -> Comparison:
-    """Set the splits beside the paper's table of them, in instances; a part of the scenes has no paper's figures."""
+    """Table of the splits and the paper's figures, in instances; without those for a part of the scenes."""
     whole = _whole(made)
     rows = []
     for (partition, subset), cells in splits().items():
@@ -200,7 +200,7 @@ def split_table(made: Sequence[Made]) -> Comparison:
 
 
 def total_table(made: Sequence[Made]) -> Comparison:
-    """Say what the benchmark holds as a whole; the paper's figures are the sums of its Table 10."""
+    """Table of the whole benchmark; the paper's figures are the sums of its Table 10."""
     ours, paper = _figures(made), _paper_figures(made)
     known = paper[0] is not None
     rows = [

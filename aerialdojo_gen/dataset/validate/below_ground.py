@@ -1,4 +1,4 @@
-"""Checks that nobody flies below the ground: of anchors, of goals, and of routes from end to end.
+"""Checks for poses below the ground: of anchors, of goals, and of routes from end to end.
 
 A surface without an underside stops no body that comes round its rim, so that a way below terrain touches nothing.
 What the generator keeps from there by its clearance grid is looked at here by rays alone: a place is below ground

@@ -1,4 +1,4 @@
-"""The certificate again: FCL is asked about every straight leg of every route, and about nothing less than its sweep.
+"""The certificate again: FCL checks every straight leg of every route, and about nothing less than its sweep.
 
 No clearance grid takes part. FCL's answers take less time than the grid takes to be built, and so a fault of the
 grid, which the planner searched by, cannot hide here.

@@ -1,4 +1,4 @@
-"""Checks of words: names and descriptions say what is so in the mesh, as `annotate-import` holds annotations to it.
+"""Checks that names and descriptions are true of the mesh, as `annotate-import` holds annotations to it.
 
 The reader of English, the relations and what makes a description ambiguous are those of
 `aerialdojo_gen.annotations`, which a second account of the English language would not improve on. The input is the

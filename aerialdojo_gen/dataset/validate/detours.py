@@ -34,7 +34,7 @@ _FITS = ("list_lengths_differ", "out_of_bounds", "route_length", "route_collisio
 _SAVED_M, _SAVED_SHARE, _SAVED_ANYWAY_M = 1.9, 0.45, 4.0
 # The straight way must be free by more than the body: the planner's search keeps margins too.
 _ROOM_M = 0.05
-# Cells of a metre make a grid in seconds, and lose passages, never invent them: its way is feasible, not the best.
+# A grid of 1 m cells is fast, and loses passages but never invents them: its path is feasible, not optimal.
 _CELL_M, _LONGER_M, _LONGER_SHARE = 1.0, 4.5, 0.1
 # The wide search: all but exhaustive (of the planner's own routes 4 % longer at most), a second a route.
 _WIDE = SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25)

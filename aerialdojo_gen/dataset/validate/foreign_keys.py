@@ -244,7 +244,7 @@ def instances_agree(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _at(rows: Ints) -> pa.Array:
-    """Row numbers for `take`, null where there is no row."""
+    """Row numbers for `take`, null if there is no row."""
     return pa.array(rows, mask=rows < 0)
 
 

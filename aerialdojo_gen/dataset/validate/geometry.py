@@ -1,4 +1,4 @@
-"""Checks of routes by their stored poses: lists that fit, lengths computed anew, the paper's rules of keeping."""
+"""Checks of routes by their stored poses: lists that fit, lengths recomputed, the paper's rules of keeping."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 def _document(data: SceneData) -> dict[str, Any]:
-    """Return the glTF document, read once; `scene_mesh` raises where there is none."""
+    """Return the glTF document, read once; `scene_mesh` raises if there is none."""
     scene_mesh(data)
     kept = data.kept.get("gltf")
     if not isinstance(kept, dict):
@@ -174,7 +174,7 @@ def _local(node: dict[str, Any]) -> Floats:
 
 
 def _describe(world: Floats) -> str:
-    """Say how a transform differs from the one that is wanted, in the world's frame."""
+    """Describe how a transform differs from the expected one, in the world frame."""
     rest = np.linalg.inv(_UP) @ world
     if np.abs(rest[:3, :3] - np.eye(3)).max() <= _SAME:
         return f"{_triple(rest[:3, 3])} m"

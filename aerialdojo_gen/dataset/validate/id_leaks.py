@@ -1,4 +1,4 @@
-"""Checks that ids tell nothing: made with a key, not to be enumerated, and independent of all that is withheld.
+"""Checks that ids reveal nothing: made with a key, not to be enumerated, and independent of all that is withheld.
 
 Where the pipeline has the salt that the release was made with, every id is computed again. Where it has not, ids are
 held against the hashes that anybody could compute, and against chance: whether their digits go with the target, the

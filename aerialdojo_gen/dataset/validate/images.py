@@ -21,7 +21,7 @@ _BLANK = 2.0
 # Rays are cast through every so many pixels: all of them take a tenth of a second a picture.
 _EVERY = 4
 _SHARE, _EDGE = 0.002, 0.03
-# Of the picture's pixels, what a part must have to be told: 7 x 7 of 320 x 320.
+# Least number of pixels of a recognisable part: 7 x 7 of 320 x 320.
 _TELL_SHARE = 0.0005
 _SAME_PLACE = 1e-6
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"

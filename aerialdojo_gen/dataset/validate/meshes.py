@@ -81,13 +81,13 @@ def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 @check("objects", needs=("mesh",))
 def object_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """An object's node stands in the mesh."""
+    """An object's node exists in the mesh."""
     yield from _unknown_nodes(data, rows)
 
 
 @check("landmarks", needs=("mesh",))
 def landmark_node(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A landmark's node stands in the mesh."""
+    """A landmark's node exists in the mesh."""
     yield from _unknown_nodes(data, rows)
 
 

@@ -19,7 +19,7 @@ from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.rendering.sight import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 
-# What is wrong with a row by these makes an episode fail too, and is named better by them.
+# These faults make an episode fail too, and are reported by their own checks.
 _ROUTE_FAULTS = (
     "list_lengths_differ", "action_order", "route_length", "keeping_rule", "out_of_bounds", "route_without_task",
     "replay_differs", "goal_anchor", "stops_far", "route_collision", "replay_collision",
@@ -97,11 +97,11 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
 
 
 class _TaskData:
-    """What the tables tell of routes' episodes."""
+    """Start, goal and budget of routes' episodes."""
 
     def __init__(self, data: SceneData, routes: Rows) -> None:
         tasks = data["tasks"]
-        # Instances agree in all that matters here: one tells.
+        # Instances agree in these columns: one suffices.
         self.task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
         self._start = tasks.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
         self._budget = tasks.ints("action_budget").tolist()
@@ -118,7 +118,7 @@ class _TaskData:
 
 
 def _left_out(data: SceneData, faults: tuple[str, ...]) -> Mask:
-    """Routes that are not flown, for something else is wrong with them or their task."""
+    """Routes that are not flown because of another fault of them or their task."""
     left_out = data.flagged("routes", (*ALWAYS_AFTER, *faults))
     faulty_tasks = data.flagged("tasks", (*ALWAYS_AFTER, *_TASK_FAULTS))
     left_out[data.route_of_task[faulty_tasks & (data.route_of_task >= 0)]] = True

@@ -19,7 +19,7 @@ from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TableSpec
 from aerialdojo_gen.store.tables import content_digest
 
-# What lies beside the tables of a release: its cards, its licence, what a hub's client leaves, pictures of it.
+# Other files of a release: cards, licence, files of a hub's client, pictures.
 _BESIDE = {
     "README.md",
     "croissant.json",
@@ -31,7 +31,7 @@ _BESIDE = {
     "stats",
 }
 
-# Tables without which a scene's tasks mean nothing; a split may have none of a scene's tasks.
+# Tables that must not be empty; a split may have none of a scene's tasks.
 _FEW = ("release/scenes", "release/landmarks", "release/objects", "release/anchors")
 
 
@@ -55,7 +55,7 @@ class Release:
         return f"{self.folder}/{relative}" if self.folder else relative
 
     def at(self, relative: str) -> str:
-        """Return where a file of the release lies, as messages say it."""
+        """Return where a file of the release lies, for messages."""
         return self.root.at(self.name(relative))
 
 
@@ -106,7 +106,7 @@ def _is_empty_folder(root: DataRoot, name: str) -> bool:
 
 
 def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Outcome]]:
-    """Read a scene's tables, as far as they can be read."""
+    """Read a scene's tables, if they can be read."""
     found = {name: Outcome(name, "files") for name in PART_CHECKS}
     runs: dict[str, str] = {}
     tables = {}

@@ -1,4 +1,4 @@
-"""The reference images drawn anew: each is what is seen from where it says it was taken, and no other's.
+"""The reference images rendered again: each is what is seen from where it says it was taken, and no other's.
 
 Two machines do not draw the same bytes, and two renderers less so. Pictures are therefore compared as averages of
 blocks, and not with a limit alone: a picture that is like another object's, or like its own with channels
@@ -59,7 +59,7 @@ def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
     after=("image_missing", "image_damaged", "image_blank", "image_format", "image_pose"), samples=True,
 )  # fmt: skip
 def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A picture is what its camera sees, as drawn anew: no other's, no channel swapped."""
+    """A picture is what its camera sees, as rendered again: no other's, no channel swapped."""
     skip = data.flagged("objects", ("image_missing", "image_damaged", "image_blank", "image_format", "image_pose"))
     sampled = [row for row in data.sampled_objects.tolist() if not skip[row]]
     decoded = {row: decode_rgb(rows.column("reference_image")[row].as_py()) for row in sampled}
@@ -110,7 +110,7 @@ def _drawn(
 def _other(
     row: int, own: NDArray[np.float32], off: float, anew: dict[int, NDArray[np.float32]], rows: Rows
 ) -> str:  # fmt: skip
-    """What explains a picture better than what its own anchor sees; empty where nothing does."""
+    """A better explanation of a picture than its own anchor's view; empty if there is none."""
     if off <= _NEARER:
         return ""
     limit = min(_BETTER * off, off - _NEARER)

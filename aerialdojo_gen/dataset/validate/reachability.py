@@ -1,4 +1,4 @@
-"""Checks that nobody is shut in: anchors, starts and goals have a free way to the open sky.
+"""Checks for reachability: anchors, starts and goals have a free way to the open sky.
 
 The generator knows it by its clearance grid. Here it is looked for by rays alone, in ways that grow longer: straight
 up; aside and then up; along the routes, which are certified to be free; and last over a lattice of places that see
@@ -27,7 +27,7 @@ _STEP_M = 0.5
 _MOST_NODES = 1_000_000
 
 
-# What is in a wall, or below ground, is told as that.
+# Positions in a wall or below ground are reported by other checks.
 @check("anchors", needs=("mesh",), after=("anchor_surface", "anchor_clearance", "anchor_below_ground"))
 def anchor_shut_in(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """From an anchor there is a free way to the open sky."""

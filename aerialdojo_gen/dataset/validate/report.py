@@ -1,4 +1,4 @@
-"""What `validate` found: a table of checks, lines for the terminal, a file with every row at fault."""
+"""The report of `validate`: a table of checks, lines for the terminal, a file with every fault."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class CheckTotal:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of every check."""
+    """The outcome of every check."""
 
-    scenes: tuple[str, ...]  # Scenes that were looked at
-    outcomes: tuple[Outcome, ...]  # One a check, table and scene, in the order of the checks
+    scenes: tuple[str, ...]  # Checked scenes
+    outcomes: tuple[Outcome, ...]  # One per check, table and scene, in the order of the checks
 
     @property
     def faults(self) -> list[Fault]:
@@ -46,7 +46,7 @@ class Report:
 
     @property
     def warnings(self) -> list[Fault]:
-        """Every row that is worth knowing of and at no fault."""
+        """Every reported row that is no fault."""
         return [warning for outcome in self.outcomes for warning in outcome.warnings]
 
     def totals(self) -> list[CheckTotal]:

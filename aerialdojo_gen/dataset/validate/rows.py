@@ -76,7 +76,7 @@ class Rows:
         return column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
 
     def find(self, name: str, keys: pa.Array) -> Ints:
-        """First row of each wanted value of a column, -1 where there is none; (len(wanted),) int64."""
+        """First row of each wanted value of a column, -1 if there is none; (len(wanted),) int64."""
         found = pc.index_in(keys, value_set=self.column(name))
         return pc.fill_null(found, -1).to_numpy(zero_copy_only=False).astype(np.int64)
 
@@ -120,7 +120,7 @@ class Paths:
 
     @cached_property
     def length_m(self) -> Floats:
-        """Lengths summed anew from the positions, (n,) float64, metres."""
+        """Lengths recomputed from the positions, (n,) float64, metres."""
         if not len(self.rows):
             return np.empty(0)
         steps = np.zeros(len(self.xyz))
@@ -166,8 +166,8 @@ class SceneData:
     tables: Mapping[str, Rows]
     meshes: Path | None = None  # Folder of the meshes; None for where the `scenes` table says, beside the release
     use_meshes: bool = True  # False leaves everything that needs a mesh unchecked
-    sample: int | None = None  # How many routes FCL is asked about; None for all
-    pictures: int | None = None  # How many reference images are drawn anew; None for all
+    sample: int | None = None  # How many routes FCL checks; None for all
+    pictures: int | None = None  # How many reference images are rendered again; None for all
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
     kept: dict[str, object] = field(default_factory=dict)
 
@@ -190,7 +190,7 @@ class SceneData:
 
     @cached_property
     def sampled(self) -> Ints:
-        """Places in `paths` of the routes that FCL is asked about: all, or so many by a draw from their ids."""
+        """Places in `paths` of the routes that FCL checks: all, or so many by a draw from their ids."""
         rows = self.paths.rows
         if self.sample is None or self.sample >= len(rows):
             return np.arange(len(rows))
@@ -200,7 +200,7 @@ class SceneData:
 
     @cached_property
     def sampled_objects(self) -> Ints:
-        """Rows of `objects` whose pictures are drawn anew: all, or so many by a draw from their ids."""
+        """Rows of `objects` whose pictures are rendered again: all, or so many by a draw from their ids."""
         ids = self["objects"].ints("object_id").tolist()
         order = sorted(range(len(ids)), key=lambda row: rank(0, "validate", self.scene, ids[row]))
         return np.sort(np.array(order[: self.pictures], dtype=np.int64))
@@ -211,12 +211,12 @@ class SceneData:
 
     @cached_property
     def route_of_task(self) -> Ints:
-        """Row of `routes` of every task, -1 where there is none."""
+        """Row of `routes` of every task, -1 if there is none."""
         return self["routes"].find("nav_id", self["tasks"].column("nav_id"))
 
     @cached_property
     def target_of_route(self) -> Ints:
-        """Row of `objects` of every route's target, -1 where there is none."""
+        """Row of `objects` of every route's target, -1 if there is none."""
         return self["objects"].find("object_id", self["routes"].column("target_object_id"))
 
     @cached_property
@@ -230,13 +230,13 @@ class SceneData:
 
     @cached_property
     def goal_of_route(self) -> Ints:
-        """Row of `anchors` of the selected anchor of every route's target, -1 where there is none."""
+        """Row of `anchors` of the selected anchor of every route's target, -1 if there is none."""
         targets = self["routes"].ints("target_object_id").tolist()
         return np.array([self.selected_of_object.get(t, -1) for t in targets], dtype=np.int64)
 
     @cached_property
     def start_of_route(self) -> Ints:
-        """Row of `anchors` of every route's start anchor, -1 where there is none."""
+        """Row of `anchors` of every route's start anchor, -1 if there is none."""
         anchors, routes = self["anchors"], self["routes"]
         known = zip(anchors.ints("object_id").tolist(), anchors.ints("anchor_id").tolist(), strict=True)
         rows = {key: row for row, key in enumerate(known)}

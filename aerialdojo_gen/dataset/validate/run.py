@@ -1,4 +1,4 @@
-"""Run every check over a release, a scene at a time, in one process or several."""
+"""Run all checks over a release, scene by scene, in one or several processes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import Where
 
-# What a process is taken to need, megabytes; not measured.
+# Assumed memory per process, megabytes.
 MEMORY_MB = 1500
 # Every module of this folder registers its checks.
 for _module in pkgutil.iter_modules([str(Path(__file__).parent)]):
@@ -44,10 +44,10 @@ class ValidationOptions:
     release: Release | Where  # The data root, or the release's own folder
     scenes: tuple[str, ...] = ()  # Names or globs; empty for all
     meshes: Path | None = None
-    use_meshes: bool = True  # False leaves everything that needs a mesh unchecked, and the report says so
-    sample: int | None = None  # Routes a scene that FCL is asked about; None for all
-    pictures: int | None = None  # Reference images a scene that are drawn anew; None for all
-    pipeline: Pipeline = field(default_factory=Pipeline)  # Whose definitions the release is held to
+    use_meshes: bool = True  # False skips checks that need a mesh
+    sample: int | None = None  # Routes a scene that FCL checks; None for all
+    pictures: int | None = None  # Reference images a scene that are rendered again; None for all
+    pipeline: Pipeline = field(default_factory=Pipeline)  # Defines the rules that the release is checked against
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _check(work: _Work) -> tuple[list[Outcome], Tally]:
 
 
 def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:
-    """Order scenes so that no process is left alone with a large one at the end."""
+    """Order scenes by size, the largest first, to balance the processes."""
 
     def size(scene: str) -> int:
         names = [release.name(part_path(key, scene)) for key in ("routes/train", "routes/test")]

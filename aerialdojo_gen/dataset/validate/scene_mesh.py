@@ -14,13 +14,13 @@ from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.root import LocalRoot
 
-# A fault of these leaves nothing to judge the rest by.
+# Without these nothing else of the mesh can be checked.
 MESH_CHECKS = ("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged")
 
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """A scene's mesh, and what questions to it are put to: parts of its context, made when first asked."""
+    """A scene's mesh, and what questions to it are put to: parts of its context, built on first use."""
 
     scene: Scene
 
@@ -36,7 +36,7 @@ class SceneMesh:
 
 
 def mesh_place(data: SceneData) -> str:
-    """Where the scene's mesh should lie, as messages say it."""
+    """Where the scene's mesh should lie, for messages."""
     stored_path = str(data["scenes"].texts("mesh_path")[0])
     return str(data.meshes / Path(stored_path).name) if data.meshes is not None else data.release.root.at(stored_path)
 

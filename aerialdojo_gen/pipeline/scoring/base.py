@@ -43,7 +43,7 @@ class Known:
     clearance_m: float
     part_visibility: tuple[float, ...]  # By ray casts: at least what the picture's would be
     off_front_rad: float | None
-    framed: float  # See `AnchorView`: from here, and from behind, None where there is no picture from there
+    framed: float  # See `AnchorView`: from here, and from behind, None if there is no picture from there
     framed_behind: float | None
 
 
