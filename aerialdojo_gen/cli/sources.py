@@ -294,7 +294,6 @@ def annotate(
     """Annotate a scene in the browser: landmarks, objects and their anchors."""
     from aerialdojo_gen.cli.sources import given_scene, pick_scene
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
-    from aerialdojo_gen.studio.annotate.serve import serve_session, write_coco
     from aerialdojo_gen.studio.annotate.session import open_session
     from aerialdojo_gen.studio.web.serving import require_web
 
@@ -305,6 +304,10 @@ def annotate(
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     session = open_session(scene, config, roots)
     if coco is not None:
+        from aerialdojo_gen.studio.annotate.coco import write_coco
+
         print(write_coco(session, coco))
     else:
+        from aerialdojo_gen.studio.annotate.server import serve_session
+
         serve_session(session, port=port, host=host, browser=browser, say=lambda line: print(line, flush=True))

@@ -169,7 +169,7 @@ FAULTS = {
         "has no height: x.tif covers 24.9000",
     ),
     "too fine": (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
-    "no such file": (lambda d: d / "none.tif", {}, "no such file"),
+    "no such file": (lambda d: d / "none.tif", {}, "No such file"),
     "no height model": (lambda d: d / "x.png", {}, "a height model is a file .tif"),
 }
 

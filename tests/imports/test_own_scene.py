@@ -201,11 +201,13 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     chosen = []
     made = drafter.objects(9, lambda: chosen.append(1))
     assert len(chosen) == len(made) < 9
-    assert len(drafter.confused) == drafter.refused["indistinguishable from others of their category"] > 0
-    for node, others in drafter.confused:
+    assert len(drafter.confusions) == drafter.rejections["indistinguishable from others of their category"] > 0
+    for node, others in drafter.confusions:
         assert node not in others
         assert set(others) <= {f"crate_{k:04d}" for k in range(9)}
-    assert re.search(r"of their kind \(crate_\d{4} with crate_\d{4}( and \d more)?; ", drafter.rejection_summary())
+    assert re.search(
+        r"of their category \(crate_\d{4} with crate_\d{4}( and \d more)?; ", drafter.rejection_summary()
+    )
 
 
 def test_a_table_says_what_nodes_are_called(place, capsys):

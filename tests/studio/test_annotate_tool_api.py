@@ -19,8 +19,8 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.annotate.access import TokenGate
-from aerialdojo_gen.studio.annotate.serve import serve_session, write_coco
-from aerialdojo_gen.studio.annotate.server import MOST_BYTES, STATIC, make_app
+from aerialdojo_gen.studio.annotate.coco import write_coco
+from aerialdojo_gen.studio.annotate.server import MOST_BYTES, STATIC, make_app, serve_session
 from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session
 from aerialdojo_gen.studio.annotate.storage import Storage
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from aerialdojo_gen.annotations.format import Object
+from aerialdojo_gen.store.atomic import atomic_file
 
 if TYPE_CHECKING:
     from aerialdojo_gen.studio.annotate.session import AnnotationSession
@@ -29,6 +31,15 @@ def coco_zip(session: AnnotationSession) -> bytes:
         for name, png in pictures.items():
             archive.writestr(zipfile.ZipInfo(f"images/{name}", _DATE), png)
     return buffer.getvalue()
+
+
+def write_coco(session: AnnotationSession, path: Path) -> Path:
+    """Write `coco_zip` to a file atomically."""
+    content = coco_zip(session)
+    session.anchors.close()
+    with atomic_file(path.parent, path.name) as temporary:
+        temporary.write_bytes(content)
+    return path
 
 
 def coco(session: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:

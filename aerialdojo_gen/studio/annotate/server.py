@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ipaddress
 import math
+import secrets
+import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,12 +16,13 @@ from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field_validator
 
-from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError
+from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError, UsageError
+from aerialdojo_gen.studio.annotate.access import TokenGate
 from aerialdojo_gen.studio.annotate.coco import coco_zip
 from aerialdojo_gen.studio.annotate.document import ConflictError, Operation
 from aerialdojo_gen.studio.annotate.session import AnnotationSession
 from aerialdojo_gen.studio.annotate.storage import Author, StaleError
-from aerialdojo_gen.studio.web.serving import local_app, one_line
+from aerialdojo_gen.studio.web.serving import local_app, one_line, open_socket, serve, url_of
 
 STATIC = Path(__file__).resolve().parent / "static"
 MOST_BYTES = 8 << 20
@@ -82,6 +87,31 @@ class Viewpoint(_Body):
     position_m: _Triple
     yaw_deg: Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-720, le=720)] | None = None
     snap: bool = False
+
+
+def serve_session(
+    session: AnnotationSession, *, port: int, host: str, browser: bool, say: Callable[[str], None]
+) -> None:
+    """Serve the tool."""
+    try:
+        loopback = ipaddress.IPv4Address(host) == ipaddress.IPv4Address("127.0.0.1")
+    except ValueError:
+        raise UsageError(f"--host {host}: give an IPv4 address of this machine, or 0.0.0.0 for all") from None
+    listener = open_socket(port, host)
+    app = make_app(session, any_host=not loopback)
+    try:
+        if loopback:
+            say(f"annotating {session.scene.name} at {url_of(listener)}   (Ctrl-C stops; changes are saved at once)")
+        else:
+            token = secrets.token_urlsafe(24)
+            app.add_middleware(TokenGate, token=token)
+            shown = socket.gethostname() if host == "0.0.0.0" else host  # noqa: S104
+            say(f"annotating {session.scene.name} at http://{shown}:{listener.getsockname()[1]}/?token={token}")
+            say("anybody with this address can change the annotations; the traffic is not encrypted")
+        say(f"annotations: {session.storage.path}")
+        serve(app, listener, browser and loopback)
+    finally:
+        session.anchors.close()
 
 
 def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
