@@ -30,23 +30,23 @@ class CliContext:
     program: str = PROGRAM  # What the command line is called as here
 
 
-_NOW = [CliContext()]
+_CURRENT = [CliContext()]
 
 
-def given() -> CliContext:
+def current_context() -> CliContext:
     """Return what has been given."""
-    return _NOW[0]
+    return _CURRENT[0]
 
 
-def remember(*, pipeline: object = None, data: object = None) -> None:
+def update_context(*, pipeline: object = None, data: object = None) -> None:
     """Keep what the user wrote, for the messages of this process; None leaves what is kept."""
     new = {key: str(value) for key, value in (("pipeline", pipeline), ("data", data)) if value is not None}
-    _NOW[0] = replace(_NOW[0], **new)
+    _CURRENT[0] = replace(_CURRENT[0], **new)
 
 
-def begin(called_as: str = "") -> None:
+def reset_context(called_as: str = "") -> None:
     """Forget what was given, at the start of a command."""
-    _NOW[0] = CliContext(program=program(called_as) or _NOW[0].program)
+    _CURRENT[0] = CliContext(program=program(called_as) or _CURRENT[0].program)
 
 
 def program(called_as: str) -> str:
@@ -60,17 +60,17 @@ def program(called_as: str) -> str:
 @contextmanager
 def use_context(context: CliContext) -> Iterator[None]:
     """Give advice for what somebody else was given, for the length of the block: a worker process."""
-    before = _NOW[0]
-    _NOW[0] = context
+    before = _CURRENT[0]
+    _CURRENT[0] = context
     try:
         yield
     finally:
-        _NOW[0] = before
+        _CURRENT[0] = before
 
 
 def command(verb: str, *words: object, **options: object) -> str:
     """Say a command so that it can be pasted into a shell."""
-    context = given()
+    context = current_context()
     for key, own in (("pipeline", context.pipeline), ("data", context.data)):
         if own and key in _TAKES.get(verb, ("pipeline", "data")):
             options.setdefault(key, own)

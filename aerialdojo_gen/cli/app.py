@@ -55,7 +55,7 @@ class _Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command, with nothing kept of another one."""
-        cli_context.begin(sys.argv[0])
+        cli_context.reset_context(sys.argv[0])
         return super().invoke(ctx)
 
 

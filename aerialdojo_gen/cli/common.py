@@ -50,18 +50,18 @@ def _plain(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def kept(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
+def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
     """Keep what is written on the command line (not what the environment says) for the advice of messages."""
     source = ctx.get_parameter_source(str(param.name))
     if source is not None and source.name == "COMMANDLINE":
-        cli_context.remember(**{str(param.name): value})
+        cli_context.update_context(**{str(param.name): value})
     return value
 
 
 Data = Annotated[
     str,
     typer.Option(
-        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
         help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
     ),
 ]  # fmt: skip
@@ -83,7 +83,7 @@ PipelineFile = Annotated[
     typer.Option(
         "--pipeline",
         metavar="FILE|NAME",
-        callback=kept,
+        callback=remember_option,
         autocompletion=completion.pipelines,
         help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
         f"else {Path(DEFAULT_PIPELINE).stem})",
@@ -93,7 +93,7 @@ PipelineArgument = Annotated[
     Path,
     typer.Argument(
         metavar="PIPELINE",
-        callback=kept,
+        callback=remember_option,
         autocompletion=completion.pipelines,
         help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
     ),
@@ -134,7 +134,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress an
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
 
 
-def together(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
+def merge_scenes(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
     """Join scenes that are given by position with those of ``--scene``; None where there is neither."""
     return [*(scenes or ()), *(scene or ())] or None
 

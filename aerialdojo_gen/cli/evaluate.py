@@ -28,8 +28,8 @@ from aerialdojo_gen.cli.common import (
     Scenes,
     Workers,
     default_workers,
+    merge_scenes,
     open_pipeline,
-    together,
 )
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def evaluate(
 
     config, _ = open_pipeline(pipeline, data, reads=True)
     splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
-    chosen = tuple(together(scenes, scene) or ())
+    chosen = tuple(merge_scenes(scenes, scene) or ())
     name = preset or agent or "random"
     with _tracebacks(traceback):
         agent, options = _agent(agent, preset, _options(option or []))

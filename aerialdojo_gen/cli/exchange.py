@@ -10,7 +10,7 @@ import typer
 
 from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import brief
-from aerialdojo_gen.cli.common import Data, Json, Quiet, Scene, Scenes, Workers, together
+from aerialdojo_gen.cli.common import Data, Json, Quiet, Scene, Scenes, Workers, merge_scenes
 
 if TYPE_CHECKING:
     from aerialdojo_gen.store.root import DataRoot
@@ -107,7 +107,7 @@ def export(
             form,
             root,
             target,
-            {**given, "scene": together(scenes, scene) or ()},
+            {**given, "scene": merge_scenes(scenes, scene) or ()},
             force,
             workers,
             estimate,
@@ -120,7 +120,7 @@ def export(
         verb = "is" if len(names) == 1 else "are"
         raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(FOR_TRAINING)}, not for {form}")
     counts = export_release(
-        form, root, target, together(scenes, scene), force=force, picture_px=picture_size, shards=shards,
+        form, root, target, merge_scenes(scenes, scene), force=force, picture_px=picture_size, shards=shards,
         reporter=Reporter(quiet=quiet or as_json),
     )  # fmt: skip
     if as_json:

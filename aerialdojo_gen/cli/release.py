@@ -18,9 +18,9 @@ from aerialdojo_gen.cli.common import (
     Scene,
     Scenes,
     json_text,
+    merge_scenes,
     open_pipeline,
     print_json,
-    together,
 )
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ def stats(
     """Compare the release with the paper's tables; without a release, show what filter kept."""
     from aerialdojo_gen.dataset.contents import files_there, no_release, scenes_in_release, scenes_there
     from aerialdojo_gen.dataset.provenance import RECORD
-    from aerialdojo_gen.store.memo import key_of, memo
+    from aerialdojo_gen.store.memo import memo, memo_key
     from aerialdojo_gen.store.root import open_root
 
-    root, scene = open_root(data), together(scenes, scene)
+    root, scene = open_root(data), merge_scenes(scenes, scene)
     released = scenes_there(root)
     if pool and (markdown or csv or figures):
         raise UsageError("--pool is printed only: leave --markdown, --csv and --figures out")
@@ -78,7 +78,7 @@ def stats(
         return "\n\n".join("\n".join(table.terminal(width)) for table in compared)
 
     # The same release gives the same tables, and make dataset prints them each time.
-    print(memo(key_of(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
+    print(memo(memo_key(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
     if markdown or csv:
         from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
         from aerialdojo_gen.store.atomic import atomic_file
@@ -159,7 +159,7 @@ def view(
     require_web()
     from aerialdojo_gen.studio.view.server import chosen_scenes, view_app
 
-    names = chosen_scenes(data, together(scenes, scene))
+    names = chosen_scenes(data, merge_scenes(scenes, scene))
     page = view_app(data, names)
     listener = open_socket(port)
     # One scene is shown at once; of several the start page lets one choose.

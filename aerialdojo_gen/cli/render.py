@@ -25,10 +25,10 @@ from aerialdojo_gen.cli.common import (
     Verbose,
     Workers,
     default_workers,
+    merge_scenes,
     open_pipeline,
     print_json,
     run_until,
-    together,
 )
 from aerialdojo_gen.pipeline.registry import BY_NAME
 
@@ -77,7 +77,7 @@ def render(
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.pipeline.freshness import Limits
 
-    scene = together(scenes, scene)
+    scene = merge_scenes(scenes, scene)
     if prune:
         _prune(data, scene)
         return

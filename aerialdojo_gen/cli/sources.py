@@ -21,9 +21,9 @@ from aerialdojo_gen.cli.common import (
     Scene,
     SceneOption,
     Scenes,
+    merge_scenes,
     open_pipeline,
     pipeline_file,
-    together,
 )
 
 if TYPE_CHECKING:
@@ -160,13 +160,12 @@ def annotate_draft(
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotations.draft import DraftOptions
-    from aerialdojo_gen.cli.sources import given_scene, pick_scene
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
     config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
-    given = given_scene(name, scene)
+    given = named_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     options = DraftOptions(
         centre_m=centre,
@@ -197,7 +196,7 @@ def gallery(
     data: Data = "data",
 ) -> None:  # fmt: skip
     """Draw every prop and every scene as contact sheets."""
-    scene = together(scenes, scene)
+    scene = merge_scenes(scenes, scene)
     if references:
         _reference_sheets(out, scene, data, "jpg" if small else "png")
         return
@@ -237,7 +236,7 @@ def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str
             print(write_picture(sheet, out, f"references-{name}-{k + 1}.{suffix}"))
 
 
-def given_scene(position: str | None, option: str | None) -> str | None:
+def named_scene(position: str | None, option: str | None) -> str | None:
     """Return the scene that is named by position or by ``--scene``."""
     if position and option and position != option:
         raise UsageError(f"two scenes, {position} and --scene {option}: name one")
@@ -292,7 +291,6 @@ def annotate(
     ] = None,
 ) -> None:
     """Annotate a scene in the browser: landmarks, objects and their anchors."""
-    from aerialdojo_gen.cli.sources import given_scene, pick_scene
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
     from aerialdojo_gen.studio.annotate.session import open_session
     from aerialdojo_gen.studio.web.serving import require_web
@@ -300,7 +298,7 @@ def annotate(
     if coco is None:
         require_web()
     config, roots = open_pipeline(pipeline, data)
-    given = given_scene(name, scene)
+    given = named_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     session = open_session(scene, config, roots)
     if coco is not None:

@@ -23,11 +23,11 @@ from aerialdojo_gen.cli.common import (
     Scenes,
     Verbose,
     Workers,
+    merge_scenes,
     open_pipeline,
     print_json,
     run_chosen,
     run_until,
-    together,
 )
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
@@ -44,7 +44,7 @@ def _stage_command(name: str) -> Callable[..., None]:
         executor: ExecutorName = "local", address: Address = None,
     ) -> None:  # fmt: skip
         run_until(
-            name, data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+            name, data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
             quiet=quiet, verbose=verbose, executor=executor, address=address,
         )  # fmt: skip
 
@@ -67,7 +67,7 @@ def plan(
 ) -> None:  # fmt: skip
     """Plan reference trajectories, with what they need upstream."""
     run_until(
-        "plan", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        "plan", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
         quiet=quiet, verbose=verbose, executor=executor, address=address, search="all" if every else None,
     )  # fmt: skip
 
@@ -81,7 +81,7 @@ def split(
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
     run_until(
-        "split", data=data, scene=together(scenes, scene), pipeline=pipeline, workers=workers, force=force,
+        "split", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
         quiet=quiet, verbose=verbose, replace=replace, executor=executor, address=address,
     )  # fmt: skip
 
@@ -94,7 +94,7 @@ def status(
     """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
     from aerialdojo_gen.dataset.status import pipeline_status, status_table
 
-    found = pipeline_status(pipeline, data, scenes=together(scenes, scene))
+    found = pipeline_status(pipeline, data, scenes=merge_scenes(scenes, scene))
     if as_json:
         print_json([asdict(one) for one in found])
     else:
@@ -120,7 +120,7 @@ def run(
         stages,
         config,
         roots,
-        together(scenes, scene),
+        merge_scenes(scenes, scene),
         workers,
         forced,
         quiet,

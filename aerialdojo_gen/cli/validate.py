@@ -20,10 +20,10 @@ from aerialdojo_gen.cli.common import (
     Scene,
     Scenes,
     Workers,
-    kept,
+    merge_scenes,
     pipeline_file,
     print_json,
-    together,
+    remember_option,
 )
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def validate(
     data: Annotated[
         str,
         typer.Option(
-            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=kept,
+            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
             help="Data directory or s3://bucket/prefix; its release is checked.",
         ),
     ] = "data",
@@ -104,7 +104,7 @@ def validate(
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
     options = validation.ValidationOptions(
         release=release,
-        scenes=tuple(together(scenes, scene) or ()),
+        scenes=tuple(merge_scenes(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,
         use_meshes=not no_meshes,
         sample=sample,

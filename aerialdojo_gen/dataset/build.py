@@ -92,7 +92,7 @@ def run_pipeline(
     else:
         needed = {stage.name for asked in stages_named(stages) for stage in upstream(asked.name)}
         chosen = stages_named([*needed])
-    given = cli_context.given()
+    given = cli_context.current_context()
     given = replaced(given, pipeline=str(pipeline) if isinstance(pipeline, (str, Path)) else given.pipeline)
     given = replaced(given, data=str(data) if isinstance(data, (str, Path)) and str(data) != "data" else given.data)
     with cli_context.use_context(given):
@@ -279,7 +279,7 @@ def _finish_release(
     """Bring what stands beside the tables of a release up to date with them."""
     from aerialdojo_gen.dataset.contents import CARD, CROISSANT, files_there, prune_release
     from aerialdojo_gen.dataset.provenance import RECORD, record_makers
-    from aerialdojo_gen.store.memo import keep, key_of, known
+    from aerialdojo_gen.store.memo import cache_text, is_cached, memo_key
 
     if whole:
         # The whole pipeline was asked for: the release holds its scenes and no others.
@@ -288,15 +288,15 @@ def _finish_release(
     record_makers(data, config, released)
 
     def as_it_is() -> str:
-        return key_of(data, [*files_there(data), RECORD, CARD, CROISSANT], "documents")
+        return memo_key(data, [*files_there(data), RECORD, CARD, CROISSANT], "documents")
 
-    if not known(as_it_is()):
+    if not is_cached(as_it_is()):
         from aerialdojo_gen.dataset.card import write_card
         from aerialdojo_gen.dataset.croissant import write_croissant
 
         write_croissant(data)
         write_card(data)
-        keep(as_it_is())
+        cache_text(as_it_is())
     reporter.line(f"release: {data.at('release')}")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import pyarrow as pa
 
-from aerialdojo_gen.base.cli_context import command, given
+from aerialdojo_gen.base.cli_context import command, current_context
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.store import schemas
@@ -119,7 +119,7 @@ def no_release(where: Where, folder: str = FOLDER) -> StoreError:
 def _making() -> str:
     """Return the command that makes the dataset; a wheel has no Makefile."""
     here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
-    return "make dataset" if here else f"{given().program} run aerialdojo-200k"
+    return "make dataset" if here else f"{current_context().program} run aerialdojo-200k"
 
 
 def _lack(root: DataRoot, folder: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.cli_context import CliContext, given, use_context
+from aerialdojo_gen.base.cli_context import CliContext, current_context, use_context
 from aerialdojo_gen.base.config.sections import Section
 from aerialdojo_gen.base.environment_errors import environment_error
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
@@ -25,7 +25,7 @@ class Task:
     job: Job
     config: Section  # Its stage's section
     fingerprint: str  # Stored with the shard
-    given: CliContext = field(default_factory=given, compare=False)
+    given: CliContext = field(default_factory=current_context, compare=False)
 
     @property
     def label(self) -> str:

@@ -16,7 +16,7 @@ from aerialdojo_gen.store.root import DataRoot
 _TEXT = "text"
 
 
-def key_of(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
+def memo_key(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
     """Tell what is asked of which files by which code from everything else."""
     digest = hashlib.sha256(f"{_sources()}\n{root}\n{parameters!r}".encode())
     for name in sorted(files):
@@ -37,18 +37,18 @@ def memo(key: str, make: Callable[[], str]) -> str:
         if (found := Cache().find(key)) is not None:
             return (found / _TEXT).read_text(encoding="utf-8")
     text = make()
-    keep(key, text)
+    cache_text(key, text)
     return text
 
 
-def known(key: str) -> bool:
+def is_cached(key: str) -> bool:
     """Whether something was kept under a key."""
     with contextlib.suppress(AerialDojoError, OSError):
         return Cache().find(key) is not None
     return False
 
 
-def keep(key: str, text: str = "") -> None:
+def cache_text(key: str, text: str = "") -> None:
     """Keep a text under a key; nothing happens where the cache cannot be written."""
 
     def fill(folder: Path) -> None:

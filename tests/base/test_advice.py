@@ -30,7 +30,7 @@ def advised() -> list[tuple[str, ast.Call]]:
         for file, tree in SOURCES.items()
         for node in ast.walk(tree)
         if isinstance(node, ast.Call)
-        and (getattr(node.func, "id", "") == "command" or ast.unparse(node.func) == "advice.command")
+        and (getattr(node.func, "id", "") == "command" or ast.unparse(node.func) == "cli_context.command")
     ]
 
 
@@ -81,7 +81,7 @@ def test_what_is_advised_is_quoted_and_repeats_what_was_given():
         assert cli_context.command("plan", force=True, pipeline="other.toml").endswith(
             "plan --force --pipeline other.toml"
         )
-    assert cli_context.given().pipeline == ""
+    assert cli_context.current_context().pipeline == ""
 
 
 def test_only_what_is_written_is_repeated(monkeypatch, capsys):
@@ -94,9 +94,9 @@ def test_only_what_is_written_is_repeated(monkeypatch, capsys):
         monkeypatch.setattr("sys.argv", ["aerialdojo-gen", *arguments])
         with pytest.raises(SystemExit):
             cli.main()
-        assert (cli_context.given().pipeline, cli_context.given().data) == kept
+        assert (cli_context.current_context().pipeline, cli_context.current_context().data) == kept
     capsys.readouterr()
-    cli_context.begin()
+    cli_context.reset_context()
 
 
 def test_the_program_is_called_as_it_was(monkeypatch, tmp_path):
@@ -106,10 +106,10 @@ def test_the_program_is_called_as_it_was(monkeypatch, tmp_path):
     tool.chmod(0o755)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", "/nowhere")
-    cli_context.begin(str(tool))
+    cli_context.reset_context(str(tool))
     assert cli_context.command("stats") == ".venv/bin/aerialdojo-gen stats"
     monkeypatch.setenv("PATH", str(tool.parent))
-    cli_context.begin(str(tool))
+    cli_context.reset_context(str(tool))
     assert cli_context.command("stats") == "aerialdojo-gen stats"
-    cli_context.begin("pytest")
+    cli_context.reset_context("pytest")
     assert cli_context.command("stats") == "aerialdojo-gen stats"

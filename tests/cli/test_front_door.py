@@ -13,7 +13,7 @@ from support.command_line import said
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.cli import app as cli
-from aerialdojo_gen.cli.sources import given_scene, pick_scene
+from aerialdojo_gen.cli.sources import named_scene, pick_scene
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.store import shards
 
@@ -79,8 +79,8 @@ def test_one_of_several_scenes_is_picked_by_number_or_name():
     with pytest.raises(UsageError, match="no scene was picked"):
         pick_scene("*", known, Terminal(""), Terminal())
     with pytest.raises(UsageError, match="two scenes, U_A_0 and --scene U_B_0"):
-        given_scene("U_A_0", "U_B_0")
-    assert given_scene("U_A_0", "U_A_0") == "U_A_0"
+        named_scene("U_A_0", "U_B_0")
+    assert named_scene("U_A_0", "U_A_0") == "U_A_0"
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def cache(tmp_path, monkeypatch):
 @pytest.fixture
 def at_once(monkeypatch):
     """What has just been written is kept too, so that no test waits for it to come of age."""
-    monkeypatch.setattr(footer_cache, "_TOLD_APART_NS", -1)
+    monkeypatch.setattr(footer_cache, "_TIME_RESOLUTION_NS", -1)
 
 
 def shard(folder, fingerprint="f" * 64, rows=3):

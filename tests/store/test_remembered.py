@@ -9,7 +9,7 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.store.memo import keep, key_of, known, memo
+from aerialdojo_gen.store.memo import cache_text, is_cached, memo, memo_key
 from aerialdojo_gen.store.root import open_root
 
 
@@ -29,32 +29,36 @@ def root(tmp_path):
 
 
 def test_a_key_is_of_the_files_and_of_what_is_asked(root, tmp_path):
-    key = key_of(root, ["a", "b"], "stats", 80)
-    assert key == key_of(root, ["b", "a"], "stats", 80)
-    others = {key_of(root, ["a"], "stats", 80), key_of(root, ["a", "b"], "stats", 79), key_of(root, ["a", "b", "c"])}
+    key = memo_key(root, ["a", "b"], "stats", 80)
+    assert key == memo_key(root, ["b", "a"], "stats", 80)
+    others = {
+        memo_key(root, ["a"], "stats", 80),
+        memo_key(root, ["a", "b"], "stats", 79),
+        memo_key(root, ["a", "b", "c"]),
+    }
     os.utime(tmp_path / "data" / "a", ns=(1, 1))
-    others.add(key_of(root, ["a", "b"], "stats", 80))
+    others.add(memo_key(root, ["a", "b"], "stats", 80))
     (tmp_path / "data" / "b").unlink()
-    others.add(key_of(root, ["a", "b"], "stats", 80))
+    others.add(memo_key(root, ["a", "b"], "stats", 80))
     assert len(others) == 5
     assert key not in others
 
 
 def test_a_text_is_made_once(root):
     asked = []
-    key = key_of(root, ["a"])
+    key = memo_key(root, ["a"])
     texts = [memo(key, lambda: asked.append(1) or "ärial") for _ in range(3)]
     assert texts == ["ärial"] * 3
     assert len(asked) == 1
-    assert known(key)
-    assert not known(key_of(root, ["b"]))
+    assert is_cached(key)
+    assert not is_cached(memo_key(root, ["b"]))
 
 
 def test_where_nothing_can_be_kept_it_is_made_each_time(root, cache):
     cache.write_text("a file where the folder should be")
-    assert [memo(key_of(root, ["a"]), lambda: "text") for _ in range(2)] == ["text"] * 2
-    keep(key_of(root, ["a"]))
-    assert not known(key_of(root, ["a"]))
+    assert [memo(memo_key(root, ["a"]), lambda: "text") for _ in range(2)] == ["text"] * 2
+    cache_text(memo_key(root, ["a"]))
+    assert not is_cached(memo_key(root, ["a"]))
 
 
 def test_stats_of_a_changed_release_are_its_own(smoke, tmp_path, capsys):
