@@ -17,7 +17,7 @@ from aerialdojo_gen.benchmark.observations import look
 from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.planning.flight_space import FlightSpace, build_ahead, flight_space
+from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space, prefetch_flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, forget_scene, hold_scenes
 from aerialdojo_gen.store.root import Where, open_root
 
@@ -81,7 +81,7 @@ class Flight:
         def read() -> None:
             # What is wrong with it is told when it is opened.
             with contextlib.suppress(Exception):
-                build_ahead(mesh, sha256, self._body.radius_m)
+                prefetch_flight_space(mesh, sha256, self._body.radius_m)
 
         self._opened.add(sha256)
         self._reader = Thread(target=read, name=sha256, daemon=True)

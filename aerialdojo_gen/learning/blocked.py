@@ -25,6 +25,6 @@ def blocked(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], ND
     moves = np.flatnonzero(DISPLACEMENTS[:N_ACTIONS].any(axis=1)).tolist()
     for k, here in enumerate(map(tuple, p[:, :3].tolist())):
         for a in moves:
-            collides[k, a], refused[k, a] = space.hindered(here, tuple(ends[k, a].tolist()))
+            collides[k, a], refused[k, a] = space.motion_outcome(here, tuple(ends[k, a].tolist()))
     ends[refused] = np.broadcast_to(p[:, None, :3], ends.shape)[refused]
     return collides, refused, ends

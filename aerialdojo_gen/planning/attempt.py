@@ -1,6 +1,6 @@
-"""One attempt at a route as a single kernel: search, refine, fly, examine.
+"""One planning attempt as a single kernel: search, refine, fly, measure clearance.
 
-Handing a kernel its arrays takes longer than a short search does, so they are handed over once.
+Passing arrays to a kernel takes longer than a short search, so they are passed once.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.constants import APPROACH, STOP
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import fly
-from aerialdojo_gen.planning.certify import ClearanceProfile, examine
+from aerialdojo_gen.planning.certify import ClearanceProfile, clearance_profile
 from aerialdojo_gen.planning.cost_to_go import cost_at, extra_cost
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.hybrid_astar import FOUND, SearchArrays, SearchOptions, search
 from aerialdojo_gen.planning.refine import moves_to_actions
 
-# A goal nearer than this is met already, and needs no Approach.
+# No Approach is needed for a goal nearer than this.
 _ON_GOAL_M = 1e-9
 
 
-class Attempt(NamedTuple):
-    """What came of one search."""
+class PlanResult(NamedTuple):
+    """Result of one planning attempt."""
 
-    status: int  # As `aerialdojo_gen.planning.hybrid_astar.search` returns them
+    status: int  # One of `aerialdojo_gen.planning.hybrid_astar`: FOUND, EXHAUSTED, BUDGET
     expansions: int
     poses: NDArray[np.float64]  # (K + 1, 4) float64; x, y, z in metres and yaw in (-pi, pi]; no rows unless FOUND
-    actions: NDArray[np.int8]  # (K + 1,) int8; what is done at every pose, Stop at the last
+    actions: NDArray[np.int8]  # (K + 1,) int8; action at every pose, Stop at the last
     length: float  # The paper's L, metres
-    seen: ClearanceProfile  # Of the route; meaningless unless FOUND
+    profile: ClearanceProfile  # Of the route; meaningless unless FOUND
 
 
 @njit(cache=True)
@@ -70,25 +70,25 @@ def plan_once(
     options: SearchOptions,
     radius: float,
     bound: float,
-) -> Attempt:
+) -> PlanResult:
     """Search a route from a pose (4,) to a goal (3,), order its moves, fly it and measure its clearance, metres."""
     status, expansions, moves = search(start, goal, goal_heading, cost_to_go, grid, memory, options)
     if status != FOUND:
-        unseen = ClearanceProfile(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
-        return Attempt(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, unseen)
-    flown = moves_to_actions(start, moves, goal_heading, options, grid)
-    poses = fly(start, flown)
-    n = len(flown)
+        no_profile = ClearanceProfile(np.empty((0, 3)), False, np.empty(0, np.bool_), 0.0)
+        return PlanResult(status, expansions, np.empty((0, 4)), np.empty(0, np.int8), 0.0, no_profile)
+    moved = moves_to_actions(start, moves, goal_heading, options, grid)
+    poses = fly(start, moved)
+    n = len(moved)
     dx, dy, dz = goal[0] - poses[n, 0], goal[1] - poses[n, 1], goal[2] - poses[n, 2]
     approach = 1 if math.sqrt(dx * dx + dy * dy + dz * dz) > _ON_GOAL_M else 0
-    whole = np.empty((n + 1 + approach, 4))
+    route = np.empty((n + 1 + approach, 4))
     actions = np.empty(n + 1 + approach, np.int8)
-    whole[: n + 1], actions[:n], actions[n] = poses, flown, APPROACH
-    whole[n + approach, :3], whole[n + approach, 3] = goal, poses[n, 3]
+    route[: n + 1], actions[:n], actions[n] = poses, moved, APPROACH
+    route[n + approach, :3], route[n + approach, 3] = goal, poses[n, 3]
     actions[n + approach] = STOP
     length = 0.0
     for k in range(n + approach):
-        ax, ay, az = whole[k + 1, 0] - whole[k, 0], whole[k + 1, 1] - whole[k, 1], whole[k + 1, 2] - whole[k, 2]
+        ax, ay, az = route[k + 1, 0] - route[k, 0], route[k + 1, 1] - route[k, 1], route[k + 1, 2] - route[k, 2]
         length += math.sqrt(ax * ax + ay * ay + az * az)
-    seen = examine(np.ascontiguousarray(whole[:, :3]), radius, bound, grid)
-    return Attempt(status, expansions, whole, actions, length, seen)
+    profile = clearance_profile(np.ascontiguousarray(route[:, :3]), radius, bound, grid)
+    return PlanResult(status, expansions, route, actions, length, profile)

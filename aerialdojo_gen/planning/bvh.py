@@ -1,7 +1,7 @@
 """A bounding-volume hierarchy of triangles for queries inside numba kernels.
 
 The tree is implicit: node i has children 2i and 2i + 1, the leaves are the last level, and leaf j holds triangles
-``LEAF*j`` to ``LEAF*(j+1)`` of an array sorted along a Morton curve. So it is two plain arrays and needs no pointers.
+``LEAF*j`` to ``LEAF*(j+1)`` of an array sorted along a Morton curve: two plain arrays, no pointers.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ def build_bvh(
     leaves = 1
     while leaves * LEAF < n:
         leaves *= 2
-    return triangles, _boxed(triangles, leaves), order
+    return triangles, _node_boxes(triangles, leaves), order
 
 
 @njit(cache=True)
-def _boxed(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
+def _node_boxes(triangles: NDArray[np.float64], leaves: int) -> NDArray[np.float64]:
     """Boxes of the tree's nodes, leaves last."""
     boxes = np.empty((2 * leaves, 6))
     boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
@@ -62,8 +62,8 @@ def _box_gap2(
 
 
 @njit(cache=True, inline="always")
-def _after(node: int) -> int:
-    """The node that a depth-first walk comes to once it is done with a subtree; 0 at the end."""
+def _next_node(node: int) -> int:
+    """Next node of a depth-first traversal after a subtree; 0 at the end."""
     while node & 1:
         node >>= 1
     return node + 1 if node else 0
@@ -71,7 +71,7 @@ def _after(node: int) -> int:
 
 @njit(cache=True, inline="always")
 def _clip(p: float, d: float, low: float, high: float, t0: float, t1: float) -> tuple[float, float]:
-    """Cut the stretch t0 to t1 of a segment p + t d down to where it lies between two planes."""
+    """Clip the interval t0 to t1 of a segment p + t d to the slab between two planes."""
     if d == 0.0:
         return (t0, t1) if low <= p <= high else (1.0, 0.0)
     a, b = (low - p) / d, (high - p) / d
@@ -94,15 +94,15 @@ def segment_blocker(
         ax, ay, az, bx, by, bz = (
             boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3], boxes[node, 4], boxes[node, 5]
         )  # fmt: skip
-        apart = ax > hx or ay > hy or az > hz or bx < lx or by < ly or bz < lz
-        if not apart:
-            # The segment's own box says little where it runs aslant.
+        disjoint = ax > hx or ay > hy or az > hz or bx < lx or by < ly or bz < lz
+        if not disjoint:
+            # The bounding box of a slanted segment is too coarse: clip the segment itself.
             t0, t1 = _clip(px, dx, ax - radius, bx + radius, 0.0, 1.0)
             t0, t1 = _clip(py, dy, ay - radius, by + radius, t0, t1)
             t0, t1 = _clip(pz, dz, az - radius, bz + radius, t0, t1)
-            apart = t0 > t1
-        if apart:
-            node = _after(node)
+            disjoint = t0 > t1
+        if disjoint:
+            node = _next_node(node)
         elif node < leaves:
             node *= 2
         else:
@@ -110,7 +110,7 @@ def segment_blocker(
             for k in range(first, min(first + LEAF, n)):
                 if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
                     return k
-            node = _after(node)
+            node = _next_node(node)
     return -1
 
 
@@ -229,18 +229,18 @@ def nearest_owners(
     px: float, py: float, pz: float, bound: float, slack: float, tri: NDArray[np.float64],
     boxes: NDArray[np.float64], owner: NDArray[np.int32],
 ) -> NDArray[np.int32]:  # fmt: skip
-    """Owners (k,) of the triangles nearest to p, give or take `slack` metres; none where all are beyond `bound`."""
+    """Owners (k,) of the triangles within `slack` metres of the nearest to p; empty where all are beyond `bound`."""
     found = np.empty(8, np.int32)
     n = 0
-    near = point_distance(px, py, pz, bound, tri, boxes)
-    if near >= bound:
+    nearest = point_distance(px, py, pz, bound, tri, boxes)
+    if nearest >= bound:
         return found[:0]
-    reach2 = (near + slack) * (near + slack)
+    reach2 = (nearest + slack) * (nearest + slack)
     leaves = boxes.shape[0] // 2
     node = 1
     while node > 0:
         if _box_gap2(px, py, pz, px, py, pz, boxes, node) > reach2:
-            node = _after(node)
+            node = _next_node(node)
         elif node < leaves:
             node *= 2
         else:
@@ -251,5 +251,5 @@ def nearest_owners(
                         found = np.concatenate((found, np.empty(n, np.int32)))
                     found[n] = owner[k]
                     n += 1
-            node = _after(node)
+            node = _next_node(node)
     return found[:n]

@@ -1,8 +1,7 @@
-"""The certificate of a route: no part of its sweep touches a surface, and how near it comes.
+"""The certificate of a route: its sweep touches no surface, and its smallest clearance.
 
-FCL has the last word on every leg of a route, a capsule for the exact sweep of the body. Where the clearance grid
-alone already proves a leg free, FCL need not be asked: the grid's distances are lower bounds of FCL's, and
-the tests hold that against FCL on random segments.
+Every leg is checked by FCL as a capsule, the exact sweep of the body, except where the clearance grid proves it free:
+the grid's distances are lower bounds of FCL's, and the tests check that on random segments.
 """
 
 from __future__ import annotations
@@ -21,26 +20,26 @@ from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, polyline_cl
 
 @dataclass(frozen=True)
 class Certificate:
-    """What is known of a route."""
+    """Collision check and clearance of a route."""
 
-    collision_free: bool  # No surface is touched and the flight volume is not left
+    collision_free: bool  # It touches no surface and stays in the flight volume
     min_clearance_m: float  # Smallest distance from the centre line to any surface, metres, up to the grid's `cap_m`
-    legs: int  # Straight legs of the route, and how many of them FCL was asked about
-    asked: int
+    legs: int  # Straight legs of the route, and how many of them FCL checked
+    fcl_checks: int
 
 
 class ClearanceProfile(NamedTuple):
-    """What the grid and the triangles say of a route."""
+    """Clearance of a route by the grid and the triangles."""
 
-    corners: NDArray[np.float64]  # (m, 3) float64; where the route bends, ends included, metres
+    corners: NDArray[np.float64]  # (m, 3) float64; the route's vertices without collinear ones, metres
     inside: bool  # Whether it stays in the flight volume
-    undecided: NDArray[np.bool_]  # (max(1, m - 1),) bool; legs that the grid alone does not prove free
-    clearance: float  # Smallest distance from the centre line to any surface, metres, up to the bound asked for
+    undecided: NDArray[np.bool_]  # (max(1, m - 1),) bool; legs that the grid does not prove free
+    clearance: float  # Smallest distance from the centre line to any surface, metres, capped at the bound
 
 
 @njit(cache=True)
 def corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Drop points that stand still or lie on the way straight on: (n, 3) to (m, 3), ends included."""
+    """Drop repeated and collinear points: (n, 3) to (m, 3), ends included."""
     n = points.shape[0]
     kept = np.empty((n, 3))
     kept[0] = points[0]
@@ -62,7 +61,7 @@ def corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True)
-def _undecided(points: NDArray[np.float64], radius: float, grid: GridArrays) -> NDArray[np.bool_]:
+def _undecided_legs(points: NDArray[np.float64], radius: float, grid: GridArrays) -> NDArray[np.bool_]:
     flags = np.ones(max(1, points.shape[0] - 1), np.bool_)
     for i in range(points.shape[0] - 1):
         p, q = points[i], points[i + 1]
@@ -79,32 +78,31 @@ def _all_inside(points: NDArray[np.float64], grid: GridArrays) -> bool:
 
 
 @njit(cache=True)
-def examine(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> ClearanceProfile:
+def clearance_profile(points: NDArray[np.float64], radius: float, bound: float, grid: GridArrays) -> ClearanceProfile:
     """Measure a route's points (n, 3), world metres, by the clearance grid alone, without FCL."""
     p = corners(points)
-    return ClearanceProfile(p, _all_inside(p, grid), _undecided(p, radius, grid), polyline_clearance(p, bound, grid))
+    return ClearanceProfile(
+        p, _all_inside(p, grid), _undecided_legs(p, radius, grid), polyline_clearance(p, bound, grid)
+    )
 
 
 def certify(
     points: NDArray[np.float64], radius_m: float, grid: ClearanceGrid, world: CollisionWorld, prove: bool = True
 ) -> Certificate:
-    """Certify a route's points (n, 3), world metres.
-
-    FCL is asked about every leg that the grid does not prove free.
-    """
-    seen = examine(np.ascontiguousarray(points, np.float64), radius_m, grid.cap_m, grid.arrays)
-    return conclude(seen, radius_m, world, prove)
+    """Certify a route's points (n, 3), world metres; FCL checks every leg that the grid does not prove free."""
+    profile = clearance_profile(np.ascontiguousarray(points, np.float64), radius_m, grid.cap_m, grid.arrays)
+    return certify_profile(profile, radius_m, world, prove)
 
 
-def conclude(seen: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
-    """Ask FCL about what an examination has left open; with `prove` False, about every leg."""
-    p = seen.corners
+def certify_profile(profile: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
+    """Check by FCL the legs that a profile leaves undecided; with `prove` False, every leg."""
+    p = profile.corners
     legs = max(1, len(p) - 1)
-    if not seen.inside:
-        return Certificate(False, seen.clearance, legs, 0)
-    asked = 0
-    for i in np.flatnonzero(seen.undecided) if prove else range(legs):
-        asked += 1
+    if not profile.inside:
+        return Certificate(False, profile.clearance, legs, 0)
+    fcl_checks = 0
+    for i in np.flatnonzero(profile.undecided) if prove else range(legs):
+        fcl_checks += 1
         if world.segment_in_collision(p[i], p[min(i + 1, len(p) - 1)], radius_m):
-            return Certificate(False, seen.clearance, legs, asked)
-    return Certificate(True, seen.clearance, legs, asked)
+            return Certificate(False, profile.clearance, legs, fcl_checks)
+    return Certificate(True, profile.clearance, legs, fcl_checks)

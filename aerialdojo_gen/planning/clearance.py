@@ -1,7 +1,6 @@
-"""The clearance grid of a scene: how far the nearest surface is, and what is connected with the open sky.
+"""The clearance grid of a scene: distance to the nearest surface, and which cells are connected with the open sky.
 
-Where the ground is an open sheet, the body is kept from below it: a curtain closes the sheet at its rim, as walls
-would.
+Where the ground is an open sheet, a curtain closes it at its rim, so that no route leads below it.
 """
 
 from __future__ import annotations
@@ -14,21 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, nearest_owners, point_distance
-from aerialdojo_gen.planning.connectivity import connected_with_ceiling, linked_cell, passable_moves
+from aerialdojo_gen.planning.connectivity import connected_with_ceiling, passable_moves, reaches_marked_cell
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
-# Longer triangles would have boxes full of nothing.
+# Longer triangles are split: their bounding boxes would be mostly empty.
 _LONGEST_EDGE_M = 4.0
-# More than distances to pieces of a triangle and to the whole of it differ by.
+# Above the rounding between distances to a triangle and to its pieces.
 _SAME_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class _Space:
-    """What is solid in a scene, for a body of a radius whatever margin it keeps; attributes as of `ClearanceGrid`."""
+class _SolidSpace:
+    """The part of a `ClearanceGrid` that does not depend on the margin; attributes as there."""
 
     arrays: GridArrays
     ground: Ground | None
@@ -38,7 +37,7 @@ class _Space:
     @classmethod
     def build(
         cls, scene: Scene, cell_m: float, radius_m: float, band_m: float, cap_m: float, closed_ground: bool
-    ) -> _Space:
+    ) -> _SolidSpace:
         low, high = np.asarray(scene.bounds, np.float64)
         reach = cap_m + 1.0
         parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
@@ -53,7 +52,7 @@ class _Space:
             curtain, _ = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
             solid, boxes, _ = build_bvh(np.concatenate([triangles, curtain]))
         nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
-        # The bound beyond the band needs half a diagonal of a cell, however large cells are.
+        # The bound beyond the band needs at least half a cell's diagonal.
         band_m = max(band_m, 0.87 * cell_m)
         field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
         arrays = GridArrays(
@@ -64,16 +63,16 @@ class _Space:
 
 @dataclass(frozen=True, eq=False)
 class ClearanceGrid:
-    """Distances on a grid, backed by the triangles where the grid cannot decide."""
+    """Distances on a grid, with the triangles for what the grid cannot decide."""
 
     arrays: GridArrays  # Distance field, triangles and bounds, for numba kernels
     moves: NDArray[np.uint32]  # Passable moves of every cell (`aerialdojo_gen.planning.connectivity.passable_moves`)
     sky: NDArray[np.bool_]  # (nx, ny, nz) bool; cells from which the body can fly to the ceiling
     radius_m: float  # The body's radius, with the planner's margin
-    cap_m: float  # Distances are known up to this
-    owner: NDArray[np.int32]  # (n,) int32; index of the instance that each of ``arrays.real_tri`` is of
-    ground: Ground | None = None  # The scene's ground where that is an open sheet that the body could get past
-    has_curtain: bool = False  # Whether the body could get below it but for the curtain
+    cap_m: float  # Distances are capped at this
+    owner: NDArray[np.int32]  # (n,) int32; index of the instance of each of ``arrays.real_tri``
+    ground: Ground | None = None  # The scene's ground where it is an open sheet
+    has_curtain: bool = False  # Whether only the curtain keeps the body from below it
 
     @classmethod
     def build(
@@ -87,8 +86,8 @@ class ClearanceGrid:
         closed_ground: bool = True,
     ) -> ClearanceGrid:
         """Build the grid over a scene's flight volume (metres); it depends on the scene and the parameters alone."""
-        space = _Space.build(scene, cell_m, radius_m, band_m, cap_m, closed_ground)
-        return cls._within(space, radius_m + margin_m, cap_m)
+        space = _SolidSpace.build(scene, cell_m, radius_m, band_m, cap_m, closed_ground)
+        return cls._with_radius(space, radius_m + margin_m, cap_m)
 
     @classmethod
     def of(
@@ -101,20 +100,20 @@ class ClearanceGrid:
         margin_m: float = 0.0,
         closed_ground: bool = True,
     ) -> ClearanceGrid:
-        """Return the grid of a scene's context, by the parameters of `build`; one of others takes its place.
+        """Return the scene context's grid, by the parameters of `build`; other parameters replace it.
 
-        What does not depend on the margin is a part of its own: who keeps another one builds no other distance field.
+        The distance field is a part of its own: grids of another margin share it.
         """
-        context, how = context_of(scene), (cell_m, radius_m, band_m, cap_m, closed_ground)
+        context, key = context_of(scene), (cell_m, radius_m, band_m, cap_m, closed_ground)
 
         def make() -> ClearanceGrid:
-            space = context.part("clearance space", lambda: _Space.build(scene, *how), how)
-            return cls._within(space, radius_m + margin_m, cap_m)
+            space = context.part("clearance space", lambda: _SolidSpace.build(scene, *key), key)
+            return cls._with_radius(space, radius_m + margin_m, cap_m)
 
-        return context.part("clearance grid", make, (how, margin_m))
+        return context.part("clearance grid", make, (key, margin_m))
 
     @classmethod
-    def _within(cls, space: _Space, radius_m: float, cap_m: float) -> ClearanceGrid:
+    def _with_radius(cls, space: _SolidSpace, radius_m: float, cap_m: float) -> ClearanceGrid:
         moves = passable_moves(space.arrays, radius_m)
         sky = connected_with_ceiling(moves)
         return cls(space.arrays, moves, sky, radius_m, cap_m, space.owner, space.ground, space.has_curtain)
@@ -125,7 +124,7 @@ class ClearanceGrid:
         return float(point_distance(x, y, z, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
 
     def nearest(self, p: ArrayLike) -> NDArray[np.int32]:
-        """Indices (k,) of the instances nearest to a point (3,); mostly one, none where all are beyond `cap_m`."""
+        """Indices (k,) of the instances nearest to a point (3,); usually one, none where all are beyond `cap_m`."""
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
         return np.asarray(nearest_owners(x, y, z, self.cap_m, _SAME_M, a.real_tri, a.real_boxes, self.owner))
@@ -135,10 +134,7 @@ class ClearanceGrid:
         return self.segment_proven_free(p, p, radius_m)
 
     def in_collision(self, p: ArrayLike) -> bool:
-        """Whether the body at a point (3,) touches a surface, leaves the bounds.
-
-        Or sits in a solid or below open ground.
-        """
+        """Whether the body at a point (3,) touches a surface, leaves the bounds, or is in a solid or below ground."""
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
         if not inside(x, y, z, a.lower, a.upper) or self.distance_m(p) <= self.radius_m:
@@ -152,7 +148,7 @@ class ClearanceGrid:
         x, y, z = np.asarray(p, np.float64)
         if not inside(x, y, z, self.arrays.lower, self.arrays.upper) or self.below_ground(p):
             return False
-        return bool(linked_cell(x, y, z, self.radius_m, self.sky, self.arrays))
+        return bool(reaches_marked_cell(x, y, z, self.radius_m, self.sky, self.arrays))
 
     def below_ground(self, points: ArrayLike) -> bool:
         """Whether any of some points, (n, 3) float metres, lies below open ground; (3,) is one."""

@@ -1,8 +1,7 @@
-"""The collision world: FCL, one bounding-volume hierarchy an instance, made when something first comes near it.
+"""The collision world: FCL, one bounding-volume hierarchy per instance, built on first use.
 
-FCL is asked for what must be right beyond doubt: the certificate of every route, and the distance to a surface.
-Surfaces are what it knows: a point deep inside a closed solid is far from every surface and not in collision here
-(`aerialdojo_gen.planning.clearance.ClearanceGrid.reachable` tells such points apart).
+FCL decides the certificate of every route, and distances to surfaces. It knows surfaces only: a point deep inside a
+closed solid is not in collision here (`aerialdojo_gen.planning.clearance.ClearanceGrid.reachable` detects it).
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 
-# A ball of no size: FCL measures distances between shapes, and has no point.
+# FCL has no point shape: distances are measured from a tiny ball.
 _POINT_RADIUS_M = 1e-6
-# Two distances are to surfaces that coincide, and more than FCL rounds a box by.
-_SAME_M, _BESIDE_M = 1e-9, 1e-6
+# Distances closer than this are a tie; and a margin above FCL's rounding of boxes.
+_TIE_M, _BOX_MARGIN_M = 1e-9, 1e-6
 
 
 def _bvh(instance: Instance) -> fcl.BVHModel:
@@ -46,7 +45,7 @@ def _along_z(ux: float, uy: float, uz: float) -> NDArray[np.float64]:
 
 
 class _Shapes(threading.local):
-    """What queries move about: a thread's own, for two threads may ask one world."""
+    """Query shapes, one set per thread: two threads may query one world."""
 
     def __init__(self) -> None:
         self.spheres: dict[float, fcl.CollisionObject] = {}
@@ -54,7 +53,7 @@ class _Shapes(threading.local):
 
 
 @njit(cache=True)
-def _touched(
+def _boxes_touching(
     boxes: NDArray[np.float64], lx: float, ly: float, lz: float, hx: float, hy: float, hz: float
 ) -> NDArray[np.int64]:
     """Rows of boxes (n, 6) that the box (l, h) touches."""
@@ -75,7 +74,7 @@ class CollisionWorld:
         self._instances = scene.instances
         self._index = {instance.node: k for k, instance in enumerate(scene.instances)}
         self._boxes = np.array([i.bounds for i in scene.instances], np.float64).reshape(-1, 6)
-        # A hierarchy takes milliseconds to build, and most things stand where nobody flies.
+        # A hierarchy takes milliseconds to build, and most instances are never near a route.
         self._objects: dict[int, fcl.CollisionObject] = {}
         self._lock = threading.RLock()
         self._request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
@@ -83,13 +82,13 @@ class CollisionWorld:
         self._shapes = _Shapes()
 
     def _object(self, k: int) -> fcl.CollisionObject:
-        made = self._objects.get(k)
-        if made is None:
+        built = self._objects.get(k)
+        if built is None:
             with self._lock:
-                made = self._objects.get(k)
-                if made is None:
-                    made = self._objects[k] = fcl.CollisionObject(_bvh(self._instances[k]), fcl.Transform())
-        return made
+                built = self._objects.get(k)
+                if built is None:
+                    built = self._objects[k] = fcl.CollisionObject(_bvh(self._instances[k]), fcl.Transform())
+        return built
 
     @cached_property
     def _manager(self) -> fcl.DynamicAABBTreeCollisionManager:
@@ -105,10 +104,7 @@ class CollisionWorld:
         return self._collides(self._sphere(p, radius_m), x, y, z, x, y, z, radius_m)
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether a ball moving straight from `p` to `q` touches a surface.
-
-        Its sweep is exactly a capsule, nothing is sampled.
-        """
+        """Whether a ball moving straight from `p` to `q` touches a surface: its exact sweep, a capsule."""
         ax, ay, az = np.asarray(p, np.float64).tolist()
         bx, by, bz = np.asarray(q, np.float64).tolist()
         dx, dy, dz = bx - ax, by - ay, bz - az
@@ -127,16 +123,13 @@ class CollisionWorld:
         return self._collides(capsule, ax, ay, az, bx, by, bz, radius_m)
 
     def distance_m(self, p: ArrayLike, nearest: Iterable[int] = ()) -> float:
-        """Distance, metres, from a point to the nearest surface, of the instances `nearest` alone where given.
-
-        Inf if empty.
-        """
+        """Distance, metres, from a point to the nearest surface; `nearest` limits the instances; inf if empty."""
         if not self._instances:
             return float("inf")
         sphere = self._sphere(p, _POINT_RADIUS_M)
         found = sorted(float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest)
-        # Where surfaces of two coincide, the last bits hang on which of them is come to first: the tree's to say.
-        if found and (len(found) == 1 or found[1] > found[0] + _SAME_M):
+        # On a tie the last bits depend on which surface is visited first: use the tree's order.
+        if found and (len(found) == 1 or found[1] > found[0] + _TIE_M):
             return max(found[0], 0.0) + _POINT_RADIUS_M
         data = fcl.DistanceData()
         self._manager.distance(sphere, data, fcl.defaultDistanceCallback)
@@ -168,14 +161,14 @@ class CollisionWorld:
         radius_m: float,
     ) -> bool:  # fmt: skip
         """Whether a shape, all of it within a radius of the segment ab, touches a surface."""
-        r = radius_m + _BESIDE_M
-        touched = _touched(
+        r = radius_m + _BOX_MARGIN_M
+        candidates = _boxes_touching(
             self._boxes, min(ax, bx) - r, min(ay, by) - r, min(az, bz) - r, max(ax, bx) + r, max(ay, by) + r,
             max(az, bz) + r,
         )  # fmt: skip
-        return any(fcl.collide(self._object(k), shape, self._request) for k in touched.tolist())
+        return any(fcl.collide(self._object(k), shape, self._request) for k in candidates.tolist())
 
 
 def collision_world(scene: Scene) -> CollisionWorld:
-    """Return the scene's one collision world; two threads may ask it."""
+    """Return the scene's one collision world; it may be used from several threads."""
     return context_of(scene).part("collision world", lambda: CollisionWorld(scene))

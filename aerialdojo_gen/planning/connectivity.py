@@ -1,4 +1,4 @@
-"""Which cells of the clearance grid the body can move between, and which of them see the sky."""
+"""Passable moves between cells of the clearance grid, and the cells connected with the sky."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ def cell_centre(i: int, j: int, k: int, grid: GridArrays) -> tuple[float, float,
 
 
 @njit(cache=True, inline="always")
-def _has(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
+def _is_passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
     return (moves[i, j, k] >> np.uint32(m)) & _ONE != 0
 
 
 @njit(cache=True)
-def _composed(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
-    """Whether both ways round, by the two shorter moves, are passable."""
+def _both_detours_passable(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool:
+    """Whether both detours by the two shorter moves are passable."""
     a, b = _PARTS[m, 0], _PARTS[m, 1]
     return (
-        _has(moves, i, j, k, a)
-        and _has(moves, i, j, k, b)
-        and _has(moves, i + MOVES[a, 0], j + MOVES[a, 1], k, b)
-        and _has(moves, i + MOVES[b, 0], j + MOVES[b, 1], k, a)
+        _is_passable(moves, i, j, k, a)
+        and _is_passable(moves, i, j, k, b)
+        and _is_passable(moves, i + MOVES[a, 0], j + MOVES[a, 1], k, b)
+        and _is_passable(moves, i + MOVES[b, 0], j + MOVES[b, 1], k, a)
     )
 
 
@@ -51,10 +51,10 @@ def _composed(moves: NDArray[np.uint32], i: int, j: int, k: int, m: int) -> bool
 def _passable(
     moves: NDArray[np.uint32], i: int, j: int, k: int, m: int, radius: float, grid: GridArrays
 ) -> bool:  # fmt: skip
-    """Whether a move that the field cannot vouch for is passable."""
-    # The middle of a square of cells is half a cell from both ways round it: a thinner body leaves room for a pole.
+    """Whether a move that the distance field does not prove free is passable."""
+    # Both detours pass half a cell from the middle of the square: a thinner body would leave room for a pole there.
     if 2.0 * radius >= grid.cell:
-        if _PARTS[m, 0] >= 0 and _composed(moves, i, j, k, m):
+        if _PARTS[m, 0] >= 0 and _both_detours_passable(moves, i, j, k, m):
             return True
         if 4 <= m < 8:
             return False
@@ -81,11 +81,11 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
                     free[:, c] = False
                 else:
                     free[:, :, c] = False
-    # The order matters: diagonals are made of axis moves, knight's moves of both.
+    # The order matters: diagonals are composed of axis moves, knight's moves of both.
     for m in (0, 1, 8, 2, 3, 4, 5, 6, 7):
         dx, dy, dz = MOVES[m]
         needed = MOVE_LENGTHS[m] * cell + 2 * radius
-        there, back = _ONE << np.uint32(m), _ONE << np.uint32(m + N_HALF)
+        forward_bit, backward_bit = _ONE << np.uint32(m), _ONE << np.uint32(m + N_HALF)
         for i in range(max(0, -dx), min(nx, nx - dx)):
             for j in range(ny - dy):
                 for k in range(nz - dz):
@@ -96,8 +96,8 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
                         moves, i, j, k, m, radius, grid
                     ):
                         continue
-                    moves[i, j, k] |= there
-                    moves[i + dx, j + dy, k + dz] |= back
+                    moves[i, j, k] |= forward_bit
+                    moves[i + dx, j + dy, k + dz] |= backward_bit
     return moves
 
 
@@ -105,14 +105,14 @@ def passable_moves(grid: GridArrays, radius: float) -> NDArray[np.uint32]:
 def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
     """Cells, (nx, ny, nz) bool, that `passable_moves` connects with the highest layer that has any."""
     nx, ny, nz = moves.shape
-    seen = np.zeros((nx, ny, nz), np.bool_)
-    flat_moves, flat_seen = moves.ravel(), seen.ravel()
+    visited = np.zeros((nx, ny, nz), np.bool_)
+    flat_moves, flat_visited = moves.ravel(), visited.ravel()
     stack = np.empty(nx * ny * nz, np.int32)
     top = 0
     for k in range(nz - 1, -1, -1):
         for c in range(k, nx * ny * nz, nz):
             if flat_moves[c]:
-                flat_seen[c] = True
+                flat_visited[c] = True
                 stack[top] = c
                 top += 1
         if top > 0:
@@ -123,15 +123,17 @@ def connected_with_ceiling(moves: NDArray[np.uint32]) -> NDArray[np.bool_]:
         c = stack[top]
         bits = flat_moves[c]
         for m in range(steps.shape[0]):
-            if (bits >> np.uint32(m)) & _ONE and not flat_seen[c + steps[m]]:
-                flat_seen[c + steps[m]] = True
+            if (bits >> np.uint32(m)) & _ONE and not flat_visited[c + steps[m]]:
+                flat_visited[c + steps[m]] = True
                 stack[top] = c + steps[m]
                 top += 1
-    return seen
+    return visited
 
 
 @njit(cache=True)
-def linked_cell(x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays) -> bool:
+def reaches_marked_cell(
+    x: float, y: float, z: float, radius: float, marked: NDArray[np.bool_], grid: GridArrays
+) -> bool:
     """Whether the body at a point can move straight to one of the 64 nearest cells that is marked."""
     nx, ny, nz = marked.shape
     i0 = math.floor((x - grid.origin[0]) / grid.cell - 0.5)

@@ -3,10 +3,10 @@
 The metric is the action set's: horizontal and vertical motion are separate moves, so that up to the grid's 16
 directions the cost of a free displacement is |horizontal| + |vertical| (at most 2.7 % above it).
 
-Ways near surfaces cost more than their metres (`aerialdojo_gen.planning.preference`), and so does what ends in an
+Paths near surfaces cost more than their metres (`aerialdojo_gen.planning.preference`), and so do paths that end in an
 Approach that does not fly ahead.
 
-Cells are relaxed a column at a time, for a column lies together in memory and its cells are computed side by side.
+Cells are relaxed a column at a time: a column is contiguous in memory, so the loops are vectorised.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from aerialdojo_gen.planning.column_kernels import (
     KINDS,
     QUANTUM_M,
     UP,
-    leave,
+    departure_costs,
     move_lengths,
-    push,
-    settle,
+    relax,
+    relax_vertical,
 )
 from aerialdojo_gen.planning.connectivity import MOVES, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
@@ -54,10 +54,7 @@ def seed_goal(
     gx: float, gy: float, gz: float, yaw: float, reach: float, radius: float,
     grid: GridArrays, moves: NDArray[np.uint32], cost: NDArray[np.float32], prefer: Preference,
 ) -> NDArray[np.int32]:  # fmt: skip
-    """Write the cost of the straight way to the goal into the cells within `reach` that see it.
-
-    Returns their numbers.
-    """
+    """Write the cost of the straight path to the goal into the free cells within `reach`; return their indices."""
     nx, ny, nz = cost.shape
     found = np.empty(4096, np.int32)
     n = 0
@@ -100,52 +97,52 @@ def expand_cost(
     cost: NDArray[np.float32],
     clearance_cost: NDArray[np.float32],
 ) -> int:
-    """Cheapest costs over passable moves from seeded cells, into `cost` (nx, ny, nz).
+    """Cheapest costs over passable moves from seeded cells, into `cost` (nx, ny, nz); return the column visits.
 
     Label-correcting by columns, equal to Dijkstra's to the bit as quanta add up exactly.
     """
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(cell)
     limit = np.float32(bound)
-    waiting, departed = np.zeros((nx, ny), np.bool_), np.empty(len(KINDS) * nz, np.float32)
-    costs, passable, tight = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
-    left, visits = 0, 0
+    queued, departures = np.zeros((nx, ny), np.bool_), np.empty(len(KINDS) * nz, np.float32)
+    costs, passable, flat_clearance_cost = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    n_queued, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
         middle_i, middle_j = seed // nz // ny, seed // nz % ny
-        if not waiting[middle_i, middle_j]:
-            waiting[middle_i, middle_j] = True
-            left += 1
+        if not queued[middle_i, middle_j]:
+            queued[middle_i, middle_j] = True
+            n_queued += 1
     n = order.shape[0]
-    outwards = True
-    while left > 0:
-        before = visits
+    outward = True
+    while n_queued > 0:
+        visits_before = visits
         for a in range(n):
-            b = a if outwards else n - 1 - a
+            b = a if outward else n - 1 - a
             i, j = middle_i + order[b, 0], middle_j + order[b, 1]
-            if i < 0 or j < 0 or i >= nx or j >= ny or not waiting[i, j]:
+            if i < 0 or j < 0 or i >= nx or j >= ny or not queued[i, j]:
                 continue
-            waiting[i, j] = False
-            left -= 1
+            queued[i, j] = False
+            n_queued -= 1
             visits += 1
             base = (i * ny + j) * nz
-            settle(costs, passable, tight, base, base + nz, lengths[UP], coarse[UP])
+            relax_vertical(costs, passable, flat_clearance_cost, base, base + nz, lengths[UP], coarse[UP])
             for kind in range(len(KINDS)):
                 k = KINDS[kind]
-                leave(costs, tight, base, nz, lengths[k], coarse[k], departed, kind * nz)
+                departure_costs(costs, flat_clearance_cost, base, nz, lengths[k], coarse[k], departures, kind * nz)
             for m in FLAT:
                 u, v = i + MOVES[m, 0], j + MOVES[m, 1]
                 if (
                     0 <= u < nx
                     and 0 <= v < ny
-                    and push(departed, KIND_OF[m] * nz, passable, base, costs, (u * ny + v) * nz, nz, m, limit)
-                    and not waiting[u, v]
+                    and relax(departures, KIND_OF[m] * nz, passable, base, costs, (u * ny + v) * nz, nz, m, limit)
+                    and not queued[u, v]
                 ):
-                    waiting[u, v] = True
-                    left += 1
-        if visits == before:
-            break  # what still waits lies beyond the reach
-        outwards = not outwards
+                    queued[u, v] = True
+                    n_queued += 1
+        if visits == visits_before:
+            break  # the columns still queued lie beyond the reach
+        outward = not outward
     return visits
 
 
@@ -154,7 +151,7 @@ def extra_cost(
     x: float, y: float, z: float, goal: NDArray[np.float64], grid: GridArrays, moves: NDArray[np.uint32],
     cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
 ) -> float:  # fmt: skip
-    """The part of a point's cost-to-go that is not metres, by following the cheapest grid path; 0 if unreached."""
+    """The part of a point's cost-to-go that is not length, along the cheapest grid path; 0 if unreached."""
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(grid.cell)
     ci = math.floor((x - grid.origin[0]) / grid.cell - 0.5)
@@ -170,9 +167,9 @@ def extra_cost(
                     low, i, j, k = through, u, v, w
     if i < 0:
         return 0.0
-    total, on = 0.0, True
-    while on:
-        on = False
+    total, advanced = 0.0, True
+    while advanced:
+        advanced = False
         for m in range(MOVES.shape[0]):
             # Move m back is passable where move m is.
             if not (moves[i, j, k] >> np.uint32(m)) & np.uint32(1):
@@ -181,7 +178,7 @@ def extra_cost(
             extra = coarse[m] * clearance_cost[u, v, w]
             if cost[u, v, w] + (lengths[m] + extra) == cost[i, j, k]:
                 total += extra
-                i, j, k, on = u, v, w, True
+                i, j, k, advanced = u, v, w, True
                 break
     px, py, pz = cell_centre(i, j, k, grid)
     return total + cost[i, j, k] - math.sqrt((px - goal[0]) ** 2 + (py - goal[1]) ** 2 + (pz - goal[2]) ** 2)
@@ -189,10 +186,7 @@ def extra_cost(
 
 @njit(cache=True)
 def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.float32]) -> float:
-    """Cost-to-go of a point: trilinear between the 8 nearest cells, where they agree; metres.
-
-    Where a cell is blocked, or the cells lie on two sides of something, it is the cheapest way through one of them.
-    """
+    """Cost-to-go of a point, metres: trilinear between the 8 nearest cells if they agree, else via the cheapest."""
     return cost_between(x, y, z, grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, cost)
 
 
@@ -200,16 +194,13 @@ def cost_at(x: float, y: float, z: float, grid: GridArrays, cost: NDArray[np.flo
 def cost_between(
     x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, cost: NDArray[np.float32]
 ) -> float:  # fmt: skip
-    """`cost_at` for inner loops, where handing over a tuple of arrays costs more than the work.
-
-    Metres, inf if unreached.
-    """
+    """`cost_at` for inner loops, where passing a tuple of arrays costs more than the work; inf if unreached."""
     nx, ny, nz = cost.shape
     fx, fy, fz = (x - ox) / cell - 0.5, (y - oy) / cell - 0.5, (z - oz) / cell - 0.5
     i = max(0, min(int(max(fx, 0.0)), nx - 2))
     j = max(0, min(int(max(fy, 0.0)), ny - 2))
     k = max(0, min(int(max(fz, 0.0)), nz - 2))
-    # Points within half a cell of the border are extrapolated to, others outside are not.
+    # Extrapolate up to half a cell beyond the border.
     fx = min(max(fx - i, -0.5), 1.5)
     fy = min(max(fy - j, -0.5), 1.5)
     fz = min(max(fz - k, -0.5), 1.5)
@@ -224,7 +215,7 @@ def cost_between(
         return p * (1 - fx) + q * fx
     if low == np.inf:
         return np.inf
-    # One corner after the other, written out: this runs for every state next to a surface.
+    # Unrolled: this runs for every state next to a surface.
     r00, r01 = math.sqrt(fx * fx + fy * fy), math.sqrt(fx * fx + (1 - fy) * (1 - fy))
     r10, r11 = math.sqrt((1 - fx) * (1 - fx) + fy * fy), math.sqrt((1 - fx) * (1 - fx) + (1 - fy) * (1 - fy))
     r00, r01, r10, r11, s, t = (

@@ -1,7 +1,7 @@
-"""The direct way to a goal, tried from every expanded state (Hybrid A*'s analytic expansion).
+"""The direct path to a goal, tried from expanded states (Hybrid A*'s analytic expansion).
 
-Where nothing stands between a state and the goal, the shortest way in the action set's metric is known without a
-search: metres along the two directions of the 24 on either side of the goal, metres up or down, and the Approach.
+Without obstacles between a state and the goal, the shortest path in the action set's metric needs no search: metres
+along the two of the 24 directions on either side of the goal, metres up or down, and the Approach.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from aerialdojo_gen.planning.translations import DOWN, UP
 
 # Orders of the three legs: along the nearer direction clockwise, counter-clockwise, vertical.
 _ORDERS = np.array([(2, 0, 1), (0, 1, 2), (2, 1, 0), (1, 0, 2), (0, 2, 1), (1, 2, 0)], np.int64)
-# A cost-to-go above this many times the direct way's length, and so many metres more, says that something is there.
+# A cost-to-go above the direct path's length by this factor and margin means that an obstacle is in between.
 _DETOUR, _DETOUR_M = 1.03, 1.0
-# No lattice way is longer than this many times the level distance, nor shorter by more than an Approach spares.
-_LONGEST, _SPARED = 1.01, 0.45
+# Longest lattice path per level distance, and the most that an Approach shortens it by per metre.
+_MAX_LATTICE_RATIO, _APPROACH_SAVING = 1.01, 0.45
 _SPLITS = 4
 _COS, _SIN = math.cos(TURN_RAD), math.sin(TURN_RAD)
 
 
 @njit(cache=True, error_model="numpy")
-def _proven(
+def _proven_free(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float,
     ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
 ) -> bool:  # fmt: skip
-    """Whether the grid proves a segment free; for inner loops, and not as good at it as `segment_free`."""
+    """Whether the grid proves a segment free; for inner loops, weaker than `segment_free`."""
     dx, dy, dz = qx - px, qy - py, qz - pz
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length == 0.0:
@@ -51,13 +51,13 @@ def _proven(
 
 
 @njit(cache=True, error_model="numpy")
-def _some_order_proven(
+def _any_order_proven_free(
     x: float, y: float, z: float, ax: float, ay: float, bx: float, by: float, lift: float, radius: float,
     grid: GridArrays,
 ) -> bool:  # fmt: skip
     """Whether the grid proves three legs free in some order, given as two level displacements and a lift.
 
-    The ways are edges of a box, and every edge belongs to two of them or is looked at once.
+    The paths run along the edges of a box; every edge is checked once.
     """
     ox, oy, oz, cell, field = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field
     reached = 1
@@ -82,7 +82,7 @@ def _some_order_proven(
                 qx, qy = px + bx, py + by
             else:
                 qz = pz + lift
-            if _proven(px, py, pz, qx, qy, qz, radius, ox, oy, oz, cell, field):
+            if _proven_free(px, py, pz, qx, qy, qz, radius, ox, oy, oz, cell, field):
                 reached |= 1 << beyond
                 if beyond == 7:
                     return True
@@ -92,32 +92,35 @@ def _some_order_proven(
 @njit(cache=True, error_model="numpy")
 def direct_legs(
     x: float, y: float, z: float, start_yaw: float, goal: NDArray[np.float64], goal_yaw: float, h: float,
-    most: float, radius: float, approach: float, prefer: Preference, grid: GridArrays,
+    max_length: float, radius: float, approach: float, prefer: Preference, grid: GridArrays,
     directions: NDArray[np.int64], metres: NDArray[np.int64],
 ) -> tuple[float, float]:  # fmt: skip
-    """Direct way from a state to the goal by at most three legs, written into `directions` and `metres`.
+    """Write the direct path to the goal, at most three legs, into `directions` and `metres`.
 
-    Length (inf if not proved free) and extra cost, metres.
+    Returns its length (inf if not proved free) and extra cost, metres.
     """
     dx, dy, dz = goal[0] - x, goal[1] - y, goal[2] - z
     flat = math.sqrt(dx * dx + dy * dy)
-    if h > _DETOUR * (_LONGEST * flat + abs(dz)) + _DETOUR_M or flat + abs(dz) - _SPARED * approach > most:
+    if (
+        h > _DETOUR * (_MAX_LATTICE_RATIO * flat + abs(dz)) + _DETOUR_M
+        or flat + abs(dz) - _APPROACH_SAVING * approach > max_length
+    ):
         return np.inf, 0.0
     turn = math.atan2(dy, dx) - start_yaw
     a = math.floor(turn / TURN_RAD)
     ax, ay = math.cos(start_yaw + a * TURN_RAD), math.sin(start_yaw + a * TURN_RAD)
     bx, by = ax * _COS - ay * _SIN, ay * _COS + ax * _SIN
     along_a, along_b = (dx * by - dy * bx) / _SIN, (ax * dy - ay * dx) / _SIN
-    if not _some_order_proven(
+    if not _any_order_proven_free(
         x, y, z, along_a * ax, along_a * ay, along_b * bx, along_b * by, dz, radius, grid
     ):  # fmt: skip
         return np.inf, 0.0
     sign = 1.0 if dz >= 0.0 else -1.0
     cos_yaw, sin_yaw = math.cos(goal_yaw), math.sin(goal_yaw)
     best, na, nb, nz = np.inf, 0, 0, 0
-    least = max(0, math.ceil(along_a + along_b - approach))
+    min_total = max(0, math.ceil(along_a + along_b - approach))
     share = along_a / max(along_a + along_b, 1e-9)
-    for total in range(least, least + 4):
+    for total in range(min_total, min_total + 4):
         middle = round(share * total)
         for p in range(max(0, middle - _SPLITS), min(total, middle + _SPLITS) + 1):
             ex, ey = dx - p * ax - (total - p) * bx, dy - p * ay - (total - p) * by
@@ -148,7 +151,7 @@ def direct_legs(
     last = clearance_penalty(
         ux, uy, uz, goal[0], goal[1], goal[2], prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
     )  # fmt: skip
-    least_extra, order = np.inf, 0
+    min_extra, order = np.inf, 0
     for o in range(_ORDERS.shape[0]):
         px, py, pz, extra = x, y, z, 0.0
         for i in range(3):
@@ -170,17 +173,17 @@ def direct_legs(
             extra += clearance_penalty(
                 px, py, pz, qx, qy, qz, prefer.clearance, prefer.weight, gx, gy, gz, cell, grid.field
             )  # fmt: skip
-            if extra >= least_extra:
+            if extra >= min_extra:
                 break
             px, py, pz = qx, qy, qz
-        if extra < least_extra:
-            least_extra, order = extra, o
+        if extra < min_extra:
+            min_extra, order = extra, o
             if extra == 0.0:
                 break
-    if least_extra == np.inf:
+    if min_extra == np.inf:
         return np.inf, 0.0
     for i in range(3):
         leg = _ORDERS[order, i]
         directions[i] = (UP if sign > 0 else DOWN) if leg == 2 else (a + leg) % N_HEADINGS
         metres[i] = nz if leg == 2 else (nb if leg == 1 else na)
-    return length, last + least_extra
+    return length, last + min_extra

@@ -12,10 +12,9 @@ from aerialdojo_gen.geometry.triangles import point_triangle_d2
 
 # float32 rounds either way: take off more than it can add, so that a bound stays a bound.
 _ROUNDING_M = 1e-5
-# A box or a plane that is farther than a known distance by more than this cannot hold a nearer point, however the
-# last bits fall: a factor on squares, and something added to them.
-_SURE, _SURE_M = 1.0 + 1e-6, 1e-9
-# Of the square of the area that its edges span: what has less is a sliver.
+# Safety factor and offset on squared distances: nothing beyond them is nearer, whatever the rounding.
+_SAFETY, _SAFETY_M = 1.0 + 1e-6, 1e-9
+# Triangles below this share of the squared area spanned by their edges are slivers.
 _SLIVER = 1e-6
 
 
@@ -28,21 +27,20 @@ def _edge_d2(wx: float, wy: float, wz: float, ux: float, uy: float, uz: float, i
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _splat(
+def _lower_in_band(
     tri: NDArray[np.float64], origin: NDArray[np.float64], cell: float, band: float, field: NDArray[np.float32]
 ) -> None:
-    """Lower `field` (squared distances) to every triangle's, as far as `band` from the triangle's box.
+    """Lower `field` (squared distances) to the distance of every triangle, up to `band` from the triangle's box.
 
-    Where the box or the plane of a triangle is farther than what is known already, the triangle is not asked. The
-    distance is that of `aerialdojo_gen.geometry.triangles.point_triangle_d2`, with what depends on the triangle
-    alone taken out of the loop over cells.
+    Cells whose distance is below that to the triangle's box or plane are skipped. The distance is that of
+    `aerialdojo_gen.geometry.triangles.point_triangle_d2`, with the triangle's constants hoisted out of the loop.
     """
     nx, ny, nz = field.shape
     ox, oy, oz = origin[0], origin[1], origin[2]
     band2 = band * band
     # In float32 the band's edge may seem a little further out.
-    edge2 = band2 * _SURE + _SURE_M
-    above2 = np.empty(nz)
+    edge2 = band2 * _SAFETY + _SAFETY_M
+    vertical2 = np.empty(nz)
     for k in range(tri.shape[0]):
         ax, ay, az = tri[k, 0], tri[k, 1], tri[k, 2]
         ux, uy, uz = tri[k, 3] - ax, tri[k, 4] - ay, tri[k, 5] - az
@@ -54,7 +52,7 @@ def _splat(
         iu, iv, ie = 1.0 / uu if uu > 0.0 else 0.0, 1.0 / vv if vv > 0.0 else 0.0, 1.0 / ee if ee > 0.0 else 0.0
         im = 1.0 / mm if mm > 0.0 else 0.0
         plane2 = band2 * mm
-        # A sliver's normal is noise: how far its plane is says nothing.
+        # A sliver's normal is noise: the distance to its plane is meaningless.
         i_plane = im if mm > _SLIVER * uu * vv else 0.0
         lx, ly, lz = min(0.0, ux, vx), min(0.0, uy, vy), min(0.0, uz, vz)
         hx, hy, hz = max(0.0, ux, vx), max(0.0, uy, vy), max(0.0, uz, vz)
@@ -67,23 +65,23 @@ def _splat(
         for l in range(z0, z1 + 1):  # noqa: E741
             wz = oz + (l + 0.5) * cell - az
             gz = max(0.0, max(lz - wz, wz - hz))
-            above2[l] = gz * gz
+            vertical2[l] = gz * gz
         for i in range(x0, x1 + 1):
             wx = ox + (i + 0.5) * cell - ax
             gx = max(0.0, max(lx - wx, wx - hx))
             for j in range(y0, y1 + 1):
                 wy = oy + (j + 0.5) * cell - ay
                 gy = max(0.0, max(ly - wy, wy - hy))
-                beside2 = gx * gx + gy * gy
-                if beside2 > edge2:
+                lateral2 = gx * gx + gy * gy
+                if lateral2 > edge2:
                     continue
                 for l in range(z0, z1 + 1):  # noqa: E741
-                    known2 = min(np.float64(field[i, j, l]) * _SURE + _SURE_M, edge2)
-                    if beside2 + above2[l] > known2:
+                    limit2 = min(np.float64(field[i, j, l]) * _SAFETY + _SAFETY_M, edge2)
+                    if lateral2 + vertical2[l] > limit2:
                         continue
                     wz = oz + (l + 0.5) * cell - az
                     h = wx * mx + wy * my + wz * mz
-                    if h * h > plane2 or h * h * i_plane > known2:
+                    if h * h > plane2 or h * h * i_plane > limit2:
                         continue
                     wu, wv = wx * ux + wy * uy + wz * uz, wx * vx + wy * vy + wz * vz
                     # Barycentric coordinates of the foot on the plane, times mm: inside, the plane decides.
@@ -103,17 +101,17 @@ def _splat(
 
 
 @njit(cache=True, nogil=True)
-def _seed_around(
+def _mark_outside_seeds(
     tri: NDArray[np.float64],
     origin: NDArray[np.float64],
     cell: float,
-    before: NDArray[np.int64],
+    margin_below: NDArray[np.int64],
     n: NDArray[np.int64],
     seeds: NDArray[np.bool_],
 ) -> None:
-    """Mark the cells around the grid of `n` cells that hold a surface point, and some whose centre is as near to one.
+    """Mark the cells outside the grid of `n` cells that hold a surface point, and some with a centre as near to one.
 
-    `seeds` begins `before` cells below the grid's first one, and is as large as there are cells that matter.
+    `seeds` begins `margin_below` cells below the grid's first cell.
     """
     half2 = 0.75 * cell * cell
     low, high, at = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
@@ -123,17 +121,17 @@ def _seed_around(
             least = min(tri[t, a], tri[t, a + 3], tri[t, a + 6]) - origin[a]
             most = max(tri[t, a], tri[t, a + 3], tri[t, a + 6]) - origin[a]
             within = within and least >= 0.0 and most <= n[a] * cell
-            low[a] = max(0, math.floor(least / cell) + before[a])
-            high[a] = min(seeds.shape[a] - 1, math.floor(most / cell) + before[a])
+            low[a] = max(0, math.floor(least / cell) + margin_below[a])
+            high[a] = min(seeds.shape[a] - 1, math.floor(most / cell) + margin_below[a])
         if within:
             continue
         for i in range(low[0], high[0] + 1):
-            at[0] = i - before[0]
+            at[0] = i - margin_below[0]
             for j in range(low[1], high[1] + 1):
-                at[1] = j - before[1]
+                at[1] = j - margin_below[1]
                 flat = 0 <= at[0] < n[0] and 0 <= at[1] < n[1]
                 for k in range(low[2], high[2] + 1):
-                    at[2] = k - before[2]
+                    at[2] = k - margin_below[2]
                     if seeds[i, j, k] or (flat and 0 <= at[2] < n[2]):
                         continue
                     x, y, z = (
@@ -145,31 +143,31 @@ def _seed_around(
 
 
 @njit(cache=True, nogil=True)
-def _lower(row: NDArray[np.float32], other: NDArray[np.float32], add: np.float32) -> None:
-    """Lower a row to another one plus a number; by itself, so that it becomes vector instructions."""
+def _lower_row(row: NDArray[np.float32], other: NDArray[np.float32], add: np.float32) -> None:
+    """Lower a row to another one plus a number; a function of its own, so that it is vectorised."""
     for k in range(len(row)):
         value = other[k] + add
         row[k] = value if value < row[k] else row[k]
 
 
 @njit(cache=True, nogil=True)
-def _beyond(
+def _fill_outside_band(
     field: NDArray[np.float32],
     cell: float,
     band: float,
     cap: float,
     seeds: NDArray[np.bool_],
-    before: NDArray[np.int64],
+    margin_below: NDArray[np.int64],
 ) -> None:
-    """Turn squared distances into distances, and fill in lower bounds where the band ends.
+    """Turn squared distances into distances, and fill in lower bounds beyond the band.
 
     The cell that holds the nearest surface point has its centre within half a cell's diagonal of it: so a cell's
-    distance is at least that to the nearest such cell, less half a diagonal. `seeds` are such cells, those around
-    the grid included: it begins `before` cells below the grid's first one.
+    distance is at least that to the nearest such cell, less half a diagonal. `seeds` are such cells, inside and
+    outside the grid: it begins `margin_below` cells below the grid's first cell.
     """
     nx, ny, nz = field.shape
     mx, my, mz = seeds.shape
-    bx, by, bz = before[0], before[1], before[2]
+    bx, by, bz = margin_below[0], margin_below[1], margin_below[2]
     half = cell * math.sqrt(3.0) / 2
     reach = math.ceil((cap + half) / cell) + 1
     far = np.float32(1e6)
@@ -195,13 +193,13 @@ def _beyond(
             row = along_y[i, j]
             row[:] = along_z[i, j + by]
             for m in range(max(0, j + by - reach), min(my, j + by + reach + 1)):
-                _lower(row, along_z[i, m], np.float32((m - j - by) * (m - j - by)))
+                _lower_row(row, along_z[i, m], np.float32((m - j - by) * (m - j - by)))
     row = np.empty(nz, np.float32)
     for i in range(nx):
         for j in range(ny):
             row[:] = far
             for m in range(max(0, i + bx - reach), min(mx, i + bx + reach + 1)):
-                _lower(row, along_y[m, j], np.float32((m - i - bx) * (m - i - bx)))
+                _lower_row(row, along_y[m, j], np.float32((m - i - bx) * (m - i - bx)))
             for k in range(nz):
                 if field[i, j, k] <= band * band:
                     field[i, j, k] = max(0.0, math.sqrt(field[i, j, k]) - _ROUNDING_M)
@@ -213,10 +211,7 @@ def _beyond(
 def _seeds(
     triangles: NDArray[np.float64], origin: NDArray[np.float64], field: NDArray[np.float32], cell: float, cap: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    """Cells near enough to a surface to hold its points, (mx, my, mz) bool.
-
-    And by how many they begin below the grid.
-    """
+    """Cells near enough to a surface to hold its points, (mx, my, mz) bool, and their margin below the grid."""
     half = cell * math.sqrt(3.0) / 2
     n = np.array(field.shape, np.int64)
     # In float32 the corners of a cell may seem a little further from its centre.
@@ -224,17 +219,17 @@ def _seeds(
     if not len(triangles):
         return near, np.zeros(3, np.int64)
     corners = (triangles.reshape(-1, 3) - origin) / cell
-    # What is further out than the cap is of no matter.
+    # Surfaces beyond the cap do not matter.
     most = math.ceil((cap + half) / cell) + 1
-    before = np.clip(np.ceil(-corners.min(axis=0)), 0, most).astype(np.int64)
-    after = np.clip(np.floor(corners.max(axis=0)) + 1 - n, 0, most).astype(np.int64)
-    if not (before.any() or after.any()):
-        return near, before
-    seeds = np.zeros(tuple(before + n + after), np.bool_)
-    inner = tuple(slice(b, b + m) for b, m in zip(before.tolist(), n.tolist(), strict=True))
+    margin_below = np.clip(np.ceil(-corners.min(axis=0)), 0, most).astype(np.int64)
+    margin_above = np.clip(np.floor(corners.max(axis=0)) + 1 - n, 0, most).astype(np.int64)
+    if not (margin_below.any() or margin_above.any()):
+        return near, margin_below
+    seeds = np.zeros(tuple(margin_below + n + margin_above), np.bool_)
+    inner = tuple(slice(b, b + m) for b, m in zip(margin_below.tolist(), n.tolist(), strict=True))
     seeds[inner] = near
-    _seed_around(triangles, np.asarray(origin, np.float64), cell, before, n, seeds)
-    return seeds, before
+    _mark_outside_seeds(triangles, np.asarray(origin, np.float64), cell, margin_below, n, seeds)
+    return seeds, margin_below
 
 
 def build_distance_field(
@@ -245,13 +240,10 @@ def build_distance_field(
     band_m: float,
     cap_m: float,
 ) -> NDArray[np.float32]:
-    """Distance (nx, ny, nz) float32 from cell centres to the nearest triangle.
-
-    Never above the truth, exact to 2e-5 in the band.
-    """
+    """Distance (nx, ny, nz) float32 from cell centres to the nearest triangle: a lower bound, exact in the band."""
     if band_m < cell_m * math.sqrt(3.0) / 2:
         raise ValueError(f"band_m = {band_m} is less than half the diagonal of a cell of {cell_m} m")
     field = np.full(shape, np.float32(4e12))
-    _splat(triangles, origin, cell_m, band_m, field)
-    _beyond(field, cell_m, band_m, cap_m, *_seeds(triangles, origin, field, cell_m, cap_m))
+    _lower_in_band(triangles, origin, cell_m, band_m, field)
+    _fill_outside_band(field, cell_m, band_m, cap_m, *_seeds(triangles, origin, field, cell_m, cap_m))
     return field

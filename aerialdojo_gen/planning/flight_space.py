@@ -1,9 +1,7 @@
-"""The body in a scene: the motion of an action, and whether its sweep touches anything.
+"""The body in a scene: the motion of an action, and whether its sweep is in collision.
 
-One motion model in the project: magnitudes and headings are those of `aerialdojo_gen.geometry.motion`. A leg
-that the clearance grid proves free needs no more; FCL is asked about the others, a capsule for the exact sweep. That
-is what `aerialdojo_gen.planning.certify` does for reference trajectories, and what makes tens of thousands of steps a
-second.
+As for reference trajectories (`aerialdojo_gen.planning.certify`), FCL checks only the legs that the clearance grid
+does not prove free: that allows tens of thousands of steps a second.
 """
 
 from __future__ import annotations
@@ -21,12 +19,12 @@ from aerialdojo_gen.scenes.model import Scene
 Point = tuple[float, float, float]
 
 _OUTSIDE, _FREE, _UNDECIDED = 0, 1, 2
-# How well the place of a contact is known, metres.
+# Accuracy of the contact point, metres.
 _CONTACT_M = 1e-3
 
 
 @njit(cache=True)
-def _judge(
+def _classify(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, radius: float, grid: GridArrays
 ) -> int:  # fmt: skip
     if not inside(qx, qy, qz, grid.lower, grid.upper):
@@ -40,64 +38,61 @@ class FlightSpace:
     def __init__(self, scene: Scene, radius_m: float, world: CollisionWorld | None = None) -> None:
         self.scene = scene
         self.radius_m = radius_m
-        # An episode ends by a touch, and below open ground there is none.
+        # An episode ends at a collision, so a body cannot get below open ground.
         self.grid = ClearanceGrid.of(scene, radius_m=radius_m, closed_ground=False)
         self._arrays = self.grid.arrays
         self._world = world
 
     @cached_property
     def world(self) -> CollisionWorld:
-        """FCL's world; built when the grid is first at a loss."""
+        """FCL's world; built when a leg is first undecided by the grid."""
         return self._world or collision_world(self.scene)
 
     def in_collision(self, p: Point) -> bool:
         """Whether the body at `p`, metres, world frame, touches a surface."""
-        return _judge(*p, *p, self.radius_m, self._arrays) != _FREE and self.world.sphere_in_collision(
+        return _classify(*p, *p, self.radius_m, self._arrays) != _FREE and self.world.sphere_in_collision(
             p, self.radius_m
         )
 
     def fly(self, p: Point, q: Point) -> tuple[Point, bool, bool]:
-        """Fly straight from `p` to `q` (world metres).
-
-        The position reached, whether it collided, whether the volume's bounds refused it.
-        """
-        collision, refused = self.hindered(p, q)
-        if refused:
+        """Fly straight from `p` to `q` (world metres): position reached, collided, refused as out of bounds."""
+        collision, out_of_bounds = self.motion_outcome(p, q)
+        if out_of_bounds:
             return p, False, True
-        return (self._contact(p, q) if collision else q), collision, False
+        return (self._contact_point(p, q) if collision else q), collision, False
 
-    def hindered(self, p: Point, q: Point) -> tuple[bool, bool]:
-        """Say what keeps a body from flying from `p` to `q`: `fly` without where it then is."""
-        verdict = _judge(*p, *q, self.radius_m, self._arrays)
+    def motion_outcome(self, p: Point, q: Point) -> tuple[bool, bool]:
+        """Return whether flying from `p` to `q` collides, and whether it leaves the bounds; see `fly`."""
+        verdict = _classify(*p, *q, self.radius_m, self._arrays)
         if verdict in (_FREE, _OUTSIDE):
             return False, verdict == _OUTSIDE
         return self.world.segment_in_collision(p, q, self.radius_m), False
 
-    def _contact(self, p: Point, q: Point) -> Point:
+    def _contact_point(self, p: Point, q: Point) -> Point:
         length = sum((b - a) ** 2 for a, b in zip(p, q, strict=True)) ** 0.5
         free, touching = 0.0, 1.0
         while (touching - free) * length > _CONTACT_M:
             middle = 0.5 * (free + touching)
-            if self.world.segment_in_collision(p, _between(p, q, middle), self.radius_m):
+            if self.world.segment_in_collision(p, _interpolate(p, q, middle), self.radius_m):
                 touching = middle
             else:
                 free = middle
-        return _between(p, q, free)
+        return _interpolate(p, q, free)
 
 
-def _between(p: Point, q: Point, share: float) -> Point:
+def _interpolate(p: Point, q: Point, share: float) -> Point:
     return (p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1]), p[2] + share * (q[2] - p[2]))
 
 
 def flight_space(mesh: Path, sha256: str, radius_m: float, keep: int = SEVERAL) -> FlightSpace:
-    """Return a scene to fly in, a part of the scene's context: for all environments of a process."""
-    return _space_of(open_scene(mesh, sha256, keep), radius_m)
+    """Return the flight space of a scene's context, shared by all environments of a process."""
+    return _flight_space_of(open_scene(mesh, sha256, keep), radius_m)
 
 
-def build_ahead(mesh: Path, sha256: str, radius_m: float) -> None:
-    """Read a scene and build all that flying wants but what draws, for `flight_space` to find: in another thread."""
-    prefetch_mesh(mesh, sha256, lambda context: _space_of(context, radius_m).world)
+def prefetch_flight_space(mesh: Path, sha256: str, radius_m: float) -> None:
+    """Read a scene and build its flight space, without the renderer: to be called in a background thread."""
+    prefetch_mesh(mesh, sha256, lambda context: _flight_space_of(context, radius_m).world)
 
 
-def _space_of(context: SceneContext, radius_m: float) -> FlightSpace:
+def _flight_space_of(context: SceneContext, radius_m: float) -> FlightSpace:
     return context.part("flight space", lambda: FlightSpace(context.scene, radius_m), radius_m)

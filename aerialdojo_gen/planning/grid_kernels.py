@@ -1,4 +1,4 @@
-"""Numba kernels over the clearance grid: is a segment free, and how near does it come to a surface."""
+"""Numba kernels over the clearance grid: collision and clearance of segments."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FREE, UNKNOWN = -1, -2
 
 
 class GridArrays(NamedTuple):
-    """What kernels need of a clearance grid."""
+    """Arrays of a clearance grid, for kernels."""
 
     field: NDArray[np.float32]  # Lower bound of the distance from a cell's centre to the nearest surface, metres
     origin: NDArray[np.float64]  # (3,) float64; lower corner of cell (0, 0, 0), metres
@@ -31,7 +31,7 @@ class GridArrays(NamedTuple):
 
 @njit(cache=True, inline="always")
 def inside(x: float, y: float, z: float, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> bool:
-    """Whether a point lies in the closed box (lower, upper), give or take a nanometre of rounding."""
+    """Whether a point lies in the closed box (lower, upper), within a nanometre of rounding."""
     e = 1e-9
     return (
         lower[0] - e <= x <= upper[0] + e and lower[1] - e <= y <= upper[1] + e and lower[2] - e <= z <= upper[2] + e
@@ -48,7 +48,7 @@ def point_bound(x: float, y: float, z: float, grid: GridArrays) -> float:
 def bound_at(
     x: float, y: float, z: float, ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32]
 ) -> float:  # fmt: skip
-    """`point_bound` for inner loops, where a tuple of arrays costs more to hand over than the work itself."""
+    """`point_bound` for inner loops, where passing a tuple of arrays costs more than the work."""
     i = min(max(int((x - ox) / cell), 0), field.shape[0] - 1)
     j = min(max(int((y - oy) / cell), 0), field.shape[1] - 1)
     k = min(max(int((z - oz) / cell), 0), field.shape[2] - 1)
@@ -57,7 +57,7 @@ def bound_at(
 
 
 @njit(cache=True, error_model="numpy")
-def what_blocks(
+def find_blocker(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
     radius: float, grid: GridArrays, prove_only: bool, guess: int,
 ) -> int:  # fmt: skip
@@ -74,7 +74,7 @@ def what_blocks(
             return FREE
         return UNKNOWN if prove_only else segment_blocker(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
     ux, uy, uz = dx / length, dy / length, dz / length
-    t, doubt = 0.0, -1.0  # where the stretch begins that the grid cannot decide, if there is one
+    t, t0 = 0.0, -1.0  # t0: start of the undecided part, negative for none
     while t < length:
         slack = bound_at(px + t * ux, py + t * uy, pz + t * uz, ox, oy, oz, cell, field) - radius
         if slack > 0.1 * cell:
@@ -91,19 +91,19 @@ def what_blocks(
                     if segment_triangle_d2(px, py, pz, qx, qy, qz, grid.tri, guess, radius) <= radius * radius:
                         return guess
                     guess = -1
-                if doubt < 0.0:
-                    doubt = t
+                if t0 < 0.0:
+                    t0 = t
                 t = reached
                 if t < length:
                     continue
-        if doubt >= 0.0:
+        if t0 >= 0.0:
             found = segment_blocker(
-                px + doubt * ux, py + doubt * uy, pz + doubt * uz, px + t * ux, py + t * uy, pz + t * uz,
+                px + t0 * ux, py + t0 * uy, pz + t0 * uz, px + t * ux, py + t * uy, pz + t * uz,
                 radius, grid.tri, grid.boxes,
             )  # fmt: skip
             if found >= 0:
                 return found
-            doubt = -1.0
+            t0 = -1.0
         t = max(t, reached)
     return FREE
 
@@ -114,26 +114,23 @@ def segment_free(
     radius: float, grid: GridArrays, prove_only: bool,
 ) -> bool:  # fmt: skip
     """Whether a ball moving from p to q stays clear; with `prove_only` False means undecided."""
-    return what_blocks(px, py, pz, qx, qy, qz, radius, grid, prove_only, -1) == FREE
+    return find_blocker(px, py, pz, qx, qy, qz, radius, grid, prove_only, -1) == FREE
 
 
 @njit(cache=True, error_model="numpy")
 def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArrays) -> float:
-    """Smallest distance, metres, from a polyline (n, 3) to any surface, at most `bound`.
-
-    The least clear pieces come first.
-    """
+    """Smallest distance, metres, from a polyline (n, 3) to any surface, at most `bound`; least clear pieces first."""
     n, last = 0, points.shape[0] - 1
     longest = 2.0 * grid.cell
     for i in range(last):
-        n += _pieces(points, i, longest)
+        n += _n_pieces(points, i, longest)
     if n == 0:
         p = points[last]
         return point_distance(p[0], p[1], p[2], bound, grid.real_tri, grid.real_boxes)
-    ends, least = np.empty((n, 6)), np.empty(n)
+    ends, lower_bounds = np.empty((n, 6)), np.empty(n)
     k = 0
     for i in range(last):
-        m = _pieces(points, i, longest)
+        m = _n_pieces(points, i, longest)
         for piece in range(m):
             for axis in range(3):
                 p, d = points[i, axis], points[i + 1, axis] - points[i, axis]
@@ -141,11 +138,11 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
             e = ends[k]
             half = math.sqrt((e[3] - e[0]) ** 2 + (e[4] - e[1]) ** 2 + (e[5] - e[2]) ** 2) / 2
             middle = point_bound((e[0] + e[3]) / 2, (e[1] + e[4]) / 2, (e[2] + e[5]) / 2, grid)
-            least[k] = middle - half
+            lower_bounds[k] = middle - half
             k += 1
     best = bound
-    for k in np.argsort(least, kind="mergesort"):
-        if least[k] >= best:
+    for k in np.argsort(lower_bounds, kind="mergesort"):
+        if lower_bounds[k] >= best:
             break
         e = ends[k]
         best = segment_distance(e[0], e[1], e[2], e[3], e[4], e[5], best, grid.real_tri, grid.real_boxes)
@@ -153,6 +150,6 @@ def polyline_clearance(points: NDArray[np.float64], bound: float, grid: GridArra
 
 
 @njit(cache=True, inline="always")
-def _pieces(points: NDArray[np.float64], i: int, longest: float) -> int:
+def _n_pieces(points: NDArray[np.float64], i: int, longest: float) -> int:
     dx, dy, dz = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1], points[i + 1, 2] - points[i, 2]
     return max(1, math.ceil(math.sqrt(dx * dx + dy * dy + dz * dz) / longest))

@@ -1,6 +1,6 @@
-"""A short grid path between a goal and one start, by weighted A*: how long the shortest may be at most.
+"""A short grid path between a goal and one start, by weighted A*: an upper bound of the shortest.
 
-It looks at few cells where the way is plain, so that a single query knows how far its cost-to-go has to reach.
+A single query derives from it how far its cost-to-go has to reach.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from aerialdojo_gen.planning.column_kernels import move_lengths
 from aerialdojo_gen.planning.connectivity import MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 
-# A little above 1: of the many ways of equal cost one is followed to its end.
+# Slightly above 1, so that one of many paths of equal cost is followed to its end.
 _WEIGHT = 1.05
 _N_BUCKETS = 4096
 _N_ENTRIES = 1 << 20
@@ -26,7 +26,7 @@ GAVE_UP = -1.0
 
 
 class PathArrays(NamedTuple):
-    """Memory of a search for a grid path; pages never written cost nothing."""
+    """Working memory of a search for a grid path; untouched pages cost nothing."""
 
     heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first open entry of every bucket, -1 for none
     cell: NDArray[np.int32]  # (n,) arrays
@@ -61,8 +61,8 @@ def short_path_cost(
 ) -> float:  # fmt: skip
     """Cost, metres, of a short grid path from a start to the seeds, within `_WEIGHT` of the least; inf or GAVE_UP."""
     nx, ny, nz = costs.shape
-    flat, flat_moves, flat_narrow = costs.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
-    heads, cells, entered, nexts, touched = arrays.heads, arrays.cell, arrays.cost, arrays.next, arrays.touched
+    flat, flat_moves, flat_clearance_cost = costs.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    heads, cells, entry_costs, nexts, touched = arrays.heads, arrays.cell, arrays.cost, arrays.next, arrays.touched
     edge = grid.cell
     lengths, coarse = move_lengths(edge)
     n_moves = MOVES.shape[0]
@@ -72,7 +72,7 @@ def short_path_cost(
         (y - grid.origin[1]) / edge - 0.5,
         (z - grid.origin[2]) / edge - 0.5,
     )
-    # The cells that the start's cost-to-go is interpolated between, as in `cost_between`.
+    # The cells between which the start's cost-to-go is interpolated, as in `cost_between`.
     i0 = max(0, min(int(max(fx, 0.0)), nx - 2))
     j0 = max(0, min(int(max(fy, 0.0)), ny - 2))
     k0 = max(0, min(int(max(fz, 0.0)), nz - 2))
@@ -84,7 +84,7 @@ def short_path_cost(
         n_touched += 1
         if flat[seed] + h <= bound:
             bucket = int((flat[seed] + _WEIGHT * h) / width)
-            cells[n], entered[n], nexts[n], heads[bucket] = seed, flat[seed], heads[bucket], n
+            cells[n], entry_costs[n], nexts[n], heads[bucket] = seed, flat[seed], heads[bucket], n
             lowest = min(lowest, bucket)
             n += 1
     while True:
@@ -94,7 +94,7 @@ def short_path_cost(
             break
         entry = heads[lowest]
         heads[lowest] = nexts[entry]
-        c, g = cells[entry], entered[entry]
+        c, g = cells[entry], entry_costs[entry]
         if g > flat[c]:
             continue
         i, j, k = c // (ny * nz), c // nz % ny, c % nz
@@ -104,12 +104,12 @@ def short_path_cost(
         if n + n_moves > cells.shape[0] or n_touched + n_moves > touched.shape[0]:
             found = GAVE_UP
             break
-        bits, tight = flat_moves[c], flat_narrow[c]
+        bits, clearance_term = flat_moves[c], flat_clearance_cost[c]
         for m in range(n_moves):
             if not (bits >> np.uint32(m)) & np.uint32(1):
                 continue
             d = c + steps[m]
-            reached = g + (lengths[m] + coarse[m] * tight)
+            reached = g + (lengths[m] + coarse[m] * clearance_term)
             if reached >= flat[d]:
                 continue
             h = edge * grid_metric(i + MOVES[m, 0] - fx, j + MOVES[m, 1] - fy, k + MOVES[m, 2] - fz)
@@ -120,7 +120,7 @@ def short_path_cost(
                 n_touched += 1
             flat[d] = reached
             bucket = int((reached + _WEIGHT * h) / width)
-            cells[n], entered[n], nexts[n], heads[bucket] = d, reached, heads[bucket], n
+            cells[n], entry_costs[n], nexts[n], heads[bucket] = d, reached, heads[bucket], n
             lowest = min(lowest, bucket)
             n += 1
     heads[:] = -1

@@ -4,12 +4,11 @@ A state is (x, y, z, heading): positions are continuous, headings 15° apart fro
 states of one cell and heading sector. An edge is a translation together with the turns that it needs: to fly in any
 of the 24 directions the body turns until that direction lies ahead, to its left or to its right, whichever takes
 fewer turns. Turning adds nothing to the length, so every action carries a small cost that breaks ties. The Approach,
-with the turns before it, is an edge to the goal like any other, and so is the direct way
-(`aerialdojo_gen.planning.direct`), which ends most searches long before they would have walked there.
+with the turns before it, is an edge to the goal like any other, and so is the direct path
+(`aerialdojo_gen.planning.direct`), which ends most searches early.
 
-Edges are put on the open list unchecked and tested for collisions when they are taken off it, for most never are.
-What they cost beside their metres, for flying near surfaces, is found out then too: an edge that costs more goes back
-on the list, to where it belongs.
+Edges are pushed unchecked and tested for collisions when they are popped (lazy evaluation): most never are. Their
+clearance cost is computed then too, and an edge that costs more is pushed again.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.cost_to_go import cost_at, cost_between
 from aerialdojo_gen.planning.direct import direct_legs
-from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, segment_free, what_blocks
+from aerialdojo_gen.planning.grid_kernels import FREE, GridArrays, find_blocker, segment_free
 from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import (
     LIFTS_M,
@@ -34,22 +33,22 @@ from aerialdojo_gen.planning.translations import (
     N_TURNS,
     STEPS_M,
     TURN_BY,
-    actions_of,
+    append_legs,
+    count_actions,
     turns_between,
-    with_legs,
     wrap_heading,
 )
 
-# Ways to the goal: the Approach alone, and the direct way.
+# Edges to the goal: the Approach alone, and the direct path.
 _TO_GOAL, _DIRECT = N_TRANSLATIONS, N_TRANSLATIONS + 1
-# Once one is known, others are looked for where they may be cheaper by this.
-_BETTER_M = 0.1
-# It is tried from states that are nearer than all before, and from one in so many others.
-_TRIED = 4
-# What it costs for the surfaces that it comes near counts so many times: the search may yet find more room.
-_CARE = 3.0
-# A step that leads away from where the search goes, by so much: longer ones that way are thought of when it is taken.
-_LONGER, _SPREAD_M = 100, 0.3
+# Once one is known, another must be cheaper by this to be tried.
+_MIN_GAIN_M = 0.1
+# The direct path is tried from states nearer than all before, and from every fourth of the others.
+_DIRECT_EVERY = 4
+# Factor on the direct path's clearance cost: the search may still find a clearer one.
+_CLEARANCE_FACTOR = 3.0
+# When a direction's shortest step is worse than the state by this, its longer steps are pushed when it is popped.
+_DEFERRED, _DEFER_MARGIN_M = 100, 0.3
 
 FOUND, EXHAUSTED, BUDGET = 0, 1, 2
 
@@ -57,29 +56,29 @@ _BUCKET_M = 0.02
 _N_BUCKETS = 8192
 # As `grid_kernels.inside` allows.
 _ROUNDING_M = 1e-9
-# Most edges that the grid does not prove free are blocked, four in five of them by what blocked one close by before.
+# Most edges that the grid does not prove free are blocked, four in five by the last blocker of a nearby edge.
 _N_BLOCKERS = 4096
 _HASH = np.uint64(0x9E3779B97F4A7C15)
 
 
 class SearchArrays(NamedTuple):
-    """Memory of a search, made once and used again for every plan."""
+    """Working memory of a search, reused by every plan."""
 
     pose: NDArray[np.float64]  # (n, 3) float64; position of every expanded state, metres
     cost: NDArray[np.float64]  # (n,) float64; cost from the start
-    heading: NDArray[np.int8]  # (n,) int8; heading, and the translation that led here
+    heading: NDArray[np.int8]  # (n,) int8; heading, and the translation that led to the state
     move: NDArray[np.int8]
     parent: NDArray[np.int32]  # (n,) int32; expanded state before it, -1 for the start
     edge_parent: NDArray[np.int32]
     edge_move: NDArray[np.int8]
     edge_next: NDArray[np.int32]
-    edge_extra: NDArray[np.float32]  # (m,) float32; what such an edge costs beside its metres
+    edge_extra: NDArray[np.float32]  # (m,) float32; clearance cost of a popped edge
     heads: NDArray[np.int32]  # (_N_BUCKETS,) int32; first edge of every bucket, -1 for none
     keys: NDArray[np.int64]  # (power of two,) int64; hash table of closed states
     stamps: NDArray[np.int32]  # (power of two,) int32; search that wrote a slot of the table
     clock: NDArray[np.int32]  # (1,) int32; number of the search
     highest: NDArray[np.float64]  # (1,) float64
-    blockers: NDArray[np.int32]  # Triangle that blocked an edge last, by where the edge's middle is; -1 for none
+    blockers: NDArray[np.int32]  # Last triangle that blocked an edge, by hash of the edge's middle; -1 for none
 
 
 class SearchOptions(NamedTuple):
@@ -87,18 +86,18 @@ class SearchOptions(NamedTuple):
 
     radius: float  # Radius that must stay clear, metres
     weight: float  # Of the cost-to-go; 1 is plain A*
-    action_cost: float  # Cost of an action beside the metres that it flies
+    action_cost: float  # Cost of an action on top of its metres
     approach: float  # Longest Approach, metres
-    budget: int  # Most expansions
-    cell: float  # Edge of the cells that tell duplicates, metres
-    sectors: int  # Heading sectors that tell duplicates, a divisor of 24
+    budget: int  # Maximum number of expansions
+    cell: float  # Edge of the duplicate-detection cells, metres
+    sectors: int  # Heading sectors of duplicate detection, a divisor of 24
     sideways: float
-    prefer: Preference  # What costs beside metres and actions
-    goal_tolerance: float  # A way to the goal is taken though another may be cheaper by this, metres
+    prefer: Preference  # Costs other than metres and actions
+    goal_tolerance: float  # An edge to the goal is accepted though another may be cheaper by this, metres
 
 
 def make_search_arrays(budget: int) -> SearchArrays:
-    """Reserve memory for searches of up to `budget` expansions; pages never written cost nothing."""
+    """Reserve memory for searches of up to `budget` expansions; untouched pages cost nothing."""
     n, edges = budget + 2, (budget + 2) * (N_TRANSLATIONS + 2)
     slots = 1 << max(10, math.ceil(math.log2(4 * n)))
     return SearchArrays(
@@ -111,7 +110,7 @@ def make_search_arrays(budget: int) -> SearchArrays:
 
 @njit(cache=True)
 def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]) -> int:
-    """Where in the table of closed states a key stands, as it is written, or ~slot of where it would."""
+    """Slot of a key in the table of closed states, or ~slot of its insertion point."""
     mask = keys.shape[0] - 1
     # The high bits of the product are the well mixed ones.
     slot = int((np.uint64(key) * _HASH) >> np.uint64(40)) & mask
@@ -123,13 +122,13 @@ def _slot(key: int, now: int, keys: NDArray[np.int64], stamps: NDArray[np.int32]
 
 
 @njit(cache=True, inline="always")
-def _place(x: float, y: float, z: float) -> int:
-    """Where the triangle that blocked an edge is remembered, given the edge's middle in metres."""
+def _blocker_slot(x: float, y: float, z: float) -> int:
+    """Slot of an edge in the blocker cache, given the edge's middle in metres."""
     return (int(x) * 73 + int(y) * 7919 + int(z) * 104729) & (_N_BLOCKERS - 1)
 
 
 @njit(cache=True)
-def _moves_to(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -> NDArray[np.int8]:
+def _backtrack(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -> NDArray[np.int8]:
     """Translations from the start to an expanded state."""
     count, last = 0, node
     while parents[last] >= 0:
@@ -160,12 +159,12 @@ def search(
         flights[m, 0], flights[m, 1], flights[m, 3] = math.cos(angle) * length, math.sin(angle) * length, length
     for m in range(N_FLAT, N_TRANSLATIONS):
         flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
-    # Scalars and plain arrays: a tuple of arrays costs more to hand over than the inner loop's work.
+    # Scalars and plain arrays: passing a tuple of arrays costs more than the inner loop's work.
     pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
     edge_parent, edge_move, edge_next, edge_extra, heads, keys, stamps, blockers = (
         s.edge_parent, s.edge_move, s.edge_next, s.edge_extra, s.heads, s.keys, s.stamps, s.blockers
     )  # fmt: skip
-    room, tightness, field = o.prefer.clearance, o.prefer.weight, grid.field
+    near_m, near_weight, field = o.prefer.clearance, o.prefer.weight, grid.field
     goal_yaw = start[3] + goal_heading * TURN_RAD
     ox, oy, oz, edge = grid.origin[0], grid.origin[1], grid.origin[2], grid.cell
     lx, ly, lz = grid.lower[0] - _ROUNDING_M, grid.lower[1] - _ROUNDING_M, grid.lower[2] - _ROUNDING_M
@@ -174,37 +173,37 @@ def search(
     now = s.clock[0]
     heads[:], blockers[:] = -1, -1
     f0 = o.weight * cost_at(start[0], start[1], start[2], grid, cost_to_go) - 5.0
-    f_most = (_N_BUCKETS - 1) * _BUCKET_M
+    f_max = (_N_BUCKETS - 1) * _BUCKET_M
     # The start is an edge from nowhere.
     edge_parent[0], edge_move[0], edge_next[0], heads[0] = -1, 0, -1, 0
     n, n_edges, lowest, highest = 0, 1, 0, -1
     nearest = np.inf
     legs, metres = np.zeros(3, np.int64), np.zeros(3, np.int64)
-    none = np.empty(0, np.int8)
+    no_moves = np.empty(0, np.int8)
     while True:
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
         if lowest == _N_BUCKETS:
-            return EXHAUSTED, n, none
+            return EXHAUSTED, n, no_moves
         if lowest > highest:
             highest = lowest
             s.highest[0] = f0 + (lowest + 1) * _BUCKET_M
-        taken, level = heads[lowest], lowest
-        heads[lowest] = edge_next[taken]
-        parent, move = edge_parent[taken], int(edge_move[taken])
+        entry, level = heads[lowest], lowest
+        heads[lowest] = edge_next[entry]
+        parent, move = edge_parent[entry], int(edge_move[entry])
         if move == _TO_GOAL:
-            return FOUND, n, _moves_to(parent, parents, moves)
+            return FOUND, n, _backtrack(parent, parents, moves)
         if move == _DIRECT:
             x, y, z = pose[parent, 0], pose[parent, 1], pose[parent, 2]
             direct_legs(
                 x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
-            return FOUND, n, with_legs(_moves_to(parent, parents, moves), legs, metres)
-        known = move < 0
-        if known:
+            return FOUND, n, append_legs(_backtrack(parent, parents, moves), legs, metres)
+        clearance_known = move < 0
+        if clearance_known:
             move = ~move
-        if move >= _LONGER:
-            move = (move - _LONGER) * N_STEPS
+        if move >= _DEFERRED:
+            move = (move - _DEFERRED) * N_STEPS
             px, py, pz = pose[parent, 0], pose[parent, 1], pose[parent, 2]
             turns = N_TURNS[wrap_heading(move // N_STEPS - int(headings[parent]))]
             for m in range(move + 1, move + N_STEPS):
@@ -213,7 +212,7 @@ def search(
                     break
                 h = cost_between(u, v, pz, ox, oy, oz, edge, cost_to_go)
                 f = cost[parent] + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
-                if f < f_most:
+                if f < f_max:
                     bucket = max(0, int(f / _BUCKET_M))
                     edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = parent, m, heads[bucket]
                     heads[bucket] = n_edges
@@ -234,24 +233,24 @@ def search(
         slot = ~_slot(key, now, keys, stamps)
         if slot < 0:
             continue
-        if known:
-            g += edge_extra[taken]
+        if clearance_known:
+            g += edge_extra[entry]
         elif parent >= 0:
-            place = _place((px + x) / 2 - ox, (py + y) / 2 - oy, (pz + z) / 2 - oz)
-            found = what_blocks(px, py, pz, x, y, z, o.radius, grid, False, blockers[place])
+            blocker_slot = _blocker_slot((px + x) / 2 - ox, (py + y) / 2 - oy, (pz + z) / 2 - oz)
+            found = find_blocker(px, py, pz, x, y, z, o.radius, grid, False, blockers[blocker_slot])
             if found != FREE:
-                blockers[place] = found
+                blockers[blocker_slot] = found
                 continue
-            if tightness > 0.0:
-                extra = clearance_penalty(px, py, pz, x, y, z, room, tightness, ox, oy, oz, edge, field)
+            if near_weight > 0.0:
+                extra = clearance_penalty(px, py, pz, x, y, z, near_m, near_weight, ox, oy, oz, edge, field)
                 g += extra
                 bucket = min(level + int(extra / _BUCKET_M), _N_BUCKETS - 1)
                 if bucket > level:
-                    edge_move[taken], edge_extra[taken] = ~move, extra
-                    edge_next[taken], heads[bucket] = heads[bucket], taken
+                    edge_move[entry], edge_extra[entry] = ~move, extra
+                    edge_next[entry], heads[bucket] = heads[bucket], entry
                     continue
         if n >= o.budget:
-            return BUDGET, n, none
+            return BUDGET, n, no_moves
         keys[slot], stamps[slot] = key, now
         pose[n, 0], pose[n, 1], pose[n, 2] = x, y, z
         cost[n], headings[n], moves[n], parents[n] = g, heading, move, parent
@@ -261,32 +260,32 @@ def search(
             f += approach_penalty(
                 goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.approach_penalty
             )
-            f += clearance_penalty(x, y, z, goal[0], goal[1], goal[2], room, tightness, ox, oy, oz, edge, field)
+            f += clearance_penalty(x, y, z, goal[0], goal[1], goal[2], near_m, near_weight, ox, oy, oz, edge, field)
             f -= o.goal_tolerance
-            if f < f_most:
-                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+            if f < f_max:
+                f_max, bucket = f, max(0, int(f / _BUCKET_M))
                 edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
                 heads[bucket] = n_edges
                 n_edges += 1
                 lowest = min(lowest, bucket)
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
         direct, extra = np.inf, 0.0
-        most = f_most + f0 + o.goal_tolerance - g - _BETTER_M
-        if h <= most and (h < nearest or n % _TRIED == 0):
+        max_direct = f_max + f0 + o.goal_tolerance - g - _MIN_GAIN_M
+        if h <= max_direct and (h < nearest or n % _DIRECT_EVERY == 0):
             direct, extra = direct_legs(
-                x, y, z, start[3], goal, goal_yaw, h, most, o.radius, o.approach, o.prefer, grid, legs, metres
+                x, y, z, start[3], goal, goal_yaw, h, max_direct, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
         nearest = min(nearest, h)
         if direct < np.inf:
-            f = g + direct + _CARE * extra - f0 - o.goal_tolerance
-            f += o.action_cost * actions_of(heading, goal_heading, legs, metres)
-            if f < f_most:
-                f_most, bucket = f, max(0, int(f / _BUCKET_M))
+            f = g + direct + _CLEARANCE_FACTOR * extra - f0 - o.goal_tolerance
+            f += o.action_cost * count_actions(heading, goal_heading, legs, metres)
+            if f < f_max:
+                f_max, bucket = f, max(0, int(f / _BUCKET_M))
                 edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
                 heads[bucket] = n_edges
                 n_edges += 1
                 lowest = min(lowest, bucket)
-        f_near = g + o.weight * h - f0 + _SPREAD_M
+        f_near = g + o.weight * h - f0 + _DEFER_MARGIN_M
         for m in range(0, N_FLAT, N_STEPS):
             turns = N_TURNS[wrap_heading(m // N_STEPS - heading)]
             for step in range(N_STEPS):
@@ -295,15 +294,15 @@ def search(
                     break
                 h = cost_between(u, v, z, ox, oy, oz, edge, cost_to_go)
                 f = g + flights[m + step, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
-                later = step == 0 and f > f_near
-                if f < f_most:
+                deferred = step == 0 and f > f_near
+                if f < f_max:
                     bucket = max(0, int(f / _BUCKET_M))
                     edge_parent[n_edges], edge_next[n_edges] = n, heads[bucket]
-                    edge_move[n_edges] = _LONGER + m // N_STEPS if later else m + step
+                    edge_move[n_edges] = _DEFERRED + m // N_STEPS if deferred else m + step
                     heads[bucket] = n_edges
                     n_edges += 1
                     lowest = min(lowest, bucket)
-                if later:
+                if deferred:
                     break
         for m in range(N_FLAT, N_TRANSLATIONS):
             w = z + flights[m, 2]
@@ -311,7 +310,7 @@ def search(
                 continue
             h = cost_between(x, y, w, ox, oy, oz, edge, cost_to_go)
             f = g + flights[m, 3] + o.action_cost + o.weight * h - f0
-            if not f < f_most:
+            if not f < f_max:
                 continue
             bucket = max(0, int(f / _BUCKET_M))
             edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, m, heads[bucket]

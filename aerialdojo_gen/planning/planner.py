@@ -13,30 +13,29 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
-from aerialdojo_gen.planning.certify import conclude
+from aerialdojo_gen.planning.certify import certify_profile
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
+from aerialdojo_gen.planning.field_cache import FieldCache
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
-from aerialdojo_gen.planning.kept_fields import FieldCache
-from aerialdojo_gen.planning.preference import Preference, narrow_cells
-from aerialdojo_gen.planning.single_query import NearField
+from aerialdojo_gen.planning.preference import Preference, clearance_cost_field
+from aerialdojo_gen.planning.query_field import NearField
 from aerialdojo_gen.scenes.model import Scene
 
-# Between cells the cost-to-go is interpolated: a little more than it is taken for what it promises.
+# The cost-to-go is interpolated between cells, so allow for a small error.
 _INTERPOLATION = 1.005
-# Few states of the lattice lie where an Approach flies ahead: a search for the very best one would expand all others.
-_NEAR_ENOUGH_M = 0.15
-# How often the cost-to-go of a single query is found farther away before that of the whole scene is.
+# Few lattice states allow an Approach that flies ahead: a search for the very best one would expand all others.
+_GOAL_TOLERANCE_M = 0.15
+# Number of growing reaches that a single query tries before the whole field.
 _TRIES = 3
-# What the longest routes cost beside their metres for the surfaces that they come near, at a weight of 1; 99 in 100
-# cost less.
+# Clearance cost of the longest routes at a weight of 1, metres; 99 in 100 cost less.
 _EXTRA_M = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """What became of one start.
+    """The route from one start, or why there is none.
 
     Attributes
     ----------
@@ -45,7 +44,7 @@ class Route:
     poses : (K + 1, 4) float64
         x, y, z in metres and yaw in (-pi, pi], world frame; no rows unless SOLVED.
     actions : (K + 1,) int8
-        What is done at every pose, Stop at the last.
+        Action at every pose, Stop at the last.
     length_m : float
         The paper's L; 0 unless SOLVED.
     expansions : int
@@ -55,7 +54,7 @@ class Route:
     cost_to_go_m : float
         Length of the cheapest grid path; infinite where there is none within bounds.
     attempts : int
-        Rungs of the ladder that were tried.
+        Search attempts made.
     """
 
     outcome: str
@@ -98,15 +97,15 @@ class Planner:
             config.clearance_preference_m, config.clearance_weight,
             math.cos(math.radians(config.max_approach_angle_deg)), config.approach_detour_m,
         )  # fmt: skip
-        self._narrow = narrow_cells(self.grid.arrays.field, self._prefer)
+        self._clearance_cost = clearance_cost_field(self.grid.arrays.field, self._prefer)
         self._cost = self._scratch = np.empty(self.grid.moves.shape, np.float32)
         self._fields = FieldCache(0, 0)
         self._order = columns_by_distance(
             math.ceil((config.max_length_m * config.length_slack + 2 * config.max_approach_m) / config.cell_m)
         )
         self._memory: dict[int, SearchArrays] = {}
-        self._known: dict[bytes, bool] = {}
-        self._near: NearField | None = None
+        self._blocked_starts: dict[bytes, bool] = {}
+        self._near_field: NearField | None = None
 
     def plan_target(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
         """Plan from every start to one goal.
@@ -123,19 +122,19 @@ class Planner:
         list of Route
             One a start, in their order; none depends on the other starts.
         """
-        target, begins = _poses(goal, starts)
+        goal_pose, start_poses = _poses(goal, starts)
         return [
-            self._search(s, target, route.cost_to_go_m, self._cost, self.config.ladder)
+            self._search(s, goal_pose, route.cost_to_go_m, self._cost, self.config.ladder)
             if route.outcome == "NOT_NEEDED"
             else route
-            for s, route in zip(begins, self.estimate_routes(target, begins), strict=True)
+            for s, route in zip(start_poses, self.estimate_routes(goal_pose, start_poses), strict=True)
         ]
 
     def plan_one(self, goal: ArrayLike, start: ArrayLike) -> Route:
         """Plan from one start to a goal: the route of `plan_target`, sooner where the goal has no other starts.
 
-        The goal's cost-to-go is found where the search looks at it alone (`aerialdojo_gen.planning.query_field`).
-        Where that is not enough to be sure of the same route, `plan_target` is asked.
+        The goal's cost-to-go is computed only where the search needs it (`aerialdojo_gen.planning.query_field`);
+        where that does not guarantee the same route, `plan_target` plans it.
 
         Parameters
         ----------
@@ -147,34 +146,36 @@ class Planner:
         Route
             As `plan_target` returns it.
         """
-        target, (begin,) = _poses(goal, start)
+        goal_pose, (start_pose,) = _poses(goal, start)
         weight = self.config.ladder[0].weight
-        if weight < 1.0 or self.grid.in_collision(target[:3]) or self._blocked(begin):
-            return self.plan_target(target, begin)[0]
-        if self._near is None:
-            self._near = NearField(self.grid, self._narrow)
-        c, least = self.config, 0.0
+        if weight < 1.0 or self.grid.in_collision(goal_pose[:3]) or self._blocked(start_pose):
+            return self.plan_target(goal_pose, start_pose)[0]
+        if self._near_field is None:
+            self._near_field = NearField(self.grid, self._clearance_cost)
+        c, min_reach_m = self.config, 0.0
         for _ in range(_TRIES):
-            with self._near.between(
-                target, begin, weight, self._seed, c.max_approach_m, self._bound_m, least
+            with self._near_field.between(
+                goal_pose, start_pose, weight, self._seed, c.max_approach_m, self._bound_m, min_reach_m
             ) as found:
                 if found.cost is None:
-                    return Route("NO_PATH") if found.none else self.plan_target(target, begin)[0]
+                    return Route("NO_PATH") if found.unreachable else self.plan_target(goal_pose, start_pose)[0]
                 cells, moves = self.grid.arrays, self.grid.moves
-                length = lengths_at(begin[None, :3], target[:3], cells, moves, found.cost, self._narrow)
-                route = self._foreseen(begin, target, float(length[0]))
+                length = lengths_at(
+                    start_pose[None, :3], goal_pose[:3], cells, moves, found.cost, self._clearance_cost
+                )
+                route = self._estimate(start_pose, goal_pose, float(length[0]))
                 if route.outcome != "NOT_NEEDED":
                     return route
-                route = self._search(begin, target, route.cost_to_go_m, found.cost, c.ladder[:1])
-            least = float(self._memory[c.ladder[0].budget].highest[0])
+                route = self._search(start_pose, goal_pose, route.cost_to_go_m, found.cost, c.ladder[:1])
+            min_reach_m = float(self._memory[c.ladder[0].budget].highest[0])
             if route.outcome != "SOLVED":
                 break
-            if least <= found.sure_m:
+            if min_reach_m <= found.reach_m:
                 return route
-        return self.plan_target(target, begin)[0]
+        return self.plan_target(goal_pose, start_pose)[0]
 
     def estimate_routes(self, goal: ArrayLike, starts: ArrayLike) -> list[Route]:
-        """Tell what the goal's cost-to-go alone knows of the routes to it; nothing is searched.
+        """Estimate the routes to a goal from its cost-to-go alone, without a search.
 
         Parameters
         ----------
@@ -189,33 +190,33 @@ class Planner:
             One a start, in their order. Where a search is needed to say more its outcome is NOT_NEEDED, and
             `cost_to_go_m` predicts the length; any other outcome is what `plan_target` returns too.
         """
-        target, begins = _poses(goal, starts)
-        if self.grid.in_collision(target[:3]):
-            return [Route("START_IN_COLLISION" if self._blocked(s) else "GOAL_IN_COLLISION") for s in begins]
-        blocked = [self._blocked(s) for s in begins]
+        goal_pose, start_poses = _poses(goal, starts)
+        if self.grid.in_collision(goal_pose[:3]):
+            return [Route("START_IN_COLLISION" if self._blocked(s) else "GOAL_IN_COLLISION") for s in start_poses]
+        blocked = [self._blocked(s) for s in start_poses]
         if not all(blocked):
-            self._expand(target)
+            self._expand(goal_pose)
         values = lengths_at(
-            np.ascontiguousarray(begins[:, :3]),
-            target[:3],
+            np.ascontiguousarray(start_poses[:, :3]),
+            goal_pose[:3],
             self.grid.arrays,
             self.grid.moves,
             self._cost,
-            self._narrow,
+            self._clearance_cost,
         )
         return [
-            Route("START_IN_COLLISION") if b else self._foreseen(s, target, float(v))
-            for s, b, v in zip(begins, blocked, values, strict=True)
+            Route("START_IN_COLLISION") if b else self._estimate(s, goal_pose, float(v))
+            for s, b, v in zip(start_poses, blocked, values, strict=True)
         ]
 
     @contextmanager
     def keeping_fields(self, plain_mb: float, packed_mb: float) -> Iterator[None]:
-        """Keep goals' cost-to-go until the block ends, so that a goal that comes up again need not be expanded again.
+        """Cache goals' cost-to-go until the block ends, so that a repeated goal is not expanded again.
 
         Parameters
         ----------
         plain_mb, packed_mb : float
-            How many megabytes are kept as they are, and how many compressed; goals after that are expanded each time.
+            Megabytes of raw and of compressed fields; further goals are expanded each time.
         """
         self._fields = FieldCache(plain_mb, packed_mb)
         try:
@@ -226,30 +227,30 @@ class Planner:
     def cost_to_go(self, points: ArrayLike) -> NDArray[np.float64]:
         """Cost-to-go of points, (n, 3) float metres; (n,) float64 metres.
 
-        It is that of the goal which `plan_target` or `foresee` was asked for last.
+        It is that of the last goal of `plan_target` or `estimate_routes`.
         """
         p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
         return np.asarray(costs_at(p, self.grid.arrays, self._cost))
 
     def _blocked(self, start: NDArray[np.float64]) -> bool:
-        # A scene's anchors are the starts to all of its goals.
+        # All goals of a scene share its anchors as starts.
         key = start[:3].tobytes()
-        if key not in self._known:
-            self._known[key] = self.grid.in_collision(start[:3])
-        return self._known[key]
+        if key not in self._blocked_starts:
+            self._blocked_starts[key] = self.grid.in_collision(start[:3])
+        return self._blocked_starts[key]
 
     def _expand(self, goal: NDArray[np.float64]) -> None:
-        kept = self._fields.find(goal.tobytes(), self._scratch)
-        if kept is not None:
-            self._cost = kept
+        cached = self._fields.find(goal.tobytes(), self._scratch)
+        if cached is not None:
+            self._cost = cached
             return
         self._cost = self._scratch
         self._cost.fill(np.inf)
         expand_cost(
             self._seed(goal, self._cost), self._order, self._bound_m, self.grid.arrays.cell, self.grid.moves,
-            self._cost, self._narrow,
+            self._cost, self._clearance_cost,
         )  # fmt: skip
-        self._fields.keep(goal.tobytes(), self._cost)
+        self._fields.store(goal.tobytes(), self._cost)
 
     @property
     def _bound_m(self) -> float:
@@ -258,16 +259,16 @@ class Planner:
 
     def _seed(self, goal: NDArray[np.float64], cost: NDArray[np.float32]) -> NDArray[np.int32]:
         c, g = self.config, self.grid
-        # A route ends with a heading up to half a turn off the goal's yaw: what its Approach may do, the grid's may.
+        # A route's final heading is up to half a turn off the goal's yaw, so the grid's Approach may be too.
         angle = min(math.radians(c.max_approach_angle_deg) + TURN_RAD / 2, math.pi)
         prefer = self._prefer._replace(ahead_cos=math.cos(angle))
         return np.asarray(seed_goal(*goal, c.max_approach_m, g.radius_m, g.arrays, g.moves, cost, prefer))
 
-    def _foreseen(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
+    def _estimate(self, start: NDArray[np.float64], goal: NDArray[np.float64], value: float) -> Route:
         c = self.config
         if not value <= c.max_length_m * c.length_slack:
             return Route("NO_PATH")
-        # The grid path is free of collision, so that the shortest route is no longer: a task that filter refuses.
+        # The grid path is collision-free, so the shortest route is no longer: `filter` would reject the task.
         straight = value * _INTERPOLATION < c.min_detour_ratio * math.dist(goal[:3], start[:3])
         return Route("NEAR_STRAIGHT" if straight else "NOT_NEEDED", cost_to_go_m=value)
 
@@ -278,29 +279,29 @@ class Planner:
         c, g = self.config, self.grid
         heading = nearest_heading(float(start[3]), float(goal[3]))
         expansions = 0
-        for number, rung in enumerate(ladder, start=1):
-            memory = self._memory.get(rung.budget)
+        for number, attempt in enumerate(ladder, start=1):
+            memory = self._memory.get(attempt.budget)
             if memory is None:
-                memory = self._memory[rung.budget] = make_search_arrays(rung.budget)
+                memory = self._memory[attempt.budget] = make_search_arrays(attempt.budget)
             options = SearchOptions(
-                g.radius_m + rung.extra_radius_m, rung.weight, c.action_cost_m, c.max_approach_m, rung.budget,
-                rung.duplicate_cell_m, rung.heading_sectors, c.sideways_actions_per_m, self._prefer,
-                _NEAR_ENOUGH_M,
+                g.radius_m + attempt.extra_radius_m, attempt.weight, c.action_cost_m, c.max_approach_m,
+                attempt.budget, attempt.duplicate_cell_m, attempt.heading_sectors, c.sideways_actions_per_m,
+                self._prefer, _GOAL_TOLERANCE_M,
             )  # fmt: skip
-            tried = plan_once(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
-            expansions += tried.expansions
-            if tried.status != FOUND:
+            result = plan_once(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
+            expansions += result.expansions
+            if result.status != FOUND:
                 continue
-            certificate = conclude(tried.seen, self.radius_m, self.world, c.prove_by_grid)
-            # A curtain hangs from the rim; a tear in the floor of a cave, say, has none.
-            if g.has_curtain and g.below_ground(tried.poses[:, :3]):
+            certificate = certify_profile(result.profile, self.radius_m, self.world, c.prove_by_grid)
+            # The curtain hangs from the rim only; holes in the ground have none.
+            if g.has_curtain and g.below_ground(result.poses[:, :3]):
                 continue
             if certificate.collision_free:
                 return Route(
-                    "SOLVED", tried.poses, tried.actions, tried.length, expansions, certificate.min_clearance_m,
+                    "SOLVED", result.poses, result.actions, result.length, expansions, certificate.min_clearance_m,
                     value, number,
                 )  # fmt: skip
-        outcome = "NO_PATH" if tried.status == EXHAUSTED else "BUDGET_EXHAUSTED"
+        outcome = "NO_PATH" if result.status == EXHAUSTED else "BUDGET_EXHAUSTED"
         return Route(outcome, expansions=expansions, cost_to_go_m=value, attempts=len(ladder))
 
 

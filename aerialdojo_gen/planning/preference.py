@@ -1,8 +1,7 @@
-"""What a route should rather do than not: keep its distance from surfaces, and end flying ahead.
+"""Soft costs of a route: clearance from surfaces, and an Approach that flies ahead.
 
-Neither is a condition. A metre flown at a clearance below the preferred one costs more than a metre, the more the
-nearer the surface is; an Approach that does not fly ahead costs some metres. The cost-to-go holds these costs too.
-L, which is stored, is of the metres alone.
+A metre flown below the preferred clearance costs more than a metre, the more the nearer the surface is; an Approach
+that does not fly ahead costs some metres. The cost-to-go includes both; the stored length L does not.
 """
 
 from __future__ import annotations
@@ -15,30 +14,30 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 
-# Steps in which the cost of clearance is integrated along a way: the grid's cells are half a metre.
+# Step of the integration of clearance cost: the grid's cells are half a metre.
 _STEP_M = 0.5
-# What cells cost is counted in sixteenths, so that float32 adds it without rounding.
-NARROW_UNIT = 1.0 / 16
+# Cells' costs are multiples of this, so that float32 adds them without rounding.
+CLEARANCE_COST_UNIT = 1.0 / 16
 _COS_ROUNDING = 1e-9
 
 
 class Preference(NamedTuple):
-    """What costs beside metres."""
+    """Costs on top of length."""
 
-    clearance: float  # Distance from surfaces from which on a way costs its metres alone, metres
+    clearance: float  # Clearance from which on a path costs its length only, metres
     weight: float
     ahead_cos: float
-    approach_penalty: float  # What another Approach costs beside its length, metres
+    approach_penalty: float  # Extra cost of an Approach that does not fly ahead, metres
 
 
 NO_PREFERENCE = Preference(1.0, 0.0, -1.0, 0.0)
 
 
-def narrow_cells(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.float32]:
-    """Extra cost of a metre in each cell near surfaces, (nx, ny, nz) float32, multiples of `NARROW_UNIT`."""
+def clearance_cost_field(field: NDArray[np.float32], prefer: Preference) -> NDArray[np.float32]:
+    """Extra cost of a metre in each cell near surfaces, (nx, ny, nz) float32, multiples of `CLEARANCE_COST_UNIT`."""
     share = np.float32(1.0) - np.clip(field, 0.0, prefer.clearance) / np.float32(prefer.clearance)
-    units = np.rint(share * np.float32(prefer.weight / NARROW_UNIT))
-    return np.asarray(units * np.float32(NARROW_UNIT), np.float32)
+    units = np.rint(share * np.float32(prefer.weight / CLEARANCE_COST_UNIT))
+    return np.asarray(units * np.float32(CLEARANCE_COST_UNIT), np.float32)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -67,7 +66,7 @@ def clearance_penalty(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float, clearance: float, weight: float,
     ox: float, oy: float, oz: float, cell: float, field: NDArray[np.float32],
 ) -> float:  # fmt: skip
-    """Extra cost, metres, of a straight way for the surfaces that it comes near."""
+    """Extra cost, metres, of a straight segment for low clearance."""
     dx, dy, dz = qx - px, qy - py, qz - pz
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if weight == 0.0 or length == 0.0:
@@ -82,7 +81,7 @@ def clearance_penalty(
         if lack > 0.0:
             total += step * lack
         else:
-            # Distances change by a metre a metre: so far on there is room.
+            # Clearance is 1-Lipschitz: skip as far as it must stay above the preferred one.
             t = max(t, m - lack)
     return weight * total / clearance
 

@@ -1,48 +1,60 @@
-"""The part of a goal's cost-to-go that the search from one start looks at, for single queries.
+"""The part of a goal's cost-to-go that the search from one start needs, for single queries.
 
-A search with the weight w takes an edge off its list while metres flown + w · cost-to-go is least. What it flies from
-the start to a cell is no less than the straight way there, in the action metric. So cells of which
+A search with weight w pops the edge with the least metres flown + w · cost-to-go. The metres flown from the start
+to a cell are at least the straight distance in the action metric. So cells with
 
-    straight way from the start + w · cost-to-go > reach
+    straight distance from the start + w · cost-to-go > reach
 
-are never looked at, or on edges that are never taken: they stay infinite. The others form, with the goal and the
-start, a thing like an ellipsoid, and hold the whole of every cheapest path from each of them: their costs are those
-of the whole field, to the bit. How far it has to reach is told by a grid path (`aerialdojo_gen.planning.grid_path`).
+are never needed, and stay infinite. The others form something like an ellipsoid around start and goal, and contain
+every cheapest path from each of them: their costs equal those of the whole field, to the bit. The reach follows
+from a grid path (`aerialdojo_gen.planning.grid_path`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import FLAT, KIND_OF, KINDS, UP, leave, move_lengths, push, settle
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.planning.column_kernels import (
+    FLAT,
+    KIND_OF,
+    KINDS,
+    UP,
+    departure_costs,
+    move_lengths,
+    relax,
+    relax_vertical,
+)
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays
-from aerialdojo_gen.planning.grid_path import grid_metric
+from aerialdojo_gen.planning.grid_path import GAVE_UP, grid_metric, make_path_arrays, short_path_cost
 
-# Columns wait in bins half a cell wide for their turn; the longest move is not quite five bins long.
+# Columns are queued in bins half a cell wide; the longest move is just under five bins.
 _BINS = 8
 _DELAY = (2.0 * MOVE_LENGTHS).astype(np.int64)
-# Ranges of cells begin and end at multiples of this, the width of vector instructions.
+# Ranges of cells begin and end at multiples of this, the width of SIMD instructions.
 _LANES = 8
-# A last straight Approach is shorter than its way in the grid's metric by less than this share of its length.
-_APPROACH_SAVES = 0.45
+# A straight Approach is shorter than in the grid's metric by less than this share of its length.
+_APPROACH_SAVING = 0.45
 
 
 class QueryArrays(NamedTuple):
-    """Memory of single queries; as `make_query_arrays` made it between them."""
+    """Working memory of single queries; cleared after each one."""
 
     cost: NDArray[np.float32]  # (nx, ny, nz) float32; cost-to-go, metres; infinite
     first: NDArray[np.int16]  # (nx, ny) int16
     last: NDArray[np.int16]
-    limit: NDArray[np.float32]  # (nx, ny) float32; most that these cells may cost, metres
-    waiting: NDArray[np.bool_]  # (nx, ny) bool; columns that may have something to pass on
+    limit: NDArray[np.float32]  # (nx, ny) float32; maximum cost of these cells, metres
+    waiting: NDArray[np.bool_]  # (nx, ny) bool; queued columns
     next: NDArray[np.int32]  # (nx * ny,) int32; columns in bins, as linked lists
-    columns: NDArray[np.int32]  # (nx * ny,) int32; columns that were come to
+    columns: NDArray[np.int32]  # (nx * ny,) int32; visited columns
 
 
 def make_query_arrays(shape: tuple[int, ...]) -> QueryArrays:
@@ -56,10 +68,10 @@ def make_query_arrays(shape: tuple[int, ...]) -> QueryArrays:
 
 
 def reach_margin(cell: float, weight: float) -> float:
-    """How much farther the field has to reach than what the search takes off its list costs, metres.
+    """Margin of the field's reach over the cost of the edges that the search pops, metres.
 
-    An edge is as dear as the cells that its cost-to-go is interpolated between. These lie within a cell's diagonal of
-    its end in the action metric, and interpolated are only costs that differ by less than four cells.
+    An edge's cost-to-go is interpolated between cells within a cell's diagonal of its end in the action metric, whose
+    costs differ by less than four cells.
     """
     return (math.sqrt(2.0) + 1.0) * cell + 4.0 * weight * cell
 
@@ -69,18 +81,18 @@ def _span(
     i: int, j: int, start: NDArray[np.float64], goal: NDArray[np.float64], approach: float, reach: float,
     weight: float, grid: GridArrays,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Range of a column's cells that may lie within reach, and the most that they may cost; a last of -1 for none."""
+    """Range of a column's cells within reach, and their maximum cost; a last of -1 for none."""
     cell, nz = grid.cell, grid.field.shape[2]
     x, y, oz = grid.origin[0] + (i + 0.5) * cell, grid.origin[1] + (j + 0.5) * cell, grid.origin[2]
     from_start = math.sqrt((x - start[0]) ** 2 + (y - start[1]) ** 2)
-    to_goal = grid_metric(x - goal[0], y - goal[1], 0.0) - _APPROACH_SAVES * approach
-    left = reach - from_start - weight * to_goal
+    to_goal = grid_metric(x - goal[0], y - goal[1], 0.0) - _APPROACH_SAVING * approach
+    remaining = reach - from_start - weight * to_goal
     low, high = min(start[2], goal[2]), max(start[2], goal[2])
-    if left < high - low:
+    if remaining < high - low:
         return 0, -1, 0.0
-    # Where |z - start| + weight · |z - goal| is what is left, outside of the two; between them nothing is cut off.
-    low = min(low, (start[2] + weight * goal[2] - left) / (1.0 + weight))
-    high = max(high, (start[2] + weight * goal[2] + left) / (1.0 + weight))
+    # Solve |z - start| + weight · |z - goal| = left outside of the two; between them nothing is cut off.
+    low = min(low, (start[2] + weight * goal[2] - remaining) / (1.0 + weight))
+    high = max(high, (start[2] + weight * goal[2] + remaining) / (1.0 + weight))
     first = max(0, int((low - oz) / cell - 0.5)) // _LANES * _LANES
     last = (max(0, int((high - oz) / cell + 0.5)) // _LANES + 1) * _LANES
     return min(first, nz - 1), min(last, nz), (reach - from_start) / weight
@@ -92,19 +104,16 @@ def expand_query(
     weight: float, bound: float, grid: GridArrays, moves: NDArray[np.uint32], clearance_cost: NDArray[np.float32],
     arrays: QueryArrays,
 ) -> int:  # fmt: skip
-    """Costs as `expand_cost` finds them, of the cells within reach of one start.
-
-    Returns columns to be cleared again.
-    """
+    """Costs as of `expand_cost` for the cells within reach of one start; return the number of columns written."""
     nx, ny, nz = arrays.cost.shape
-    costs, flat_moves, flat_narrow = arrays.cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    costs, flat_moves, flat_clearance = arrays.cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
     first, last, limit, waiting, nexts, columns = (
         arrays.first, arrays.last, arrays.limit, arrays.waiting, arrays.next, arrays.columns
     )  # fmt: skip
     lengths, coarse = move_lengths(grid.cell)
-    departed = np.empty(len(KINDS) * nz, np.float32)
+    leaving = np.empty(len(KINDS) * nz, np.float32)
     bins = np.full(_BINS, -1, np.int32)
-    n, left, now = 0, 0, 0
+    n, remaining, bin_number = 0, 0, 0
     for seed in seeds:
         c = seed // nz
         i, j = c // ny, c % ny
@@ -114,20 +123,20 @@ def expand_query(
             n += 1
         if last[i, j] > 0 and not waiting[i, j]:
             waiting[i, j], nexts[c], bins[0] = True, bins[0], c
-            left += 1
-    while left > 0:
-        while bins[now % _BINS] < 0:
-            now += 1
-        c = bins[now % _BINS]
-        bins[now % _BINS] = nexts[c]
-        left -= 1
+            remaining += 1
+    while remaining > 0:
+        while bins[bin_number % _BINS] < 0:
+            bin_number += 1
+        c = bins[bin_number % _BINS]
+        bins[bin_number % _BINS] = nexts[c]
+        remaining -= 1
         i, j = c // ny, c % ny
         waiting[i, j] = False
         k0, k1, base = first[i, j], last[i, j], c * nz
-        settle(costs, flat_moves, flat_narrow, base + k0, base + k1, lengths[UP], coarse[UP])
+        relax_vertical(costs, flat_moves, flat_clearance, base + k0, base + k1, lengths[UP], coarse[UP])
         for kind in range(len(KINDS)):
             m = KINDS[kind]
-            leave(costs, flat_narrow, base + k0, k1 - k0, lengths[m], coarse[m], departed, kind * nz + k0)
+            departure_costs(costs, flat_clearance, base + k0, k1 - k0, lengths[m], coarse[m], leaving, kind * nz + k0)
         for m in FLAT:
             u, v = i + MOVES[m, 0], j + MOVES[m, 1]
             if not (0 <= u < nx and 0 <= v < ny) or last[u, v] < 0:
@@ -140,20 +149,28 @@ def expand_query(
             b0, b1 = max(k0, first[u, v]), min(k1, last[u, v])
             if (
                 b0 < b1
-                and push(
-                    departed, KIND_OF[m] * nz + b0, flat_moves, base + b0, costs, d * nz + b0, b1 - b0, m, limit[u, v]
+                and relax(
+                    leaving,
+                    KIND_OF[m] * nz + b0,
+                    flat_moves,
+                    base + b0,
+                    costs,
+                    d * nz + b0,
+                    b1 - b0,
+                    m,
+                    limit[u, v],
                 )
                 and not waiting[u, v]
             ):
-                b = (now + _DELAY[m]) % _BINS
+                b = (bin_number + _DELAY[m]) % _BINS
                 waiting[u, v], nexts[d], bins[b] = True, bins[b], d
-                left += 1
+                remaining += 1
     return n
 
 
 @njit(cache=True)
 def clear_query(n: int, seeds: NDArray[np.int32], arrays: QueryArrays) -> None:
-    """Bring the memory of a query that wrote n columns back to what it was."""
+    """Reset the memory of a query that wrote n columns."""
     ny, nz = arrays.cost.shape[1], arrays.cost.shape[2]
     for seed in seeds:
         arrays.cost[seed // nz // ny, seed // nz % ny, seed % nz] = np.inf
@@ -162,3 +179,57 @@ def clear_query(n: int, seeds: NDArray[np.int32], arrays: QueryArrays) -> None:
         if arrays.last[i, j] > 0:
             arrays.cost[i, j, arrays.first[i, j] : arrays.last[i, j]] = np.inf
         arrays.last[i, j] = 0
+
+
+# The search rarely exceeds weight · grid path by more than this, metres: action costs, and detours of the lattice.
+_SURPLUS_M = 1.1
+
+
+class QueryResult(NamedTuple):
+    """Cost-to-go between a start and a goal."""
+
+    cost: NDArray[np.float32] | None  # (nx, ny, nz) float32 or None
+    unreachable: bool  # There is no grid path
+    reach_m: float  # Costs are complete up to this
+
+
+class NearField:
+    """Computes the cost-to-go, metres, between one start and one goal at a time."""
+
+    def __init__(self, grid: ClearanceGrid, clearance_cost: NDArray[np.float32]) -> None:
+        self.grid = grid
+        self.clearance_cost = clearance_cost
+        self._arrays = make_query_arrays(grid.moves.shape)
+        self._path = make_path_arrays()
+
+    @contextmanager
+    def between(
+        self,
+        goal: NDArray[np.float64],
+        start: NDArray[np.float64],
+        weight: float,
+        seed: Callable[[NDArray[np.float64], NDArray[np.float32]], NDArray[np.int32]],
+        approach: float,
+        bound: float,
+        min_reach: float,
+    ) -> Iterator[QueryResult]:
+        """Yield the costs that a search from a start (4,) to a goal (4,) needs; valid until the block ends."""
+        cost, cells, moves = self._arrays.cost, self.grid.arrays, self.grid.moves
+        seeds = seed(goal, cost)
+        seeded = cost.ravel()[seeds]
+        # The start is within the bound if one of the cells around it is.
+        max_cost = bound + reach_margin(cells.cell, 1.0)
+        path = short_path_cost(seeds, *start[:3], max_cost, cells, moves, self.clearance_cost, cost, self._path)
+        if path == GAVE_UP or not math.isfinite(path):
+            yield QueryResult(None, path != GAVE_UP, 0.0)
+            return
+        cost.reshape(-1)[seeds] = seeded
+        reach = max(weight * path + _SURPLUS_M, min_reach)
+        written = expand_query(
+            seeds, start[:3], goal[:3], approach, reach + reach_margin(cells.cell, weight), weight, bound, cells,
+            moves, self.clearance_cost, self._arrays,
+        )  # fmt: skip
+        try:
+            yield QueryResult(cost, False, reach)
+        finally:
+            clear_query(written, seeds, self._arrays)

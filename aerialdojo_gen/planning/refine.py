@@ -1,9 +1,8 @@
-"""From translations to actions: put a found route in its best order and fly it with the fewest actions.
+"""From translations to actions: reorder a found route and fly it with the fewest actions.
 
-Translations commute: flown in another order they end in the same place, after the same length. So equal directions
-are brought together, there and back cancels out, the order is chosen that keeps away from surfaces, and the headings
-are chosen by dynamic programming: few actions, and few metres flown sideways, for the front camera should see where
-the drone is going.
+Translations commute: in any order they end in the same place after the same length. So equal directions are joined,
+opposite ones cancelled, the order with the best clearance is chosen, and headings are chosen by dynamic programming:
+few actions, and few metres flown sideways, because the front camera should see where the drone is going.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from aerialdojo_gen.planning.translations import DOWN, LIFTS_M, N_FLAT, N_STEPS,
 _MOVE_FORWARD_1, _MOVE_LEFT_1, _MOVE_RIGHT_1 = 1, 4, 7
 _MAX_PASSES = 50
 _ARRIVAL_M = 3
-_LEAST_ACTION_M, _WORTH_M = 1e-4, 1e-6
+_MIN_ACTION_COST_M, _MIN_GAIN_M = 1e-4, 1e-6
 
 
 @njit(cache=True, inline="always")
@@ -74,7 +73,7 @@ def _headings(
     """Choose the heading of every leg, so that turns and metres flown sideways cost least; return that cost.
 
     A leg is flown ahead, to the left or to the right; on a tie ahead. A vertical leg keeps the heading. The last
-    metres may be flown sideways for nothing: what the front camera should see there is the goal.
+    metres cost nothing sideways: there the front camera should see the goal.
     """
     to_fly = 0
     for i in range(n):
@@ -91,10 +90,10 @@ def _headings(
             at[i, side] = (d + offset) % N_HEADINGS
             own = 0.0 if side == 0 else sideways * (metres[i - 1] - min(metres[i - 1], max(0, _ARRIVAL_M - to_fly)))
             best[i, side] = np.inf
-            for before in range(3):
-                cost = best[i - 1, before] + turns_between(at[i - 1, before], at[i, side]) + own
+            for previous in range(3):
+                cost = best[i - 1, previous] + turns_between(at[i - 1, previous], at[i, side]) + own
                 if cost < best[i, side]:
-                    best[i, side], back[i, side] = cost, before
+                    best[i, side], back[i, side] = cost, previous
     total, side = np.inf, 0
     for last in range(3):
         cost = best[n, last] + turns_between(at[n, last], goal_heading)
@@ -116,10 +115,10 @@ def _leg_end(x: float, y: float, z: float, yaw: float, d: int, metres: int) -> t
 
 
 @njit(cache=True, inline="always")
-def _leg_squeezed(
+def _leg_clearance_cost(
     x: float, y: float, z: float, u: float, v: float, w: float, prefer: Preference, grid: GridArrays
 ) -> float:  # fmt: skip
-    """What a leg costs beside its metres for the surfaces that it comes near."""
+    """Clearance cost of a leg, metres."""
     return clearance_penalty(
         x, y, z, u, v, w, prefer.clearance, prefer.weight,
         grid.origin[0], grid.origin[1], grid.origin[2], grid.cell, grid.field,
@@ -129,24 +128,24 @@ def _leg_squeezed(
 @njit(cache=True)
 def _fly_legs(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int,
-    prefer: Preference, grid: GridArrays, points: NDArray[np.float64], before: NDArray[np.float64],
+    prefer: Preference, grid: GridArrays, points: NDArray[np.float64], cost_before: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Where every leg begins, and what those before it cost for the surfaces that they come near."""
+    """Write every leg's start, and the clearance cost of the legs before it."""
     x, y, z = start[0], start[1], start[2]
-    points[0, 0], points[0, 1], points[0, 2], before[0] = x, y, z, 0.0
+    points[0, 0], points[0, 1], points[0, 2], cost_before[0] = x, y, z, 0.0
     for i in range(n):
         u, v, w = _leg_end(x, y, z, start[3], direction[i], metres[i])
-        before[i + 1] = before[i] + _leg_squeezed(x, y, z, u, v, w, prefer, grid)
+        cost_before[i + 1] = cost_before[i] + _leg_clearance_cost(x, y, z, u, v, w, prefer, grid)
         x, y, z = u, v, w
         points[i + 1, 0], points[i + 1, 1], points[i + 1, 2] = x, y, z
 
 
 @njit(cache=True)
-def _moved(
+def _with_leg_moved(
     direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, source: int, target: int,
     new_direction: NDArray[np.int64], new_metres: NDArray[np.int64],
 ) -> int:  # fmt: skip
-    """Write legs of which one stands elsewhere, joined where they may be; return how many they are."""
+    """Write the legs with one moved elsewhere, joined where possible; return their number."""
     k = 0
     for i in range(n):
         if i == source:
@@ -167,18 +166,18 @@ def _reorder(
     start: NDArray[np.float64], direction: NDArray[np.int64], metres: NDArray[np.int64], n: int, goal_heading: int,
     options: SearchOptions, grid: GridArrays,
 ) -> int:  # fmt: skip
-    """Move single legs elsewhere in the sequence as long as that is free and makes the route cheaper, in place.
+    """Move single legs within the sequence while that is free and makes the route cheaper, in place.
 
-    Legs before and after those that change place stay where they are: what is known of them holds.
+    Only the legs between the old and the new place move, so only they are checked again.
     """
     size = len(direction)
     new_direction, new_metres, chosen = np.empty_like(direction), np.empty_like(metres), np.empty_like(direction)
     best, back, at = np.empty((size + 1, 3)), np.empty((size + 1, 3), np.int64), np.empty((size + 1, 3), np.int64)
-    points, before = np.empty((size + 1, 3)), np.empty(size + 1)
-    # Where actions cost nothing, fewer of them still decide between ways that cost the same.
-    action, prefer = max(options.action_cost, _LEAST_ACTION_M), options.prefer
-    _fly_legs(start, direction, metres, n, prefer, grid, points, before)
-    cost = before[n]
+    points, cost_before = np.empty((size + 1, 3)), np.empty(size + 1)
+    # With free actions, fewer of them still break ties.
+    action, prefer = max(options.action_cost, _MIN_ACTION_COST_M), options.prefer
+    _fly_legs(start, direction, metres, n, prefer, grid, points, cost_before)
+    cost = cost_before[n]
     for i in range(n):
         cost += metres[i] + action * _fewest_moves(direction[i], metres[i])
     cost += action * _headings(direction, metres, n, goal_heading, options.sideways, chosen, best, back, at)
@@ -186,10 +185,10 @@ def _reorder(
         improved = False
         for source in range(n):
             for target in range(n):
-                # A leg and its neighbour change places once.
+                # Swap neighbours only once.
                 if target == source or target == source - 1:
                     continue
-                m = _moved(direction, metres, n, source, target, new_direction, new_metres)
+                m = _with_leg_moved(direction, metres, n, source, target, new_direction, new_metres)
                 lead, tail = 0, 0
                 while lead < min(n, m) and (
                     new_direction[lead] == direction[lead] and new_metres[lead] == metres[lead]
@@ -200,23 +199,23 @@ def _reorder(
                     and new_metres[m - 1 - tail] == metres[n - 1 - tail]
                 ):
                     tail += 1
-                wanted = cost - _WORTH_M
-                new_cost = before[lead] + before[n] - before[n - tail]
+                cost_limit = cost - _MIN_GAIN_M
+                new_cost = cost_before[lead] + cost_before[n] - cost_before[n - tail]
                 for i in range(m):
                     new_cost += new_metres[i] + action * _fewest_moves(new_direction[i], new_metres[i])
-                if new_cost >= wanted:
+                if new_cost >= cost_limit:
                     continue
                 new_cost += action * _headings(
                     new_direction, new_metres, m, goal_heading, options.sideways, chosen, best, back, at
                 )
                 x, y, z = points[lead, 0], points[lead, 1], points[lead, 2]
                 for i in range(lead, m - tail):
-                    if new_cost >= wanted:
+                    if new_cost >= cost_limit:
                         break
                     u, v, w = _leg_end(x, y, z, start[3], new_direction[i], new_metres[i])
-                    new_cost += _leg_squeezed(x, y, z, u, v, w, prefer, grid)
+                    new_cost += _leg_clearance_cost(x, y, z, u, v, w, prefer, grid)
                     x, y, z = u, v, w
-                if new_cost >= wanted:
+                if new_cost >= cost_limit:
                     continue
                 x, y, z, free = points[lead, 0], points[lead, 1], points[lead, 2], True
                 for i in range(lead, m - tail):
@@ -231,7 +230,7 @@ def _reorder(
                     continue
                 direction[:m], metres[:m] = new_direction[:m], new_metres[:m]
                 n, cost = m, new_cost
-                _fly_legs(start, direction, metres, n, prefer, grid, points, before)
+                _fly_legs(start, direction, metres, n, prefer, grid, points, cost_before)
                 improved = True
                 break
             if improved:
@@ -242,15 +241,15 @@ def _reorder(
 
 
 @njit(cache=True, inline="always")
-def _turn(actions: NDArray[np.int8], k: int, heading: int, wanted: int) -> int:
-    left = (wanted - heading) % N_HEADINGS
+def _turn(actions: NDArray[np.int8], k: int, heading: int, target: int) -> int:
+    left = (target - heading) % N_HEADINGS
     count, action = (left, TURN_LEFT) if left <= N_HEADINGS // 2 else (N_HEADINGS - left, TURN_RIGHT)
     actions[k : k + count] = action
     return k + count
 
 
 @njit(cache=True)
-def _write(actions: NDArray[np.int8], k: int, first: int, steps: tuple[int, ...], metres: int) -> int:
+def _write_moves(actions: NDArray[np.int8], k: int, first: int, steps: tuple[int, ...], metres: int) -> int:
     """Write the fewest moves that add up to `metres`, the longest first; `first` is the action of the shortest."""
     for s in range(len(steps) - 1, -1, -1):
         count = metres // steps[s]
@@ -268,7 +267,7 @@ def moves_to_actions(
     options: SearchOptions,
     grid: GridArrays,
 ) -> NDArray[np.int8]:
-    """Turn the search's moves (n,) into actions (m,), the turns to the final heading included."""
+    """Turn the search's moves (n,) into actions (m,), including the turns to the final heading."""
     direction, metres = np.empty(len(moves) + 1, np.int64), np.empty(len(moves) + 1, np.int64)
     total = 0
     for i in range(len(moves)):
@@ -291,12 +290,12 @@ def moves_to_actions(
         heading = chosen[i]
         d = direction[i]
         if d == UP:
-            k = _write(actions, k, MOVE_UP_1, (1, 2), metres[i])
+            k = _write_moves(actions, k, MOVE_UP_1, (1, 2), metres[i])
         elif d == DOWN:
-            k = _write(actions, k, MOVE_DOWN_1, (1, 2), metres[i])
+            k = _write_moves(actions, k, MOVE_DOWN_1, (1, 2), metres[i])
         else:
             side = (d - heading) % N_HEADINGS
             first = _MOVE_FORWARD_1 if side == 0 else (_MOVE_LEFT_1 if side == QUARTER else _MOVE_RIGHT_1)
-            k = _write(actions, k, first, (1, 3, 5), metres[i])
+            k = _write_moves(actions, k, first, (1, 3, 5), metres[i])
     k = _turn(actions, k, heading, goal_heading)
     return actions[:k].copy()

@@ -1,4 +1,4 @@
-"""Translations, which a search's edges are: 24 directions times three lengths, and up and down.
+"""Translations, the edges of a search: 24 directions times three lengths, and up and down.
 
 To fly in a direction the body turns until that direction lies ahead, to its left or to its right, whichever takes
 fewer turns.
@@ -31,15 +31,12 @@ def turns_between(a: int, b: int) -> int:
 
 @njit(cache=True, inline="always")
 def wrap_heading(heading: int) -> int:
-    """Bring a number from -24 to 23 into 0 to 23; a division would take longer than what it is for."""
+    """Wrap a number from -24 to 23 into 0 to 23, without a division."""
     return heading + N_HEADINGS if heading < 0 else heading
 
 
-def _ways_to_fly() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """For every direction relative to the heading, the turns to the best heading to fly there from, and how many.
-
-    The body flies ahead, to its left or to its right; ahead wins ties.
-    """
+def _best_headings() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Turns to the best heading for every direction relative to the heading, and their number; ahead wins ties."""
     by, count = np.zeros(N_HEADINGS, np.int64), np.zeros(N_HEADINGS, np.int64)
     for direction in range(N_HEADINGS):
         options = [direction, (direction - QUARTER) % N_HEADINGS, (direction + QUARTER) % N_HEADINGS]
@@ -49,11 +46,11 @@ def _ways_to_fly() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return by, count
 
 
-TURN_BY, N_TURNS = _ways_to_fly()
+TURN_BY, N_TURNS = _best_headings()
 
 
 @njit(cache=True)
-def with_legs(
+def append_legs(
     moves: NDArray[np.int8], directions: NDArray[np.int64], metres: NDArray[np.int64]
 ) -> NDArray[np.int8]:  # fmt: skip
     """Append the fewest translations that fly some legs."""
@@ -77,10 +74,10 @@ def with_legs(
 
 
 @njit(cache=True, error_model="numpy")
-def actions_of(
+def count_actions(
     heading: int, goal_heading: int, directions: NDArray[np.int64], metres: NDArray[np.int64]
 ) -> int:  # fmt: skip
-    """Actions that some legs, the turns before, between and after them and an Approach take."""
+    """Number of actions of legs, with the turns before, between and after them and an Approach."""
     count = 1
     for i in range(len(metres)):
         if metres[i] == 0:

@@ -117,7 +117,7 @@ def main() -> None:
             if r.outcome == "SOLVED":
                 t = clock()
                 c = certify(r.poses[:, :3], RADIUS, planner.grid, collisions)
-                certificates.append((clock() - t, c.legs, c.asked))
+                certificates.append((clock() - t, c.legs, c.fcl_checks))
         if options.exact:
             some = [i for i, r in enumerate(found) if r.outcome == "SOLVED"][: options.exact]
             for i, b in zip(some, exact.plan_target(goal, starts[some]), strict=True):
@@ -126,7 +126,7 @@ def main() -> None:
     solved = [r for r in routes if r.outcome == "SOLVED"]
     ms = 1e3 * np.array(plans)
     over = np.array([r.length_m / r.cost_to_go_m for r in solved])
-    took, legs, asked = np.array(certificates).T
+    took, legs, checks = np.array(certificates).T
     expansions = [r.expansions for r in solved]
     outcomes, attempts = dict(Counter(r.outcome for r in routes)), dict(Counter(r.attempts for r in solved))
     print(f"outcomes       {outcomes}; solved in attempt {attempts}")
@@ -135,7 +135,7 @@ def main() -> None:
         f"plan           {np.median(ms):.2f} ms median, {ms.mean():.2f} mean, {ms.max():.1f} most, with certificate"
     )
     print(
-        f"certificate    {1e3 * took.mean():.2f} ms a route, FCL asked about {asked.sum() / legs.sum():.0%} of legs"
+        f"certificate    {1e3 * took.mean():.2f} ms a route, FCL asked about {checks.sum() / legs.sum():.0%} of legs"
     )
     print(f"whole          {1e3 * whole / len(routes):.2f} ms a candidate, {options.starts} to a cost-to-go")
     print(f"expansions     {np.median(expansions):.0f} median, {np.mean(expansions):.0f} mean")

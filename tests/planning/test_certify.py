@@ -37,9 +37,9 @@ def test_fcl_answers_for_every_leg_that_is_not_proven_free_and_for_all_without_p
     side = -0.1 - RADIUS - 0.001
     near = np.array([[side, -5.0, 2], [side, 0, 2], [side, 0, 5], [side, 5, 5]])
     for route, undecided in ((near, 3), (WEST, 0), (np.concatenate([WEST[:2], near[:1]]), 1)):
-        assert certify(route, RADIUS, GRID, WORLD).asked == undecided
+        assert certify(route, RADIUS, GRID, WORLD).fcl_checks == undecided
         every = certify(route, RADIUS, GRID, WORLD, prove=False)
-        assert (every.collision_free, every.asked) == (True, len(route) - 1)
+        assert (every.collision_free, every.fcl_checks) == (True, len(route) - 1)
     assert certify(near, RADIUS, GRID, WORLD).min_clearance_m == pytest.approx(RADIUS + 0.001, abs=1e-6)
     # A body two millimetres thicker touches the wall on each of the legs.
     for k in range(len(near) - 1):

@@ -11,14 +11,14 @@ from aerialdojo_gen.planning.attempt import lengths_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
-from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, narrow_cells
+from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, clearance_cost_field
 
 
 def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
     cost = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, cost, prefer)
     order = columns_by_distance(math.ceil((bound + 2.0) / grid.arrays.cell))
-    clearance_cost = narrow_cells(grid.arrays.field, prefer)
+    clearance_cost = clearance_cost_field(grid.arrays.field, prefer)
     visits = expand_cost(seeds, order, bound, grid.arrays.cell, grid.moves, cost, clearance_cost)
     return cost, seeds, visits
 
@@ -29,7 +29,7 @@ def test_it_is_dijkstras_on_the_same_graph(prefer):
     grid = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16))
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
     cost, seeds, _ = field(grid, goal, prefer=prefer)
-    clearance_cost = narrow_cells(grid.arrays.field, prefer).ravel()
+    clearance_cost = clearance_cost_field(grid.arrays.field, prefer).ravel()
     shape = grid.moves.shape
     n = grid.moves.size
     i, j, k = np.indices(shape).reshape(3, -1)
@@ -62,7 +62,7 @@ def test_what_is_not_metres_is_told_apart():
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
     plain, _, _ = field(grid, goal)
     cost, _, _ = field(grid, goal, prefer=prefer)
-    clearance_cost = narrow_cells(grid.arrays.field, prefer)
+    clearance_cost = clearance_cost_field(grid.arrays.field, prefer)
     centres = np.argwhere(np.isfinite(plain))[::37]
     points = grid.arrays.origin + (centres + 0.5) * grid.arrays.cell
     values = lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, cost, clearance_cost)
@@ -73,7 +73,7 @@ def test_what_is_not_metres_is_told_apart():
     assert (values <= dearest + 1e-3).all()
     assert (values < dearest - 0.1).mean() > 0.3
     # No preference, nothing to tell apart.
-    zero = narrow_cells(grid.arrays.field, NO_PREFERENCE)
+    zero = clearance_cost_field(grid.arrays.field, NO_PREFERENCE)
     assert lengths_at(points, np.array(goal, float), grid.arrays, grid.moves, plain, zero) == pytest.approx(
         shortest, abs=1e-3
     )

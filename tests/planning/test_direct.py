@@ -10,8 +10,8 @@ from support.handmade import scene
 
 from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.geometry.motion import TURN_RAD
+from aerialdojo_gen.planning.difficulty import free_lengths_m
 from aerialdojo_gen.planning.direct import direct_legs
-from aerialdojo_gen.planning.free_length import free_lengths_m
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import DOWN, UP

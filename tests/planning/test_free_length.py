@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from aerialdojo_gen.geometry.motion import TURN_RAD
-from aerialdojo_gen.planning.free_length import free_lengths_m
+from aerialdojo_gen.planning.difficulty import free_lengths_m
 
 HEADINGS = np.arange(24) * TURN_RAD
 # Displacements of every size: shorter than an Approach, about as long, and as long as a route.

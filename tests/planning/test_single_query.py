@@ -15,7 +15,7 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
 from aerialdojo_gen.planning.grid_path import make_path_arrays, short_path_cost
 from aerialdojo_gen.planning.planner import Planner, plan
-from aerialdojo_gen.planning.preference import Preference, narrow_cells
+from aerialdojo_gen.planning.preference import Preference, clearance_cost_field
 from aerialdojo_gen.planning.query_field import clear_query, expand_query, make_query_arrays
 
 RADIUS = 0.25
@@ -99,7 +99,7 @@ def ground():
     grid = ClearanceGrid.build(town())
     goal = np.array([0.1, 0.2, 1.4]) if grid.reachable((0.1, 0.2, 1.4)) else np.array([4.0, 4.0, 1.4])
     assert grid.reachable(goal)
-    clearance_cost = narrow_cells(grid.arrays.field, PREFER)
+    clearance_cost = clearance_cost_field(grid.arrays.field, PREFER)
     whole = np.full(grid.moves.shape, np.inf, np.float32)
     seeds = seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, whole, PREFER)
     seeded = whole.ravel()[seeds]

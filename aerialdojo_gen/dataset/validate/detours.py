@@ -25,7 +25,12 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.planning.preference import NO_PREFERENCE, approach_penalty, clearance_penalty, narrow_cells
+from aerialdojo_gen.planning.preference import (
+    NO_PREFERENCE,
+    approach_penalty,
+    clearance_cost_field,
+    clearance_penalty,
+)
 from aerialdojo_gen.store.schemas import APPROACH
 
 _FITS = ("list_lengths_differ", "out_of_bounds", "route_length", "route_collision")
@@ -77,7 +82,7 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         cap_m=plan.clearance_cap_m,
     )  # fmt: skip
     cost = np.empty(grid.moves.shape, np.float32)
-    wide = narrow_cells(grid.arrays.field, NO_PREFERENCE)
+    wide = clearance_cost_field(grid.arrays.field, NO_PREFERENCE)
     longest = float(paths.length_m[fit].max())
     order = columns_by_distance(math.ceil((longest + 2.0) / _CELL_M))
     places, owner = np.unique(goals[fit], axis=0, return_inverse=True)

@@ -19,8 +19,7 @@ from aerialdojo_gen.base.paper_figures import PaperScene, inventory
 from aerialdojo_gen.geometry.frames import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
-from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of
-from aerialdojo_gen.planning.free_length import free_lengths_m
+from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of, free_lengths_m
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene

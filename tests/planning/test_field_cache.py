@@ -11,7 +11,7 @@ from support.flying import town
 
 from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.planning.column_kernels import QUANTUM_M
-from aerialdojo_gen.planning.kept_fields import FieldCache
+from aerialdojo_gen.planning.field_cache import FieldCache
 from aerialdojo_gen.planning.planner import Planner
 
 FIELDS = arrays.arrays(
@@ -25,7 +25,7 @@ FIELDS = arrays.arrays(
 def test_a_field_comes_back_bit_for_bit(field, plain):
     kept = FieldCache(1.0 if plain else 0.0, 1.0)
     scratch = field.copy()
-    kept.keep(b"goal", scratch)
+    kept.store(b"goal", scratch)
     scratch.fill(3.0)
     found = kept.find(b"goal", scratch)
     assert found.dtype == np.float32
@@ -38,7 +38,7 @@ def test_no_more_is_kept_than_there_is_room_for():
     rough = np.random.default_rng(1).integers(0, 2**24, (100, 100, 6)).astype(np.float32) * np.float32(QUANTUM_M)
     kept = FieldCache(0.5, 0.3)  # two as they are, one compressed
     for k in range(5):
-        kept.keep(bytes([k]), rough)
+        kept.store(bytes([k]), rough)
     there = [kept.find(bytes([k]), np.empty_like(rough)) is not None for k in range(5)]
     assert there == [True, True, True, False, False]
 
