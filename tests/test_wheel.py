@@ -116,8 +116,8 @@ import sys
 sys.modules["pybullet"] = None  # as where it is not installed
 from aerialdojo_gen.rendering.backend import choose_renderer
 assert choose_renderer("auto").name == "gl"
-from aerialdojo_gen.rendering.preview import look_at
-from aerialdojo_gen.rendering.probe import probe_scene
+from aerialdojo_gen.rendering.gallery import look_at
+from aerialdojo_gen.rendering.backend import probe_scene
 assert look_at(probe_scene(), (-6, -6, 6), (0, 0, 1), 32, 24).std() > 5
 from aerialdojo_gen.base.errors import RenderError
 try:

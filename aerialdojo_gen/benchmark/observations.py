@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.planning.flight_space import Point
-from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, kept_renderer
+from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, scene_renderer
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.model import Scene
 
@@ -29,7 +29,7 @@ def drawing(scene: Scene, name: str) -> Renderer:
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
             "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
         )
-    renderer = kept_renderer(scene, name)
+    renderer = scene_renderer(scene, name)
     if renderer.name == "gl":
         _drawn_by_gl[:] = [os.getpid()]
     return renderer

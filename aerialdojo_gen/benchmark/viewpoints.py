@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.planning.flight_space import Point
-from aerialdojo_gen.rendering.sight import in_sight
+from aerialdojo_gen.rendering.casters import in_sight
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot

@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.asking import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
-from aerialdojo_gen.rendering.backend import forget_renderers
+from aerialdojo_gen.rendering.backend import close_renderers
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STEPS
 
@@ -194,7 +194,7 @@ class Worker:
             return self._flight.observe()
         except Exception as error:
             # A context that is lost stays lost: the next attempt opens another.
-            forget_renderers()
+            close_renderers()
             said = str(error) if isinstance(error, RenderError) else place(error)
             raise AgentUnavailable(f"the renderer failed: {said}", kind="renderer") from error
 

@@ -223,8 +223,7 @@ def gallery(
 
 def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str) -> None:
     from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
-    from aerialdojo_gen.rendering.gallery import write_picture
-    from aerialdojo_gen.rendering.reference_sheets import reference_sheets
+    from aerialdojo_gen.rendering.gallery import reference_sheets, write_picture
     from aerialdojo_gen.store.atomic import make_folder
     from aerialdojo_gen.store.root import open_root
 

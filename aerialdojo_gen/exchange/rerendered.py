@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
+from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 from aerialdojo_gen.scenes.context import open_scene
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
@@ -50,7 +50,7 @@ class Redrawn:
         """Draw an object's picture."""
         x, y, z, yaw = self._poses[object_id]
         pose = view_pose((x, y, z), yaw, "front")
-        rgb = kept_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
+        rgb = scene_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
         if _difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
             raise StoreError(
                 f"object {object_id} of {self._scene_name} does not look as its picture does: "

@@ -18,7 +18,7 @@ from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
 from aerialdojo_gen.learning.trajectories import SOURCES
 from aerialdojo_gen.learning.words import goal_text
-from aerialdojo_gen.rendering.sample import choose
+from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
 
 GOALS = ("text", "image")
@@ -135,7 +135,7 @@ def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: ExportOption
     by_scene: dict[str, list[dict[str, str]]] = {}
     for nav_id in index.nav_id:
         by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
-    taken = {nav_id for rows in by_scene.values() for nav_id in choose(rows, wanted.limit, wanted.seed)}
+    taken = {nav_id for rows in by_scene.values() for nav_id in choose_trajectories(rows, wanted.limit, wanted.seed)}
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
 

@@ -1,8 +1,7 @@
-"""What the cameras of many bodies see: small pictures of one scene, drawn in a row.
+"""Batches of small pictures of one scene, from the cameras of many bodies.
 
-A small picture's time goes to finding out what to draw, to the triangles that are drawn and to waiting for the
-picture, not to its pixels. So the views of a body are culled together, and a picture is read back when others have
-been drawn since.
+Culling, vertex work and waiting dominate the time of a small picture, not its pixels. So the views of a body are
+culled together, and a picture is read back after later ones have been drawn.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
 
 Floats = NDArray[np.float64]
 
-# Pictures that are drawn before the first of them is read.
+# Pictures drawn before the first of them is read back.
 _AHEAD = 4
 
 
@@ -71,10 +70,13 @@ class GlBodies:
             clips = np.stack([clip_from_world(camera, matrix, NEAR_M, FAR_M) for matrix in world])
             eye = np.ascontiguousarray(pose[:3])
             nearness = np.zeros((len(views), camera.height, camera.width), np.float32)
-            seen = [culling.seen(clips, eye, camera.width, camera.height, nearness) for culling in self._cullings]
+            visible = [
+                culling.visible_indices(clips, eye, camera.width, camera.height, nearness)
+                for culling in self._cullings
+            ]
             for v, matrix in enumerate(world):
-                target = self._renderer.draw_seen(
-                    camera, matrix, clips[v], [of_kind[v] for of_kind in seen], instance is not None,
+                target = self._renderer.draw_triangles(
+                    camera, matrix, clips[v], [of_kind[v] for of_kind in visible], instance is not None,
                     slot=turn % (_AHEAD + 1),
                 )  # fmt: skip
                 turn += 1

@@ -1,14 +1,14 @@
-"""Checks of rendered frames against what the camera must have seen.
+"""Checks of rendered frames against ray casts and for defects.
 
 Flags, in the order of `FLAGS`:
 
 - ``missing``: a file lacks frames, or does not open (found by `aerialdojo_gen.rendering.recording.record_views`)
 - ``black``: nearly all of the picture is black
 - ``uniform``: one colour fills the picture
-- ``frozen``: picture and depth equal those of the frame before, though the camera has moved
+- ``frozen``: picture and depth equal those of the previous frame, though the camera has moved
 - ``depth_invalid``: depth is NaN, negative, or nearer than the near plane
-- ``depth_mismatch``: depth is not what ray casts say at sampled pixels
-- ``camera_inside``: most rays from the camera meet a surface from behind, or the camera touches one
+- ``depth_mismatch``: depth differs from ray casts at sampled pixels
+- ``camera_inside``: most rays from the camera hit a surface from behind, or the camera touches one
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.codecs import MAX_DEPTH_M
 from aerialdojo_gen.rendering.picture import NEAR_M, Picture
-from aerialdojo_gen.rendering.texels import seen_caster
+from aerialdojo_gen.rendering.texels import masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
 FLAGS = ("missing", "black", "uniform", "frozen", "depth_invalid", "depth_mismatch", "camera_inside")
-OF_DEPTH = frozenset({"missing", "depth_invalid", "depth_mismatch", "camera_inside"})
-OF_RGB = frozenset({"missing", "black", "uniform", "frozen", "camera_inside"})
-# An instance id map is drawn with the depth: what is wrong with one is wrong with the other.
-CONCERNS = {"rgb": OF_RGB, "depth": OF_DEPTH, "instance": OF_DEPTH}
+DEPTH_FLAGS = frozenset({"missing", "depth_invalid", "depth_mismatch", "camera_inside"})
+RGB_FLAGS = frozenset({"missing", "black", "uniform", "frozen", "camera_inside"})
+# An instance id map is drawn with the depth, so it shares its flags.
+FLAGS_OF_MODALITY = {"rgb": RGB_FLAGS, "depth": DEPTH_FLAGS, "instance": DEPTH_FLAGS}
 
 _BLACK_LEVEL, _BLACK_SHARE = 8, 0.98
 _UNIFORM_RANGE = 6
@@ -48,11 +48,8 @@ _DEPTH_TOLERANCE_M = 0.01
 _MISMATCH_SHARE = 0.03
 
 
-def _looks_different(before: Floats, now: Floats, picture: Picture) -> bool:
-    """Whether a picture must differ from the one before: the camera has moved, and not only under the same sky.
-
-    The sky is the same from everywhere and to every side: of it alone a camera sees something else only if it tilts.
-    """
+def _must_differ(before: Floats, now: Floats, picture: Picture) -> bool:
+    """Whether a picture must differ from the previous one: the camera has moved; of sky alone, it has tilted."""
     rows, columns = (slice(0, 3), slice(0, 4)) if np.isfinite(picture.depth_m).any() else (slice(2, 3), slice(0, 3))
     return not np.allclose(before[rows, columns], now[rows, columns], rtol=0.0, atol=1e-4)
 
@@ -63,7 +60,7 @@ class ViewChecks:
 
     camera: Camera
     solid: Solid  # The scene that is rendered
-    flags: set[str] = field(default_factory=set)  # What has been found so far
+    flags: set[str] = field(default_factory=set)
     _picture: Picture | None = None
     _pose: Floats | None = None
 
@@ -71,7 +68,7 @@ class ViewChecks:
         """Check the next frame."""
         own = picture_flags(picture)
         self.flags |= own
-        wrong, behind = self.against_rays(picture, world_from_camera)
+        wrong, behind = self.compare_with_rays(picture, world_from_camera)
         if wrong > _MISMATCH_SHARE:
             self.flags.add("depth_mismatch")
         if behind > _BEHIND_SHARE:
@@ -81,24 +78,21 @@ class ViewChecks:
             before is not None
             and self._pose is not None
             and "uniform" not in own
-            # What hardly ever holds first: the rest looks at all of a picture.
+            # The rarest condition first: the others compare whole pictures.
             and _equal(before.depth_m, picture.depth_m)
             and _equal(before.rgb, picture.rgb)
-            and _looks_different(self._pose, world_from_camera, picture)
+            and _must_differ(self._pose, world_from_camera, picture)
         ):
             self.flags.add("frozen")
         self._picture, self._pose = picture, world_from_camera
 
-    def against_rays(self, picture: Picture, world_from_camera: Floats) -> tuple[float, float]:
-        """Compare depth with ray casts at a lattice of pixels without edges.
-
-        Shares that are wrong, and that hit from behind.
-        """
+    def compare_with_rays(self, picture: Picture, world_from_camera: Floats) -> tuple[float, float]:
+        """Compare depth with ray casts at a lattice of smooth pixels: share that differs, share hit from behind."""
         h, w = picture.depth_m.shape
         n = _SAMPLES_A_SIDE
         rows, cols = _samples(h, w, n)
         depth = picture.depth_m
-        here = depth[rows, cols].astype(np.float64)
+        measured = depth[rows, cols].astype(np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = [
                 1.0 / depth[rows + r, cols + c].astype(np.float64)
@@ -107,31 +101,31 @@ class ViewChecks:
             bend = np.maximum(
                 np.abs(inverse[1] + inverse[2] - 2 * inverse[0]), np.abs(inverse[3] + inverse[4] - 2 * inverse[0])
             )
-            smooth = np.where(np.isfinite(here), bend * here**2 < _DEPTH_TOLERANCE_M / 2, bend == 0.0)
+            smooth = np.where(np.isfinite(measured), bend * measured**2 < _DEPTH_TOLERANCE_M / 2, bend == 0.0)
         f = self.camera.focal_px
         local = np.stack([(cols + 0.5 - w / 2) / f, (rows + 0.5 - h / 2) / f, np.ones(len(rows))], axis=1)
         along, behind = self.solid.first_hit(world_from_camera[:3, 3], local @ world_from_camera[:3, :3].T)
         cast = along / np.linalg.norm(local, axis=1)
-        near = np.minimum(here, cast) <= MAX_DEPTH_M
+        near = np.minimum(measured, cast) <= MAX_DEPTH_M
         compared = smooth & near
         if not compared.any():
             return 0.0, behind
         with np.errstate(invalid="ignore"):
-            wrong = ~(np.abs(here - cast) <= _DEPTH_TOLERANCE_M + 2e-6 * np.minimum(here, cast) ** 2)
+            wrong = ~(np.abs(measured - cast) <= _DEPTH_TOLERANCE_M + 2e-6 * np.minimum(measured, cast) ** 2)
         return float(wrong[compared].mean()), behind
 
 
 class Solid:
-    """A scene for ray casts that tell front from back."""
+    """Ray casts that distinguish front faces from back faces."""
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         vertices, faces = soup(scene.instances)
         corners = vertices[faces]
         self._normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # What is there from both sides has no inside.
+        # Double-sided surfaces have no inside.
         both = [scene.materials[p.material].double_sided for i in scene.instances for p in i.parts]
         self._normal[np.repeat(both, [len(p.faces) for i in scene.instances for p in i.parts])] = 0.0
-        self._caster = seen_caster(scene, caster or TriangleRayCaster(vertices, faces))
+        self._caster = masked_caster(scene, caster or TriangleRayCaster(vertices, faces))
 
     def first_hit(self, origin: Floats, directions: Floats) -> tuple[Floats, float]:
         """First hits of rays, (n,) metres, and the share of hits from behind: near 1 inside a solid."""
@@ -141,7 +135,7 @@ class Solid:
         return distance, float(away.mean()) if hit.any() else 0.0
 
 
-def kept_solid(scene: Scene) -> Solid:
+def scene_solid(scene: Scene) -> Solid:
     """Return the scene's solid, over its one Embree scene."""
     return context_of(scene).part("solid", lambda: Solid(scene, triangle_caster(scene)))
 
@@ -181,7 +175,7 @@ def _darkness(rgb: NDArray[np.uint8]) -> tuple[float, int]:
 
 
 def _equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    """Whether two pictures are equal: some rows first, which hardly ever are."""
+    """Whether two pictures are equal; some rows first, which rarely are."""
     return bool(np.array_equal(one[::32], other[::32]) and np.array_equal(one, other))
 
 

@@ -1,8 +1,8 @@
 """Writers of the recordings: RGB as H.264 in MP4, depth and instance ids without loss as FFV1 in Matroska; or PNG.
 
-Depth is stored as 16-bit grey: planar depth in whole millimetres, rounded, or in steps of a share of itself. 0 means
-that nothing lies within range: the sky, or a surface farther than 65.535 m. Instance ids are 16-bit grey too, one
-more than the instance's number, 0 where nothing is seen. All writers give the same bytes for the same frames.
+Depth is stored as 16-bit grey: planar depth in whole millimetres, or in relative steps. 0 means out of range: the
+sky, or a surface farther than 65.535 m. Instance ids are 16-bit grey too, one more than the instance's number, 0 for
+none. All writers give the same bytes for the same frames.
 """
 
 from __future__ import annotations
@@ -27,20 +27,17 @@ RGB_CODEC, DEPTH_CODEC = "h264", "ffv1"
 SUFFIX = {"rgb": "mp4", "depth": "mkv", "instance": "mkv"}
 CODEC = {"rgb": RGB_CODEC, "depth": DEPTH_CODEC, "instance": DEPTH_CODEC}
 
-# A short closed GOP without B-frames: a seek decodes 15 frames at most, and lands on the frame asked for.
+# A short closed GOP without B-frames: a seek decodes 15 frames at most, and is exact.
 _H264 = {"g": "15", "bf": "0", "flags": "+bitexact+cgop"}
-# Every frame a key frame; a checksum a slice, so that a damaged file is noticed.
+# Every frame a key frame; a checksum per slice detects damaged files.
 _FFV1 = {"level": "3", "slices": "4", "slicecrc": "1", "g": "1", "flags": "+bitexact"}
 
-# 16 and 128, and half of what the shift cuts off.
+# 16 and 128, plus half a unit for rounding.
 _Y_OFFSET, _UV_OFFSET = (16 << 16) + (1 << 15), (128 << 18) + (1 << 17)
 
 
 def to_stored(depth_m: NDArray[np.floating[Any]], step: float = 0.0) -> NDArray[np.uint16]:
-    """Planar depth in metres as stored uint16: whole millimetres, or the nearest of `stored_depths_m(step)`.
-
-    0 for no hit.
-    """
+    """Planar depth in metres as stored uint16: millimetres, or nearest of `stored_depths_m(step)`; 0 for no hit."""
     depth = np.ascontiguousarray(depth_m)
     out = np.empty(depth.shape, dtype=np.uint16)
     _round(depth.reshape(-1), depth.dtype.type(1000.0), out.reshape(-1))
@@ -51,12 +48,12 @@ def to_stored(depth_m: NDArray[np.floating[Any]], step: float = 0.0) -> NDArray[
 def _round(depth_m: NDArray[Any], millimetres_a_metre: Any, out: NDArray[np.uint16]) -> None:
     for k in range(len(depth_m)):
         mm = np.rint(depth_m[k] * millimetres_a_metre)
-        # Not so of a NaN either.
+        # False for NaN too.
         out[k] = np.uint16(mm) if 0.0 <= mm <= 65535.0 else np.uint16(0)
 
 
 def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float32]:
-    """Depth in metres from what is stored, float32; inf where nothing lies within range."""
+    """Depth in metres from stored values, float32; inf for out of range."""
     if step:
         return stored_depths_m(step)[stored]
     return np.where(stored == 0, np.float32(np.inf), stored.astype(np.float32) / np.float32(1000.0))
@@ -64,10 +61,7 @@ def to_metres(stored: NDArray[np.uint16], step: float = 0.0) -> NDArray[np.float
 
 @lru_cache
 def stored_depths_m(step: float) -> NDArray[np.float32]:
-    """What the stored values of a relative step mean, (65536,) metres: 0.1 m * (1 + step) ** (value - 1).
-
-    Inf for 0.
-    """
+    """Depths of the stored values of a relative step, (65536,) m: 0.1 * (1 + step) ** (value - 1); inf for 0."""
     values = np.arange(1 << 16, dtype=np.float64)
     with np.errstate(over="ignore"):
         metres = (0.1 * (1.0 + step) ** (values - 1.0)).astype(np.float32)
@@ -85,16 +79,13 @@ def _steps(step: float) -> NDArray[np.uint16]:
 
 
 class VideoWriter:
-    """Write video streams (H.264 RGB, 16-bit depth, instance ids) into one file, frame by frame.
-
-    A context manager.
-    """
+    """Write video streams (H.264 RGB, 16-bit depth, instance ids) into one file, by frames; a context manager."""
 
     def __init__(
         self, path: Path, modalities: Sequence[str], width: int, height: int, fps: float, crf: int = 23,
         preset: str = "ultrafast", comment: str = "",
     ) -> None:  # fmt: skip
-        # Without bitexact the Matroska muxer writes a random id into every file, and both the library's version.
+        # Without bitexact the Matroska muxer writes a random id, and both muxers the library's version.
         self._container = av.open(
             str(path),
             "w",
@@ -124,7 +115,7 @@ class VideoWriter:
                 self._container.mux(packet)
 
     def close(self) -> None:
-        """Write what is left and close the file."""
+        """Flush the encoders and close the file."""
         for stream in self._streams.values():
             for packet in stream.encode():
                 self._container.mux(packet)
@@ -151,7 +142,7 @@ def _frame(modality: str, picture: NDArray[np.uint8] | NDArray[np.uint16]) -> An
         if picture.dtype != np.uint8 or picture.shape[2:] != (3,) or height % 2 or width % 2:
             raise ValueError(f"a picture is (H, W, 3) uint8, H and W even, not {picture.shape} {picture.dtype}")
         frame = av.VideoFrame(width, height, "yuv420p")
-        # A pixel in one load each: that, and no table, is what lets the compiler take several at a time.
+        # One load per pixel and no lookup table, so that the compiler vectorises.
         rgba = cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA).view(np.int32)[..., 0]
         _to_yuv(rgba, *(_plane(frame, k, np.uint8) for k in range(3)))
         return frame
@@ -163,7 +154,7 @@ def _frame(modality: str, picture: NDArray[np.uint8] | NDArray[np.uint16]) -> An
 
 
 def _plane(frame: Any, k: int, dtype: type[np.uint8] | type[np.uint16]) -> NDArray[Any]:
-    """Return a frame's own memory of one plane, without what its lines are filled up with."""
+    """Return a frame's own memory of one plane, without the lines' padding."""
     plane = frame.planes[k]
     return np.frombuffer(plane, dtype).reshape(plane.height, -1)[:, : plane.width]
 
@@ -172,7 +163,7 @@ def _plane(frame: Any, k: int, dtype: type[np.uint8] | type[np.uint16]) -> NDArr
 def _to_yuv(
     rgba: NDArray[np.int32], y: NDArray[np.uint8], u: NDArray[np.uint8], v: NDArray[np.uint8]
 ) -> None:  # fmt: skip
-    """Convert by BT.601, limited range, chroma the mean of four pixels: whole numbers, the same on every machine."""
+    """Convert by BT.601, limited range, chroma the mean of four pixels, in integers: the same on every machine."""
     for r in range(rgba.shape[0]):
         for c in range(rgba.shape[1]):
             p = np.int32(rgba[r, c])

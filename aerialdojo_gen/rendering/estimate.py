@@ -1,4 +1,4 @@
-"""What recording a selection will take: measured on a few of its trajectories, before it starts."""
+"""Estimate of a recording's time, disk and memory, measured on a few of its trajectories."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.placement import places
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
-from aerialdojo_gen.rendering.sample import choose, tables
+from aerialdojo_gen.rendering.sample import choose_trajectories, tables
 from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
@@ -27,7 +27,7 @@ _MEASURED_SCENES, _MEASURED_POSES = 6, 12
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a selection will take."""
+    """Estimated time, disk and memory of a recording."""
 
     trajectories: int  # Of the selection; a pose is a frame in every view
     poses: int
@@ -38,7 +38,7 @@ class Estimate:
     memory_bytes: float  # Of all workers of a machine
     workers: int
     machines: int
-    measured: int  # Poses that were rendered, encoded and checked to find out
+    measured: int  # Poses that were rendered, encoded and checked for the estimate
     why: str  # Which renderer, and why
 
     def __str__(self) -> str:
@@ -62,19 +62,19 @@ def estimate(
     choice = choose_renderer(config.renderer)
     poses = trajectories = 0
     selected: dict[str, str] = {}
-    # Scenes differ threefold: what is measured in one counts as much as the poses that it has of the selection.
+    # Scenes differ threefold: weight each measured scene by its poses in the selection.
     weight: dict[str, int] = {}
     for scene in scenes:
         keys = [row for table in tables(config, scene) for row in _rows(data, table, scene, ["nav_id", "setting"])]
-        mine = choose(keys, config.limit, seed)
-        if mine:
+        chosen = choose_trajectories(keys, config.limit, seed)
+        if chosen:
             frames = _frames(data, scene, config)
-            trajectories += len(mine)
-            weight[scene] = sum(frames[nav_id] for nav_id in mine)
+            trajectories += len(chosen)
+            weight[scene] = sum(frames[nav_id] for nav_id in chosen)
             poses += weight[scene]
-            selected[scene] = min(mine, key=lambda i: rng.rank(seed, "estimate", i))
+            selected[scene] = min(chosen, key=lambda i: rng.rank(seed, "estimate", i))
     if not selected:
-        raise UsageError("there is nothing to record: no trajectory of these scenes is in the split")
+        raise UsageError("nothing to record: no trajectory of these scenes is in the split")
     drawn = sorted(selected, key=lambda scene: rng.rank(seed, "estimate", scene))[:_MEASURED_SCENES]
     measured = 0
     seconds = opening = bytes_ = 0.0
@@ -82,8 +82,8 @@ def estimate(
     for scene in drawn:
         every = (row for table in tables(config, scene) for row in _rows(data, table, scene))
         route = next(row for row in every if row["nav_id"] == selected[scene])
-        n, cpu, built, size = _measure(data, scene, route, config, choice.name)
-        measured, opening = measured + n, opening + built
+        n, cpu, opening_s, size = _measure(data, scene, route, config, choice.name)
+        measured, opening = measured + n, opening + opening_s
         seconds, bytes_ = seconds + share[scene] * cpu / n, bytes_ + share[scene] * size / n
     cpu_s = poses * seconds + len(selected) * workers * opening / len(drawn)
     # Kilobytes on Linux, bytes on macOS.
@@ -128,19 +128,19 @@ def _measure(
     data: Where, scene: str, route: dict[str, Any], config: RenderConfig, renderer_name: str
 ) -> tuple[int, float, float, int]:
     """Record the first poses of a route; returns poses, CPU seconds for them and for opening the scene, bytes."""
-    begun = time.process_time()
+    started = time.process_time()
     row = store.read_scene(data, "scenes", scene).to_pylist()[0]
     mesh = read_scene_mesh(open_root(data), row["mesh_path"], row["mesh_sha256"])
     solid = Solid(mesh)
     short = route | {name: route[name][:_MEASURED_POSES] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")}
     poses = frame_poses(short, config)
     with open_renderer(mesh, renderer_name) as renderer, scratch_folder() as folder:
-        built = time.process_time() - begun
-        begun = time.process_time()
+        opening_s = time.process_time() - started
+        started = time.process_time()
         record_views(renderer, solid, config.views, poses, config, folder)
-        seconds = time.process_time() - begun
+        seconds = time.process_time() - started
         size = sum(size_of(folder / file) for file in {place.file for place in places(config)})
-        return len(poses.time_s), seconds, built, size
+        return len(poses.time_s), seconds, opening_s, size
 
 
 def _hours(seconds: float) -> str:

@@ -1,8 +1,7 @@
-"""Finished trajectories: a folder each, whole or not there, so that a killed run loses one trajectory at most.
+"""Finished trajectories: one folder each, committed atomically, so that a killed run loses at most one trajectory.
 
 ``media/<scene>/<nav_id>/`` holds the videos and ``recording.json``: the rows of `recordings`, and the fingerprint of
-what they were made from. A run that finds it there and up to date does not render the trajectory again, be it that it
-was killed, that its budget was spent, or that more trajectories are asked for than before.
+their inputs. A trajectory whose folder is up to date is not rendered again.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import RECORDINGS
 from aerialdojo_gen.store.tables import check_table, from_rows
 
-NOTE = "recording.json"
-# What does not change a trajectory's own files: which others are recorded, and how they are shared out.
+MANIFEST = "recording.json"
+# Settings that do not change a trajectory's own files.
 _SELECTION = {"limit", "split", "trajectories_per_part"}
 
 
 def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any], config: RenderConfig) -> str:
-    """Hash what a trajectory's recording depends on."""
+    """Hash the inputs of a trajectory's recording."""
     facts = {
         "code": code,
         "mesh": mesh_sha256,
@@ -39,7 +38,7 @@ def trajectory_fingerprint(code: str, mesh_sha256: str, route: Mapping[str, Any]
 def find(data: DataRoot, folder: str, fingerprint: str, *, verify: bool = False) -> list[dict[str, Any]] | None:
     """Return the rows of a finished trajectory; None where there is none, or it is stale or damaged."""
     try:
-        note = read_json(data.local_copy(f"{folder}/{NOTE}"))
+        note = read_json(data.local_copy(f"{folder}/{MANIFEST}"))
     except (OSError, StoreError):
         return None
     if not isinstance(note, dict) or note.get("fingerprint") != fingerprint:
@@ -62,6 +61,6 @@ def _are_recordings(rows: list[Any], folder: str) -> bool:
 
 
 def note(folder: Path, fingerprint: str, rows: list[dict[str, Any]]) -> None:
-    """Write down, in a trajectory's folder, what stands in it."""
+    """Write the manifest of a trajectory's folder."""
     text = json.dumps({"fingerprint": fingerprint, "recordings": rows}, indent=1)
-    (folder / NOTE).write_text(text, encoding="utf-8")
+    (folder / MANIFEST).write_text(text, encoding="utf-8")

@@ -1,19 +1,22 @@
-"""Contact sheets: what every prop and every scene looks like, for a person to judge."""
+"""Contact sheets of props, scenes and reference pictures, for human review."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.base.pictures import GALLERY_JPEG, SMALLEST_PNG, encode_jpeg, encode_png
+from aerialdojo_gen.base.pictures import GALLERY_JPEG, SMALLEST_PNG, decode_rgb, encode_jpeg, encode_png
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.preview import contact_sheet, look_at
+from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
@@ -22,6 +25,37 @@ from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.store.atomic import atomic_file
 
 Image = NDArray[np.uint8]
+
+
+def look_at(
+    scene: Scene, eye: ArrayLike, target: ArrayLike, width: int = 640, height: int = 480, fov_deg: float = 60.0
+) -> NDArray[np.uint8]:
+    """Take a picture of a scene from `eye` to `target`, world metres; (height, width, 3) uint8 sRGB."""
+    camera = Camera(width, height, fov_deg)
+    return scene_renderer(scene, "auto").render(camera, look_at_pose(eye, target)).rgb
+
+
+def contact_sheet(
+    images: Sequence[NDArray[np.uint8]], labels: Sequence[str] = (), columns: int = 4
+) -> NDArray[np.uint8]:
+    """Put pictures, (H, W, 3) uint8, side by side under their labels."""
+    if not images or (labels and len(labels) != len(images)):
+        raise ValueError(f"a sheet of {len(images)} pictures with {len(labels)} labels")
+    height, width = max(i.shape[0] for i in images), max(i.shape[1] for i in images)
+    head = 20 if labels else 0
+    columns = min(columns, len(images))
+    rows = -(-len(images) // columns)
+    sheet = np.full((rows * (height + head + 4) + 4, columns * (width + 4) + 4, 3), 255, dtype=np.uint8)
+    for k, image in enumerate(images):
+        top, left = 4 + k // columns * (height + head + 4), 4 + k % columns * (width + 4)
+        if labels:
+            cell = np.full((head, width, 3), 255, dtype=np.uint8)
+            cv2.putText(cell, labels[k], (3, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA)
+            sheet[top : top + head, left : left + width] = cell
+        sheet[top + head : top + head + image.shape[0], left : left + image.shape[1]] = image
+    return sheet
+
+
 _FLYING_HEIGHT_M = 3.0
 
 
@@ -64,7 +98,7 @@ def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
     fov = 60.0
     half = math.tan(math.radians(fov / 2))
     up = 1.08 * max(span[0] / 2, span[1] / 2 * width / height) / half
-    # A breath to the south, so that north is up in the picture.
+    # Slightly to the south, so that north is up in the picture.
     above = centre + np.array([0, -1e-3 * up, up])
     views = [(above, centre, fov, "from above")]
     for name, (dx, dy) in {
@@ -82,7 +116,7 @@ def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
 
 
 def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Two views among the objects, one from each half of the scene: low places from which one sees far."""
+    """Two views among the objects, one from each half of the scene: low places with a long line of sight."""
     low, high = scene.bounds
     caster = RayCaster(scene)
     n = 9
@@ -120,3 +154,37 @@ def write_picture(image: Image, folder: Path, name: str, max_width: int | None =
     with atomic_file(folder, name) as path:
         path.write_bytes(data)
     return folder / name
+
+
+PICTURES_A_SHEET = 30
+_COLUMNS, _SIZE_PX, _GAP_PX = 6, 240, 8
+_LINE_PX, _CHARACTERS, _LINES = 13, 46, 8
+_INK, _WARNING = (30, 30, 30), (190, 30, 20)
+
+
+def reference_sheets(rows: Sequence[Mapping[str, Any]]) -> Iterator[Image]:
+    """Yield contact sheets, (H, W, 3) uint8 sRGB, of objects' reference pictures, ids, names and descriptions."""
+    for first in range(0, len(rows), PICTURES_A_SHEET):
+        page = rows[first : first + PICTURES_A_SHEET]
+        height = _SIZE_PX + _LINES * _LINE_PX + _GAP_PX
+        width = _SIZE_PX + _GAP_PX
+        sheet = np.full((-(-len(page) // _COLUMNS) * height, _COLUMNS * width, 3), 255, np.uint8)
+        for k, row in enumerate(page):
+            top, left = k // _COLUMNS * height, k % _COLUMNS * width
+            _put(sheet[top : top + height, left : left + width], row)
+        yield sheet
+
+
+def _put(cell: Image, row: Mapping[str, Any]) -> None:
+    picture = decode_rgb(row["reference_image"]) if row["reference_image"] else None
+    if picture is not None:
+        cell[:_SIZE_PX, :_SIZE_PX] = cv2.resize(picture, (_SIZE_PX, _SIZE_PX), interpolation=cv2.INTER_AREA)
+    lines = [(f"{row['object_id']} {row['name']}", _INK)]
+    if row.get("tells_missing"):
+        lines.append((f"not shown: {row['tells_missing']}", _WARNING))
+    # OpenCV's letters are ASCII.
+    plain = row["description"].translate(str.maketrans("“”’é–", '""\'e-'))
+    lines += [(line, (110, 110, 110)) for line in textwrap.wrap(plain, _CHARACTERS)]
+    for n, (line, ink) in enumerate(lines[:_LINES]):
+        at = (2, _SIZE_PX + (n + 1) * _LINE_PX - 2)
+        cv2.putText(cell, line, at, cv2.FONT_HERSHEY_SIMPLEX, 0.34, ink, 1, cv2.LINE_AA)

@@ -30,17 +30,17 @@ from aerialdojo_gen.scenes.model import Scene
 Floats = NDArray[np.float64]
 
 _SHADOW_PX = 2048
-_MEND = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
+_HINT = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
 _FORMATS = {
     "position": "3f", "uv": "2f", "normal": "3f", "colour": "4f1", "texel_m": "1f", "layer": "1f", "instance": "1f",
 }  # fmt: skip
 
 
-# What programs are told for every picture.
-_CHANGING = ("clip_from_world", "eye", "focal_px", "world_from_camera", "reach")
+# Uniforms that change with every picture.
+_PER_PICTURE = ("clip_from_world", "eye", "focal_px", "world_from_camera", "reach")
 
-# A context belongs to the thread that made it: in another one its calls do nothing, or reach that one's objects.
-_here = threading.local()
+# A context is valid only in the thread that made it.
+_thread = threading.local()
 
 
 def context() -> Any:
@@ -55,29 +55,29 @@ def context() -> Any:
     RenderError
         moderngl or EGL is missing; the message says what to install.
     """
-    if (known := getattr(_here, "context", None)) is not None:
-        return known
-    # No thread of its own: several processes share the cores, and threads would only wait for each other.
+    if (current := getattr(_thread, "context", None)) is not None:
+        return current
+    # No threads of llvmpipe's own: several processes share the cores.
     os.environ.setdefault("LP_NUM_THREADS", "0")
     try:
         moderngl: Any = importlib.import_module("moderngl")
 
-        # The libraries' development packages, which have the names without a version, need not be there.
-        found = {"libegl": ctypes.util.find_library("EGL"), "libgl": ctypes.util.find_library("GL")}
-        named = {option: library for option, library in found.items() if library}
-        _here.context = moderngl.create_standalone_context(backend="egl", require=430, **named)
+        # Find the versioned names: the development packages may be missing.
+        libraries = {"libegl": ctypes.util.find_library("EGL"), "libgl": ctypes.util.find_library("GL")}
+        named = {option: library for option, library in libraries.items() if library}
+        _thread.context = moderngl.create_standalone_context(backend="egl", require=430, **named)
     except ImportError:
-        raise RenderError(f"the renderer gl lacks the package moderngl: {_MEND}") from None
+        raise RenderError(f"the renderer gl lacks the package moderngl: {_HINT}") from None
     except Exception as error:  # glcontext raises plain Exceptions
-        raise RenderError(f"the renderer gl does not start ({error}): {_MEND}") from None
-    # Pictures are drawn upside down, so that their first row comes first in memory: that turns the winding.
-    _here.context.front_face = "cw"
-    _here.context.depth_func = "<="
-    return _here.context
+        raise RenderError(f"the renderer gl does not start ({error}): {_HINT}") from None
+    # Pictures are drawn upside down, so that their first row comes first in memory: that flips the winding.
+    _thread.context.front_face = "cw"
+    _thread.context.depth_func = "<="
+    return _thread.context
 
 
 def device() -> str:
-    """Name what draws, in the driver's words; RenderError where there is no OpenGL."""
+    """Name of the OpenGL device; RenderError where there is no OpenGL."""
     return str(context().info["GL_RENDERER"])
 
 
@@ -107,28 +107,28 @@ class GlRenderer:
         self._bodies: GlBodies | None = None
         textured, flat, layers = chunks(scene)
         kinds = [Kind(textured, ("TEXTURED",), layers), Kind(flat, (), None), *foreign_kinds(scene)]
-        self._sets = [_Drawn(kind, self) for kind in kinds if len(kind.chunks.low)]
-        self._behind = [_Drawn(kind, self) for kind in backdrop_kinds(scene)]
-        most = max(len(drawn.kind.chunks.vertices) for drawn in (*self._sets, *self._behind))
-        self._indices = self._own(self._gl.buffer(reserve=4 * most, dynamic=True))
+        self._sets = [_DrawSet(kind, self) for kind in kinds if len(kind.chunks.low)]
+        self._backdrop = [_DrawSet(kind, self) for kind in backdrop_kinds(scene)]
+        max_vertices = max(len(drawn.kind.chunks.vertices) for drawn in (*self._sets, *self._backdrop))
+        self._indices = self._own(self._gl.buffer(reserve=4 * max_vertices, dynamic=True))
         self._light = light_of(scene)
         camera, pose, near_m, far_m = sun_view(scene, _SHADOW_PX)
         self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
         self._bias_m = 0.03 + 1.5 * (near_m + far_m) / 2.0 / camera.focal_px
         self._shadow = self._shadow_map()
 
-    def _own(self, thing: Any) -> Any:
-        self._owned.append(thing)
-        return thing
+    def _own(self, resource: Any) -> Any:
+        self._owned.append(resource)
+        return resource
 
     def texture_array(self, kind: Kind) -> Any:
-        """Load a kind's textures; None where it has none."""
+        """Upload a kind's textures; None where it has none."""
         if kind.layers is None:
             return None
         layers = kind.layers
         n, height, width, channels = layers.shape
         if channels == 3:
-            # Four bytes a texel: llvmpipe takes a tenth of a picture's time longer to pick three.
+            # Four bytes a texel: with three, llvmpipe takes a tenth longer.
             whole = np.full((n, height, width, 4), 255, dtype=np.uint8)
             whole[..., :3] = layers
             layers = whole
@@ -137,12 +137,12 @@ class GlRenderer:
         if kind.smooth:
             texture.filter = (self._gl.LINEAR_MIPMAP_LINEAR, self._gl.LINEAR)
         else:
-            # The nearest size alone: a texture fades into its mean before two sizes of it look different.
+            # One mipmap level is enough: a texture fades into its mean before two levels differ.
             texture.filter = (self._gl.NEAREST_MIPMAP_NEAREST, self._gl.NEAREST)
         return texture
 
     def _shadow_map(self) -> Any:
-        """Draw what the sun sees: its depths, of which the shader compares the four nearest and averages."""
+        """Draw the shadow map, of which the shader averages the comparisons with the four nearest depths."""
         gl = self._gl
         depth = gl.depth_texture((_SHADOW_PX, _SHADOW_PX))
         target = gl.framebuffer(depth_attachment=depth)
@@ -156,14 +156,14 @@ class GlRenderer:
             array.release()
             program.release()
         target.release()
-        # As numbers, and not as the depth texture that they are: llvmpipe compares that at twice the price.
+        # As a float texture: llvmpipe's comparison with a depth texture takes twice as long.
         shadow = self._own(gl.texture((_SHADOW_PX, _SHADOW_PX), 1, depth.read(), dtype="f4"))
         depth.release()
         shadow.filter = (gl.NEAREST, gl.NEAREST)
         return shadow
 
     def _begin(self, target: Any, colours: int = 0) -> None:
-        """Start to draw into a target with some colours, which stay what they are: the sky covers them all."""
+        """Begin to draw into a target; its colours are not cleared, because the sky covers them."""
         gl = self._gl
         gl.enable_only(gl.DEPTH_TEST | gl.CULL_FACE)
         clear_depth(target, colours)
@@ -179,36 +179,36 @@ class GlRenderer:
         eyes: dict[bytes, list[int]] = {}
         for v, pose in enumerate(poses):
             eyes.setdefault(pose[:3, 3].tobytes(), []).append(v)
-        seen: list[list[NDArray[np.uint32]]] = [[] for _ in poses]
+        visible: list[list[NDArray[np.uint32]]] = [[] for _ in poses]
         for views in eyes.values():
             eye = np.ascontiguousarray(poses[views[0]][:3, 3])
             tiles = Tiles.empty(len(views), camera.width, camera.height)
             for drawn in self._sets:
-                found = drawn.kind.chunks.seen(clips[views], eye, tiles, drawn.kind.hides)
+                found = drawn.kind.chunks.visible_indices(clips[views], eye, tiles, drawn.kind.hides)
                 for v, indices in zip(views, found, strict=True):
-                    seen[v].append(indices)
-        # One target for all: what a view leaves in the processor's cache serves the next.
+                    visible[v].append(indices)
+        # One target for all views, for the processor's cache.
         return [
-            read_picture(self.draw_seen(camera, pose, clip, chosen, instances), camera, instances)
-            for clip, pose, chosen in zip(clips, poses, seen, strict=True)
+            read_picture(self.draw_triangles(camera, pose, clip, chosen, instances), camera, instances)
+            for clip, pose, chosen in zip(clips, poses, visible, strict=True)
         ]
 
     def bodies(self) -> GlBodies:
-        """Return what draws many small pictures in a row with this renderer."""
+        """Return the batch renderer of many small pictures."""
         if self._bodies is None:
             self._bodies = GlBodies(self)
         return self._bodies
 
-    def draw_seen(
+    def draw_triangles(
         self,
         camera: Camera,
         world_from_camera: Floats,
         clip: Floats,
-        seen: Sequence[NDArray[np.uint32]],
+        visible: Sequence[NDArray[np.uint32]],
         instances: bool = False,
         slot: int = 0,
     ) -> Any:
-        """Draw triangles that were chosen, and the sky behind them.
+        """Draw culled triangles, and the sky behind them.
 
         Parameters
         ----------
@@ -221,12 +221,12 @@ class GlRenderer:
         instances : bool
             Whether the picture has an instance id map.
         slot : int
-            Which of several targets of this size: what is drawn in another stays.
+            Which of several targets of this size.
 
         Returns
         -------
         moderngl.Framebuffer
-            The target; who reads it waits until it is drawn.
+            The target; reading it waits until it is drawn.
         """
         target = self._target(camera.width, camera.height, instances, slot)
         eye = world_from_camera[:3, 3].astype(np.float32).tobytes()
@@ -236,29 +236,29 @@ class GlRenderer:
 
         place = {"clip_from_world": _columns(clip), "eye": eye, "focal_px": np.float32(camera.focal_px).tobytes()}
 
-        def draw(drawn: _Drawn, chosen: NDArray[np.uint32]) -> None:
+        def draw(drawn: _DrawSet, chosen: NDArray[np.uint32]) -> None:
             drawn.begin(self._gl)
             array, uniforms = self._array((*drawn.kind.tags, *tags), drawn.buffer)
             _write(uniforms, place)
-            # No larger than it must be: Mesa clears all of it.
+            # As small as possible: Mesa clears all of it.
             self._indices.orphan(chosen.nbytes)
             self._indices.write(chosen)
             array.render(vertices=len(chosen))
 
-        for drawn, chosen in zip(self._sets, seen, strict=True):
+        for drawn, chosen in zip(self._sets, visible, strict=True):
             if len(chosen):
                 draw(drawn, chosen)
         self._gl.disable(self._gl.CULL_FACE)
         sky, uniforms = self._array(("SKY", *tags), None)
-        _write(uniforms, {"world_from_camera": _columns(world_from_camera[:3, :3]), "reach": _reach(camera)})
+        _write(uniforms, {"world_from_camera": _columns(world_from_camera[:3, :3]), "reach": _half_extent(camera)})
         sky.render(vertices=3)
-        # After the sky: depths so near to the far end are rounded to it, and the one that is drawn last is seen.
-        for drawn in self._behind:
+        # After the sky: depths near the far plane round to it, and the last one drawn wins.
+        for drawn in self._backdrop:
             draw(drawn, np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32))
         return target
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> tuple[Any, dict[str, Any]]:
-        """Return the vertex array of a program and its buffer, made when it is first needed, and what it is told."""
+        """Return the vertex array of a program and buffer, made on first use, and its uniforms."""
         # Two kinds may have one program, and never one buffer.
         key = (*tags, id(buffer))
         if key not in self._arrays:
@@ -270,7 +270,7 @@ class GlRenderer:
                 horizon=self._light.horizon, zenith=self._light.zenith, textures=0, shadow=1,
             )  # fmt: skip
             content, indices = ([], None) if sky else ([_content(program, buffer)], self._indices)
-            uniforms = {name: program[name] for name in _CHANGING if name in program}
+            uniforms = {name: program[name] for name in _PER_PICTURE if name in program}
             self._arrays[key] = self._own(self._gl.vertex_array(program, content, index_buffer=indices)), uniforms
         return self._arrays[key]
 
@@ -288,11 +288,11 @@ class GlRenderer:
         return self._targets[key]
 
     def close(self) -> None:
-        """Free the renderer's memory; a second call does nothing, nor does one in another thread than made it."""
+        """Free the renderer's memory; does nothing when called again, or in another thread than its own."""
         while self._owned:
-            thing = self._owned.pop()
-            if getattr(_here, "context", None) is self._gl:
-                thing.release()
+            resource = self._owned.pop()
+            if getattr(_thread, "context", None) is self._gl:
+                resource.release()
         self._arrays, self._targets, self._bodies = {}, {}, None
 
     def __enter__(self) -> GlRenderer:
@@ -306,7 +306,7 @@ class GlRenderer:
         self.close()
 
 
-class _Drawn:
+class _DrawSet:
     """A kind of surface in the renderer's memory."""
 
     def __init__(self, kind: Kind, renderer: GlRenderer) -> None:
@@ -315,7 +315,7 @@ class _Drawn:
         self.textures = renderer.texture_array(kind)
 
     def begin(self, gl: Any) -> None:
-        """Set what holds for this kind, and not for others."""
+        """Set the OpenGL state of this kind."""
         if self.textures is not None:
             self.textures.use(0)
         if self.kind.double_sided:
@@ -325,10 +325,7 @@ class _Drawn:
 
 
 def clip_from_world(camera: Camera, world_from_camera: Floats, near_m: float, far_m: float) -> Floats:
-    """OpenGL's matrix for a camera, row-major (4, 4) float64, the picture's first row at the bottom.
-
-    Pixel centres are where OpenGL samples: nothing is to be shifted.
-    """
+    """OpenGL's matrix for a camera, row-major (4, 4) float64, the picture's first row at the bottom."""
     return np.asarray(_projection(camera, near_m, far_m) @ np.linalg.inv(world_from_camera))
 
 
@@ -342,8 +339,8 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def _reach(camera: Camera) -> bytes:
-    """Half the picture's width and height at a depth of 1, as the sky's program wants it."""
+def _half_extent(camera: Camera) -> bytes:
+    """Half the picture's width and height at a depth of 1, for the sky's shader."""
     return (np.array([camera.width, camera.height]) / 2.0 / camera.focal_px).astype(np.float32).tobytes()
 
 
@@ -357,7 +354,7 @@ def _write(uniforms: dict[str, Any], values: dict[str, bytes]) -> None:
 
 
 def _set(program: Any, **values: Any) -> None:
-    """Set those uniforms that the program has: a compiler drops what a variant does not use."""
+    """Set the uniforms that the program has: a compiler drops unused ones."""
     for name, value in values.items():
         if name in program:
             if isinstance(value, bytes):
@@ -367,7 +364,7 @@ def _set(program: Any, **values: Any) -> None:
 
 
 def _content(program: Any, buffer: Any) -> tuple[Any, ...]:
-    """Describe the buffer to a vertex array: the fields that the program reads, and gaps for the others."""
+    """Vertex layout of the buffer: the fields that the program reads, and padding for the others."""
     fields = [(name, name in program) for name in _FORMATS]
     sizes = {name: VERTEX.fields[name][0].itemsize for name in _FORMATS} if VERTEX.fields else {}
     layout = " ".join(_FORMATS[name] if used else f"{sizes[name]}x" for name, used in fields)

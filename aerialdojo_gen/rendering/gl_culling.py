@@ -1,7 +1,7 @@
-"""Which triangles the views of one place draw: those that face the eye, lie in the picture and hold a pixel's centre.
+"""Culling for the views of one eye: triangles that face it, lie in the picture and cover a pixel's centre.
 
-The views of a pose share their eye, and with it the order of the chunks, the side that a triangle shows, and the
-triangles that are loaded at all: what is found out once serves all four.
+The views of a pose share their eye, and so the order of the chunks and the facing of triangles: both are computed
+once for all four.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from aerialdojo_gen.rendering.gl_tiles import cover, hidden
 
 Floats = NDArray[np.float64]
 
-# Corners nearer than this are not projected; and how far OpenGL may round a corner, pixels.
+# Corners nearer than this are not projected; and OpenGL's rounding of corners, pixels.
 NEAR_W, ROUNDING_PX = 0.05, 0.02
 
 
@@ -24,23 +24,23 @@ NEAR_W, ROUNDING_PX = 0.05, 0.02
 def chunks_in_view(
     low: Floats, high: Floats, eye: Floats, clips: Floats
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Chunks that at least one view may see, the nearest first, and which views may see each, (m, v) bool."""
-    sees = _boxes_in_view(low, high, clips)
+    """Chunks in at least one view frustum, nearest first, and whether each is in each view, (m, v) bool."""
+    in_view = _boxes_in_view(low, high, clips)
     found, away = np.empty(len(low), np.int64), np.empty(len(low), np.float64)
     n = 0
     for k in range(len(low)):
-        any_sees = False
+        in_any_view = False
         for v in range(len(clips)):
-            any_sees |= sees[k, v]
-        if any_sees:
+            in_any_view |= in_view[k, v]
+        if in_any_view:
             x = max(low[k, 0] - eye[0], 0.0) + max(eye[0] - high[k, 0], 0.0)
             y = max(low[k, 1] - eye[1], 0.0) + max(eye[1] - high[k, 1], 0.0)
             z = max(low[k, 2] - eye[2], 0.0) + max(eye[2] - high[k, 2], 0.0)
             found[n], away[n] = k, x * x + y * y + z * z
             n += 1
-    # A stable sort: of boxes that are equally near the first one stays before.
+    # Stable, for boxes that are equally near.
     order = found[:n][np.argsort(away[:n], kind="mergesort")]
-    return order, sees[order]
+    return order, in_view[order]
 
 
 @njit(cache=True)
@@ -61,7 +61,7 @@ def _boxes_in_view(low: Floats, high: Floats, clips: Floats) -> NDArray[np.bool_
 @njit(cache=True, fastmath={"contract", "arcp", "nsz"})
 def triangles_in_view(
     order: NDArray[np.int64],
-    sees: NDArray[np.bool_],
+    in_view: NDArray[np.bool_],
     starts: NDArray[np.int64],
     planes: Floats,
     corners: NDArray[np.float32],
@@ -76,24 +76,23 @@ def triangles_in_view(
     part: NDArray[np.float32],
     covered: NDArray[np.uint64],
 ) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
-    """Choose the triangles of every view.
-
-    Vertex indices (v, 3 most) uint32, in the order of the chunks, and their counts.
-    """
+    """Cull the triangles of every view: vertex indices (v, 3 max_triangles) uint32, by chunk, and their counts."""
     views = len(clips)
-    most = 0
+    max_triangles = 0
     for chunk in order:
-        most += starts[chunk + 1] - starts[chunk]
-    out = np.empty((views, 3 * most), dtype=np.uint32)
+        max_triangles += starts[chunk + 1] - starts[chunk]
+    out = np.empty((views, 3 * max_triangles), dtype=np.uint32)
     count = np.zeros(views, dtype=np.int64)
     half_w, half_h = 0.5 * width, 0.5 * height
-    here = np.empty(views, dtype=np.bool_)
+    visible_in = np.empty(views, dtype=np.bool_)
     for c in range(len(order)):
-        chunk, views_left = order[c], False
+        chunk, in_any_view = order[c], False
         for v in range(views):
-            here[v] = sees[c, v] and not _box_hidden(low[chunk], high[chunk], clips[v], width, height, whole[v])
-            views_left |= here[v]
-        if not views_left:
+            visible_in[v] = in_view[c, v] and not _box_hidden(
+                low[chunk], high[chunk], clips[v], width, height, whole[v]
+            )
+            in_any_view |= visible_in[v]
+        if not in_any_view:
             continue
         for t in range(starts[chunk], starts[chunk + 1]):
             if planes[t, 0] * eye[0] + planes[t, 1] * eye[1] + planes[t, 2] * eye[2] + planes[t, 3] <= 0.0:
@@ -102,7 +101,7 @@ def triangles_in_view(
             bx, by, bz = corners[t, 3] - eye[0], corners[t, 4] - eye[1], corners[t, 5] - eye[2]
             cx, cy, cz = corners[t, 6] - eye[0], corners[t, 7] - eye[1], corners[t, 8] - eye[2]
             for v in range(views):
-                if not here[v]:
+                if not visible_in[v]:
                     continue
                 # Seen from the eye, x, y and w have no constant part.
                 m0, m1, m2 = clips[v, 3, 0], clips[v, 3, 1], clips[v, 3, 2]
@@ -155,14 +154,14 @@ def _centres(a: float, b: float, c: float, size: int) -> tuple[int, int]:
 
 @njit(cache=True, error_model="numpy")
 def _box_hidden(low: Floats, high: Floats, m: Floats, width: int, height: int, whole: NDArray[np.float32]) -> bool:
-    """Whether a box lies behind what is drawn at every pixel whose centre it could hold."""
+    """Whether a box lies behind the occluders at every pixel centre that it could cover."""
     left, right, top, bottom, nearest = box_pixels(low, high, m, width, height)
     return left > right or top > bottom or hidden(left, right, top, bottom, nearest, whole)
 
 
 @njit(cache=True, error_model="numpy")
 def box_pixels(low: Floats, high: Floats, m: Floats, width: int, height: int) -> tuple[int, int, int, int, float]:
-    """Columns and rows of pixels that a box could hold, and the inverse depth of its nearest corner."""
+    """Columns and rows of pixels that a box could cover, and the inverse depth of its nearest corner."""
     u0, u1, v0, v1, nearest = np.inf, -np.inf, np.inf, -np.inf, np.inf
     for corner in range(8):
         x = high[0] if corner & 1 else low[0]

@@ -1,4 +1,4 @@
-"""What of a scene came from a foreign mesh, packed for OpenGL: large textures, holes, both sides, vertex colours."""
+"""Imported meshes packed for OpenGL: large textures, alpha masks, double-sided materials, vertex colours."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.rendering.gl_geometry import Kind, cut, is_foreign, packed
 from aerialdojo_gen.scenes.model import Instance, Material, Scene
 
-# A vertex colour's fourth byte, where it has its light in it.
+# Fourth byte of the vertex colour of an unlit material.
 _UNLIT = 255
 _Key = tuple[int, int, bool, bool]
 
@@ -22,7 +22,7 @@ def foreign_kinds(scene: Scene) -> list[Kind]:
 
 
 def backdrop_kinds(scene: Scene) -> list[Kind]:
-    """Pack what is drawn behind everything, of all materials, from both sides."""
+    """Pack the backdrop: all materials, both sides."""
     return _kinds(scene.backdrop, scene.materials, False, ("FOREIGN", "BACKDROP"))
 
 
@@ -36,14 +36,14 @@ def _kinds(
             material = materials[part.material]
             if foreign_only and not is_foreign(part, material):
                 continue
-            both = material.double_sided or not foreign_only
-            key = (*_size(material), material.mask is not None, both)
-            own = packed(part, material, k)
-            own["colour"][..., 3] = _UNLIT if material.unlit else 0
+            double_sided = material.double_sided or not foreign_only
+            key = (*_size(material), material.mask is not None, double_sided)
+            vertices = packed(part, material, k)
+            vertices["colour"][..., 3] = _UNLIT if material.unlit else 0
             if material.texture is not None:
                 layer = names.setdefault(key, {})
-                own["layer"] = layer.setdefault(material.name, len(layer))
-            rows.setdefault(key, []).append(own)
+                vertices["layer"] = layer.setdefault(material.name, len(layer))
+            rows.setdefault(key, []).append(vertices)
     return [
         Kind(
             cut(rows[key], double_sided=key[3]),
@@ -71,7 +71,7 @@ def _layers(materials: list[Material], key: _Key) -> NDArray[np.uint8]:
         texture = material.texture
         if material.mask is not None:
             alpha = np.where(material.mask, 255, 0).astype(np.uint8)
-            # Holes get the mean colour of what is there, or a leaf's edge would have the colour of nothing.
+            # Fill holes with the mean colour, or filtering would give leaves dark edges.
             filled = np.where(material.mask[..., None], texture, np.array(material.colour, dtype=np.uint8))
             texture = np.dstack([filled, alpha])
         if texture.shape[:2] != key[:2]:

@@ -1,8 +1,8 @@
-"""A scene's triangles as an OpenGL renderer wants them: packed once, and chosen anew for every view.
+"""A scene's triangles packed for OpenGL, and culled for every view.
 
-A software rasteriser takes a third of a microsecond for a triangle, seen or not; to find out that it is not seen
-takes a hundredth of that. So a view draws only the triangles that face the camera, lie in its picture and hold a
-pixel's centre, the nearest first, so that what stands behind is rejected by its depth before it is coloured.
+A software rasteriser takes a third of a microsecond for a triangle, visible or not; culling a hundredth of that. So
+a view draws only the triangles that face the camera, lie in its picture and cover a pixel's centre, nearest first,
+so that hidden ones fail the depth test early.
 """
 
 from __future__ import annotations
@@ -49,11 +49,13 @@ class Chunks:
     planes: Floats  # (n, 4) float64; a triangle faces the eye where ``normal . eye + d`` is positive
     corners: NDArray[np.float32]  # (n, 9) float32
 
-    def seen(self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True) -> list[NDArray[np.uint32]]:
-        """Vertex indices (3 k,) a view of what the views of one eye draw, chunk by chunk, the nearest first."""
-        order, sees = chunks_in_view(self.low, self.high, eye, clips)
+    def visible_indices(
+        self, clips: Floats, eye: Floats, tiles: Tiles, hides: bool = True
+    ) -> list[NDArray[np.uint32]]:
+        """Vertex indices (3 k,) per view of one eye, by chunk, nearest first."""
+        order, in_view = chunks_in_view(self.low, self.high, eye, clips)
         indices, count = triangles_in_view(
-            order, sees, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
+            order, in_view, self.starts, self.planes, self.corners, clips, eye, self.low, self.high, hides,
             tiles.width, tiles.height, tiles.whole, tiles.part, tiles.covered,
         )  # fmt: skip
         return [row[:n] for row, n in zip(indices, count, strict=True)]
@@ -64,22 +66,19 @@ class Kind:
     """Surfaces that one program draws, from one texture array."""
 
     chunks: Chunks
-    tags: tuple[str, ...]  # What the program is made for (`aerialdojo_gen.rendering.gl_shaders.specialise`)
+    tags: tuple[str, ...]  # Variant of the program (`aerialdojo_gen.rendering.gl_shaders.specialise`)
     layers: NDArray[np.uint8] | None  # The layers of its texture array, first row at v = 0; None where it has none
     smooth: bool = False
     double_sided: bool = False  # Whether both sides are drawn
 
     @property
     def hides(self) -> bool:
-        """Whether what lies behind a triangle of it is not seen."""
+        """Whether its triangles are occluders."""
         return "MASK" not in self.tags
 
 
 def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
-    """Pack a scene's catalogue materials for OpenGL.
-
-    Textured and flat chunks, and the texture layers (n, e, e, 3) uint8.
-    """
+    """Pack a scene's catalogue materials: textured and flat chunks, and texture layers (n, e, e, 3) uint8."""
     names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
     layer = {name: float(k) for k, name in enumerate(names)}
     textured, flat = [], []
@@ -99,7 +98,7 @@ def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
 
 
 def is_foreign(part: Part, material: Material) -> bool:
-    """Whether a part is drawn as only foreign meshes are: by `aerialdojo_gen.rendering.gl_foreign`."""
+    """Whether a part is drawn by `aerialdojo_gen.rendering.gl_foreign`."""
     return material.foreign or part.colours is not None
 
 
@@ -119,7 +118,7 @@ def packed(part: Part, material: Material, instance: int) -> NDArray[np.void]:
 
 
 def cut(parts: list[NDArray[np.void]], double_sided: bool = False) -> Chunks:
-    """Cut packed triangles into chunks; of what is double-sided every triangle faces every eye."""
+    """Cut packed triangles into chunks; double-sided triangles face every eye."""
     triangles = np.concatenate([*parts, np.zeros((0, 3), dtype=VERTEX)])
     if not len(triangles):
         none = np.zeros((0, 3))
@@ -129,7 +128,7 @@ def cut(parts: list[NDArray[np.void]], double_sided: bool = False) -> Chunks:
     corners = triangles["position"].astype(np.float64)
     low, high = corners.min(axis=1), corners.max(axis=1)
     extent = (high - low).max(axis=1)
-    # Large triangles apart from small ones, or every chunk's box would be as large as the largest in it.
+    # Separate large triangles from small ones, or every chunk's box would be as large as its largest triangle.
     size = np.floor(np.log2(np.maximum(extent, 1.0)) / 1.5).astype(np.int64)
     order = np.lexsort((morton_codes((low + high) / 2.0, _MORTON_BITS), size))
     triangles, corners = triangles[order], corners[order]

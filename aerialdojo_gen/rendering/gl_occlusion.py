@@ -1,9 +1,8 @@
-"""What all cameras of a body draw, chosen in one pass: they share their centre.
+"""Occlusion culling for all cameras of a body in one pass: they share their centre.
 
-OpenGL in software takes a microsecond for a triangle, however few pixels of it are seen, and a small picture has few
-pixels. So triangles are drawn here too, the nearest first and their depth alone, and what lies behind it everywhere
-is left out, whole chunks at once. OpenGL draws the rest and decides: what is left out could not have been seen, by
-margins that exceed what OpenGL rounds.
+OpenGL in software takes a microsecond for a triangle, however few pixels of it are visible, and a small picture has
+few pixels. So triangles are first drawn here, nearest first and depth only, and what lies entirely behind them is
+culled, whole chunks at once. Margins exceed OpenGL's rounding, so the pictures do not change.
 """
 
 from __future__ import annotations
@@ -21,12 +20,12 @@ from aerialdojo_gen.rendering.gl_tiles import MOVED_PX, NEARER, NEAREST, Tiles
 
 Floats = NDArray[np.float64]
 
-# Triangles that are computed with together, whether all of them are there or not: loops of a known length.
+# Triangles per loop, padded to a constant length for vectorisation.
 _SIZE = CHUNK_TRIANGLES
 
 
 class BodyCulling:
-    """Chooses the triangles of one kind of surface that the views of a body draw."""
+    """Culls the triangles of one kind of surface for the views of a body."""
 
     def __init__(self, chunks: Chunks, hides: bool = True) -> None:
         self._chunks = chunks
@@ -34,27 +33,24 @@ class BodyCulling:
         self._out = np.empty((0, 0), np.uint32)
         self._planes, self._corners = _blocks(chunks.planes, chunks.starts), _blocks(chunks.corners, chunks.starts)
 
-    def seen(
+    def visible_indices(
         self, clips: Floats, eye: Floats, width: int, height: int, nearness: NDArray[np.float32]
     ) -> list[NDArray[np.uint32]]:
-        """Vertex indices (3 k,) of what every view draws, the nearest first; valid until the next call.
-
-        `nearness` is raised.
-        """
+        """Vertex indices (3 k,) of every view, nearest first; valid until the next call; raises `nearness`."""
         c = self._chunks
         if not self._hides:
-            return c.seen(clips, eye, Tiles.empty(len(clips), width, height), hides=False)
-        order, sees = chunks_in_view(c.low, c.high, eye, clips)
+            return c.visible_indices(clips, eye, Tiles.empty(len(clips), width, height), hides=False)
+        order, in_view = chunks_in_view(c.low, c.high, eye, clips)
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
-        counts = _triangles_seen(
-            order, sees, c.starts, self._planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
+        counts = _visible_triangles(
+            order, in_view, c.starts, self._planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
         )
         return [self._out[v, :n] for v, n in enumerate(counts.tolist())]
 
 
 def _blocks(rows: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[Any]:
-    """Lay triangles' rows out by chunk, field and triangle: so that several are computed with in one step."""
+    """Lay triangles' rows out by chunk, field and triangle, for vectorised loops."""
     out = np.zeros((len(starts) - 1, rows.shape[1], CHUNK_TRIANGLES), rows.dtype)
     chunk = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     out[chunk, :, np.arange(len(rows)) - starts[chunk]] = rows
@@ -62,8 +58,8 @@ def _blocks(rows: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[Any]:
 
 
 @njit(cache=True, error_model="numpy")
-def _triangles_seen(
-    order: NDArray[np.int64], sees: NDArray[np.bool_], starts: NDArray[np.int64], planes: Floats,
+def _visible_triangles(
+    order: NDArray[np.int64], in_view: NDArray[np.bool_], starts: NDArray[np.int64], planes: Floats,
     corners: NDArray[np.float32], clips: Floats, eye: Floats, low: Floats, high: Floats,
     nearness: NDArray[np.float32], out: NDArray[np.uint32],
 ) -> NDArray[np.int64]:  # fmt: skip
@@ -71,14 +67,14 @@ def _triangles_seen(
     counts = np.zeros(views, np.int64)
     facing, places = np.empty(_SIZE), np.empty(12 * _SIZE)
     for n in range(len(order)):
-        chunk, known = order[n], False
+        chunk, faced = order[n], False
         first = starts[chunk]
         for v in range(views):
-            if not sees[n, v] or _hidden(low[chunk], high[chunk], clips[v], nearness[v]):
+            if not in_view[n, v] or _box_hidden(low[chunk], high[chunk], clips[v], nearness[v]):
                 continue
-            if not known:
+            if not faced:
                 _face(planes[chunk], eye[0], eye[1], eye[2], facing)
-                known = True
+                faced = True
             for corner in range(3):
                 _project(corners[chunk, 3 * corner * _SIZE :], clips[v], width, height, places[4 * corner * _SIZE :])
             at = counts[v]
@@ -113,7 +109,7 @@ def _triangles_seen(
 
 @njit(cache=True)
 def _face(planes: Floats, x: float, y: float, z: float, facing: Floats) -> None:
-    """Tell which triangles of a chunk face a point: where it is above their planes."""
+    """Write the signed distances of a point from the planes of a chunk's triangles, scaled."""
     for i in range(_SIZE):
         facing[i] = planes[i] * x + planes[i + _SIZE] * y + planes[i + 2 * _SIZE] * z + planes[i + 3 * _SIZE]
 
@@ -136,8 +132,8 @@ def _project(corners: NDArray[np.float32], m: Floats, width: int, height: int, p
 
 
 @njit(cache=True, error_model="numpy")
-def _hidden(low: Floats, high: Floats, m: Floats, nearness: NDArray[np.float32]) -> bool:
-    """Whether a box lies behind what is drawn at every pixel whose centre it could hold."""
+def _box_hidden(low: Floats, high: Floats, m: Floats, nearness: NDArray[np.float32]) -> bool:
+    """Whether a box lies behind the occluders at every pixel centre that it could cover."""
     height, width = nearness.shape
     left, right, top, bottom, nearest = box_pixels(low, high, m, width, height)
     limit = np.float32(nearest + NEARER)
@@ -153,7 +149,7 @@ def _covers(
     u0: float, v0: float, n0: float, u1: float, v1: float, n1: float, u2: float, v2: float, n2: float,
     left: int, right: int, top: int, bottom: int, nearness: NDArray[np.float32],
 ) -> bool:  # fmt: skip
-    """Whether a triangle may be seen at a pixel's centre; where it surely lies, the nearness is raised.
+    """Whether a triangle may be visible at a pixel's centre; raises the nearness in its conservative interior.
 
     Corners are in pixels, with their inverse depth, which is linear over the picture.
     """
@@ -161,49 +157,49 @@ def _covers(
     area = a0 * b1 - b0 * a1
     if area < 0.0:
         a0, b0, a1, b1, a2, b2 = -a0, -b0, -a1, -b1, -a2, -b2
-    # Where a corner is moved, an edge's function changes by at most so much.
+    # Maximum change of an edge's function by a moved corner.
     s0, s1, s2 = MOVED_PX * (abs(a0) + abs(b0)), MOVED_PX * (abs(a1) + abs(b1)), MOVED_PX * (abs(a2) + abs(b2))
     flat = abs(area) < 1e-9
     dx = 0.0 if flat else ((n1 - n0) * (v2 - v0) - (n2 - n0) * (v1 - v0)) / area
     dy = 0.0 if flat else ((n2 - n0) * (u1 - u0) - (n1 - n0) * (u2 - u0)) / area
-    least, most = min(n0, min(n1, n2)), max(n0, max(n1, n2))
+    min_depth, max_depth = min(n0, min(n1, n2)), max(n0, max(n1, n2))
     if flat:
-        least = most
+        min_depth = max_depth
     slack = NEARER + MOVED_PX * (abs(dx) + abs(dy))
-    hides, visible = not flat and most <= NEAREST, False
+    hides, seen = not flat and max_depth <= NEAREST, False
     i0, i1, i2 = 1.0 / b0, 1.0 / b1, 1.0 / b2
     for y in range(top, bottom + 1):
         span = float(left), float(right), left - 0.5, right + 0.5
-        span = _within(a0 * (y - v0) + b0 * u0, b0, i0, s0, span)
-        span = _within(a1 * (y - v1) + b1 * u1, b1, i1, s1, span)
-        span = _within(a2 * (y - v2) + b2 * u2, b2, i2, s2, span)
+        span = _clip_span(a0 * (y - v0) + b0 * u0, b0, i0, s0, span)
+        span = _clip_span(a1 * (y - v1) + b1 * u1, b1, i1, s1, span)
+        span = _clip_span(a2 * (y - v2) + b2 * u2, b2, i2, s2, span)
         first, last = math.ceil(span[0] - 1e-6), math.floor(span[1] + 1e-6)
         row = n0 - dx * u0 + dy * (y - v0)
-        if not visible:
+        if not seen:
             for x in range(first, last + 1):
-                if min(max(row + dx * x, least), most) + slack >= nearness[y, x]:
-                    visible = True
+                if min(max(row + dx * x, min_depth), max_depth) + slack >= nearness[y, x]:
+                    seen = True
                     break
-        if not visible:
-            # Nothing of this row is nearer than what is there.
+        if not seen:
+            # This row is behind the occluders.
             continue
         if not hides:
             return True
         for x in range(math.ceil(span[2] + 1e-6), math.floor(span[3] - 1e-6) + 1):
-            here = min(max(row + dx * x, least), most) - slack
-            if here > nearness[y, x]:
-                nearness[y, x] = here
-    return visible
+            depth = min(max(row + dx * x, min_depth), max_depth) - slack
+            if depth > nearness[y, x]:
+                nearness[y, x] = depth
+    return seen
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _within(
+def _clip_span(
     r: float, b: float, inverse: float, s: float, span: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Narrow a row of pixels to the inner side of an edge, where r - b x is positive.
+    """Clip a row of pixels to the inner side of an edge, where r - b x is positive.
 
-    The first two bounds are those of what may lie there, the others of what surely does; s is what moved corners
-    change. A difference of a millionth of a pixel is within s.
+    The first two bounds are outer, the others inner bounds; s is the change by moved corners. A difference of a
+    millionth of a pixel is within s.
     """
     first, last, sure_first, sure_last = span
     if b > 0.0:

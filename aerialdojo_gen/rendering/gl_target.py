@@ -1,4 +1,4 @@
-"""What OpenGL draws into, and how it is read: two numbers a pixel, its colour's four bytes and its depth's bits."""
+"""Reading of OpenGL's render targets: two numbers per pixel, its colour's four bytes and its depth's bits."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.picture import Picture
 
-# A thread's memory for reading: to ask for it anew costs more than to read.
-_here = threading.local()
+# Read buffers per thread: allocating them costs more than reading.
+_thread = threading.local()
 
 
 def clear_depth(target: Any, colours: int) -> None:
-    """Clear a target's depth, and none of its colours: what is drawn last covers them all."""
+    """Clear a target's depth only: the sky covers all colours."""
     # One attachment has its mask alone, several have a tuple of them.
     none, every = (False,) * 4, (True,) * 4
     if colours:
@@ -45,9 +45,13 @@ def read_instances(target: Any, shape: tuple[int, int]) -> NDArray[np.int32]:
 def read_pixels(target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> None:
     """Read what was drawn into RGB (H, W, 3) uint8 and planar depth (H, W), inf where nothing is hit."""
     shape = depth_m.shape
-    if getattr(_here, "shape", None) != shape:
-        # The bytes of colours, which are no numbers, and depths.
-        _here.shape, _here.pixels, _here.rgba = shape, np.empty((*shape, 2), np.float32), np.empty(shape, np.float32)
-    target.read_into(_here.pixels, components=2, dtype="u4")
-    cv2.split(_here.pixels, [_here.rgba, depth_m])
-    cv2.cvtColor(_here.rgba.view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)
+    if getattr(_thread, "shape", None) != shape:
+        # Colours as raw bytes, and depths.
+        _thread.shape, _thread.pixels, _thread.rgba = (
+            shape,
+            np.empty((*shape, 2), np.float32),
+            np.empty(shape, np.float32),
+        )
+    target.read_into(_thread.pixels, components=2, dtype="u4")
+    cv2.split(_thread.pixels, [_thread.rgba, depth_m])
+    cv2.cvtColor(_thread.rgba.view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)

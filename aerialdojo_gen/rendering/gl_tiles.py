@@ -1,8 +1,8 @@
-"""What is known to be hidden in the pictures of one place: tiles of 8 x 8 pixels, with a bit a pixel and two depths.
+"""Occlusion buffers of the views of one eye: tiles of 8 x 8 pixels, with a bit a pixel and two depths.
 
 As in *Masked Software Occlusion Culling* (Hasselgren, Andersson, Akenine-Möller, 2016): the larger triangles are
-drawn into tiles, the nearest first, and what lies behind them need not be drawn. Margins exceed what OpenGL
-rounds: what is left out could not have been seen, and every picture stays what it is, to the bit.
+drawn into tiles, the nearest first, and triangles behind them are culled. Margins exceed OpenGL's rounding, so the
+pictures do not change by a bit.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ Floats = NDArray[np.float64]
 # How far OpenGL moves a corner at most, pixels: it counts them in 256ths; and how much nearer something must be to
 # hide another, in inverse metres: several steps of the depth buffer.
 MOVED_PX, NEARER = 0.004, 1e-5
-# What is nearer than OpenGL's near plane hides nothing.
+# Triangles in front of OpenGL's near plane hide nothing.
 NEAREST = 1.0 / NEAR_M
-# Twice the pixels of the least triangle that is drawn here: smaller ones cost more than they hide.
-_LEAST_PX2 = 400.0
+# Twice the area, in pixels, of the smallest occluder: smaller ones cost more than they hide.
+_MIN_AREA_PX2 = 400.0
 _ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 _COLUMN = np.uint64(0x0101010101010101)
 
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """What is drawn already in some views, by tiles, rows first."""
+    """Occluders drawn so far in some views, by tiles, rows first."""
 
     width: int  # Pixels of each view
     height: int
@@ -50,7 +50,7 @@ class Tiles:
 
 @njit(cache=True, error_model="numpy")
 def hidden(left: int, right: int, top: int, bottom: int, nearest: float, whole: NDArray[np.float32]) -> bool:
-    """Whether what lies in a rectangle of pixels, no nearer than an inverse depth, is behind what is drawn."""
+    """Whether a rectangle of pixels, no nearer than an inverse depth, is behind the occluders."""
     limit = np.float32(nearest + NEARER)
     for row in range(top >> 3, (bottom >> 3) + 1):
         for column in range(left >> 3, (right >> 3) + 1):
@@ -65,19 +65,19 @@ def cover(
     left: int, right: int, top: int, bottom: int, width: int, height: int,
     whole: NDArray[np.float32], part: NDArray[np.float32], covered: NDArray[np.uint64],
 ) -> None:  # fmt: skip
-    """Draw a triangle into the tiles, where it surely lies.
+    """Draw a triangle's conservative interior into the tiles.
 
     Corners are in pixels, with their inverse depth, which is linear over the picture; the rectangle encloses it.
     """
     a0, b0, a1, b1, a2, b2 = u1 - u0, v1 - v0, u2 - u1, v2 - v1, u0 - u2, v0 - v2
     area = a0 * b1 - b0 * a1
-    if abs(area) < _LEAST_PX2 or max(n0, n1, n2) > NEAREST:
+    if abs(area) < _MIN_AREA_PX2 or max(n0, n1, n2) > NEAREST:
         return
     if area < 0.0:
         a0, b0, a1, b1, a2, b2 = -a0, -b0, -a1, -b1, -a2, -b2
     dx = ((n1 - n0) * (v2 - v0) - (n2 - n0) * (v1 - v0)) / area
     dy = ((n2 - n0) * (u1 - u0) - (n1 - n0) * (u2 - u0)) / area
-    least = min(n0, n1, n2)
+    min_depth = min(n0, n1, n2)
     # From a tile's middle to its farthest pixel, and what moved corners change.
     below = 3.5 * (abs(dx) + abs(dy))
     slack = NEARER + MOVED_PX * (abs(dx) + abs(dy))
@@ -109,20 +109,20 @@ def cover(
         for column in range(low >> 3, (high >> 3) + 1):
             x = column << 3
             middle = n0 + dx * (x + 3.5 - u0) + dy * ((row << 3) + 3.5 - v0)
-            here = np.float32(max(middle - below, least) - slack)
-            if here <= whole[row, column]:
+            depth = np.float32(max(middle - below, min_depth) - slack)
+            if depth <= whole[row, column]:
                 continue
             bits = covered[row, column]
             if bits:
-                here = min(here, part[row, column])
+                depth = min(depth, part[row, column])
             for k in range(8):
                 first_bit, last_bit = max(begin[k] - x, 0), min(end[k] - x, 7)
                 if first_bit <= last_bit:
                     bits |= np.uint64((0xFF << first_bit) & (0xFF >> (7 - last_bit))) << np.uint64(k << 3)
             if bits == _pixels(row, column, width, height):
-                whole[row, column], part[row, column], covered[row, column] = here, np.float32(0.0), np.uint64(0)
+                whole[row, column], part[row, column], covered[row, column] = depth, np.float32(0.0), np.uint64(0)
             else:
-                part[row, column], covered[row, column] = here, bits
+                part[row, column], covered[row, column] = depth, bits
 
 
 @njit(cache=True)

@@ -15,25 +15,25 @@ from aerialdojo_gen.scenes.model import Material, Scene
 
 Floats = NDArray[np.float64]
 
-# How far the sun of the shadow map stands, in radii of the scene: its rays are then within 5° of parallel.
+# Distance of the shadow map's sun, in radii of the scene: its rays are then within 5° of parallel.
 _SUN_RADII = 12.0
 _ENDLESS_M = 1e9
 
 
 @dataclass(frozen=True, eq=False)
 class Lighting:
-    """What shading must know of a scene; row k of the tables is surface k."""
+    """Inputs of shading; row k of the tables is surface k."""
 
     colour: Floats  # (n, 3) float64; the material's mean colour, 0-255
     texel_m: Floats  # (n,) float64
-    unlit: NDArray[np.bool_]  # (n,) bool; whether the material has its light in its colours
+    unlit: NDArray[np.bool_]  # (n,) bool; whether light is baked into the material's colours
     sun: Floats  # (3,) float64; unit vector towards the sun
     zenith: Floats  # (3,) float64; the sky's colours, 0-255
     horizon: Floats
 
 
 def light_of(scene: Scene, materials: Sequence[str] = ()) -> Lighting:
-    """Collect what shading must know."""
+    """Collect the inputs of shading."""
     found = [scene.materials[name] for name in materials]
     sky = np.array(scene.sky, dtype=np.float64)
     sun = np.array(scene.sun, dtype=np.float64)
@@ -55,7 +55,7 @@ def _texel_m(material: Material) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ShadowMap:
-    """What the sun sees."""
+    """Depth as seen from the sun."""
 
     camera: Camera
     world_from_camera: Floats  # (4, 4) float64
@@ -69,10 +69,7 @@ class ShadowMap:
 
 
 def sun_view(scene: Scene, size_px: int = 2048) -> tuple[Camera, Floats, float, float]:
-    """The camera of the shadow map.
-
-    The sun stands twelve scene radii away, as TinyRenderer has no parallel projection.
-    """
+    """The shadow map's camera, twelve scene radii away: TinyRenderer has no parallel projection."""
     boxes = np.stack([i.bounds for i in scene.instances])
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     centre, radius = (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0 + 1.0

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
-from aerialdojo_gen.rendering.texels import SurfaceTexels, seen_caster
+from aerialdojo_gen.rendering.texels import SurfaceTexels, masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 # As in aerialdojo_gen.rendering.shading: light from everywhere, from above, from east, from north, from the sun.
 _AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
-# What the plane cuts open shows its inside: the material's colour, darker.
+# Cut faces show the inside: the material's colour, darker.
 _CUT_LEVEL = 0.38
 _EARTH = (107.0, 96.0, 84.0)
 _OFF_SURFACE_M = 0.02
@@ -27,7 +27,7 @@ _OFF_SURFACE_M = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Where the picture is taken from, and how large it is: the world's part that lies behind it is shown."""
+    """Image plane and extent; the part of the world behind it is shown."""
 
     origin: Floats  # (3,) float64; a point of the plane, metres, world frame: picture coordinates (0, 0)
     right: Floats  # (3,) float64; orthogonal unit vectors in the plane
@@ -36,12 +36,12 @@ class Plane:
 
     @classmethod
     def above(cls, z_m: float, extent_m: tuple[float, float, float, float]) -> Plane:
-        """A map's: from height z straight down, north up; the extent is west, east, south and north, metres."""
+        """Plane of a map: from height z straight down, north up; extent west, east, south and north, metres."""
         return cls(np.array([0.0, 0.0, z_m]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), extent_m)
 
     @property
     def forward(self) -> Floats:
-        """The direction that one looks in, (3,) float64."""
+        """Viewing direction, (3,) float64."""
         return np.cross(self.up, self.right)
 
     def project(self, points: ArrayLike) -> Floats:
@@ -59,7 +59,7 @@ class OrthographicPictures:
         self._vertices, self._faces = soup(parts)
         self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
         self._materials = [scene.materials[name] for name in names]
-        self._rays = seen_caster(scene, caster or TriangleRayCaster(self._vertices, self._faces))
+        self._rays = masked_caster(scene, caster or TriangleRayCaster(self._vertices, self._faces))
         self._texels = SurfaceTexels(parts, scene.materials)
         self._double_sided = np.array([m.double_sided for m in self._materials])[self._material]
         self._unlit = np.array([m.unlit for m in self._materials])[self._material]
@@ -90,22 +90,22 @@ class OrthographicPictures:
         face, points = face[hit], origins[hit] + distance[hit, None] * forward
         normal = self._normals(face)
         away = normal @ forward > 0.0
-        both = self._double_sided[face]
-        normal[away & both] *= -1.0
-        cut = away & ~both
+        double_sided = self._double_sided[face]
+        normal[away & double_sided] *= -1.0
+        cut = away & ~double_sided
         colour = self._colours(face, points, pixel_m)
         level = _AMBIENT + normal @ np.array([_FROM_EAST, _FROM_NORTH, _FROM_ABOVE])
         level += _SUN * self._sunlit(points, normal)
         level[self._unlit[face]] = 1.0
         out[hit] = colour * np.where(cut, _CUT_LEVEL, level)[:, None]
         if abs(forward[2]) < 1e-9:
-            # Ground is a sheet without thickness: what the plane cuts of it is filled in.
+            # Ground is a sheet without thickness: fill in the earth below it.
             surface = self._ground_height(plane.origin + a[:, None] * plane.right)
             out[(b[:, None] < surface[None, :]).ravel()] = _EARTH
         return np.clip(out + 0.5, 0.0, 255.0).astype(np.uint8).reshape(height, width, 3)
 
     def _ground_height(self, columns: Floats) -> Floats:
-        """Height of the ground at points (n, 3), whose z plays no part; the lowest vertex's where there is none."""
+        """Height of the ground below points (n, 3), z ignored; the lowest vertex's where there is none."""
         from_above = np.column_stack([columns[:, :2], np.full(len(columns), self._ceiling_m + 1.0)])
         if self._ground is None:
             return np.full(len(columns), self._floor_m)
@@ -137,16 +137,16 @@ class OrthographicPictures:
         order = np.argsort(material, kind="stable")
         starts = np.flatnonzero(np.diff(material[order], prepend=-1))
         for first, rows in zip(starts, np.split(order, starts[1:]), strict=True):
-            tile = _reduced(self._materials[material[order[first]]], pixel_m)
+            tile = _downscaled(self._materials[material[order[first]]], pixel_m)
             if tile is not None:
                 uv = self._texels.uv_at(face[rows], points[rows])
                 column = np.floor(uv[:, 0] % 1.0 * tile.shape[1]).astype(np.int64) % tile.shape[1]
                 row = np.floor(-uv[:, 1] % 1.0 * tile.shape[0]).astype(np.int64) % tile.shape[0]
                 colour[rows] = tile[row, column]
-        return self._texels.painted(face, points, colour)
+        return self._texels.with_vertex_colours(face, points, colour)
 
 
-def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
+def _downscaled(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
     """The texture with texels no smaller than a pixel, so that sampling one of them is enough."""
     if material.texture is None:
         return None
@@ -158,7 +158,7 @@ def _reduced(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:
 
 
 def orthographic_pictures(scene: Scene) -> OrthographicPictures:
-    """Return what takes parallel projections of a scene: its context's, over its one Embree scene."""
+    """Return the orthographic camera of the scene's context, over its one Embree scene."""
     return context_of(scene).part(
         "orthographic pictures", lambda: OrthographicPictures(scene, triangle_caster(scene))
     )

@@ -1,4 +1,4 @@
-"""What a renderer gives, and how near and how far it sees, whichever it is."""
+"""The output of every renderer, and the depth range of all of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NEAR_M, FAR_M = 0.1, 2000.0
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What a camera sees."""
+    """Output of a renderer for one camera."""
 
     rgb: NDArray[np.uint8]  # (H, W, 3) uint8; sRGB
     depth_m: NDArray[np.float32]  # (H, W) float32; planar depth, metres; inf where nothing is hit

@@ -1,4 +1,4 @@
-"""Which files a recording has, and where in them a view's pictures lie: a file each, or all tiled in one."""
+"""Layout of a recording's files: one per view and modality, or all views tiled in one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TILED = "views.mkv"
 
 @dataclass(frozen=True)
 class Place:
-    """Where the pictures of one view and modality lie."""
+    """Location of the pictures of one view and modality."""
 
     view: str
     modality: str
@@ -30,12 +30,12 @@ class Place:
 
 
 def modalities(config: RenderConfig) -> tuple[str, ...]:
-    """Return what is recorded of every view: pictures, depth, and instance ids where they are asked for."""
+    """Return the recorded modalities: RGB, depth, and instance ids if configured."""
     return ("rgb", "depth", "instance") if config.instances else ("rgb", "depth")
 
 
 def places(config: RenderConfig) -> list[Place]:
-    """List what a recording consists of, view by view."""
+    """List the places of a recording, view by view."""
     return [
         _place(config, k, view, n, modality)
         for k, view in enumerate(config.views)
@@ -52,7 +52,7 @@ def _place(config: RenderConfig, k: int, view: str, stream: int, modality: str) 
 
 
 def columns(config: RenderConfig) -> int:
-    """Count the tiles side by side: two of four views."""
+    """Number of tiles per row: two for four views."""
     return math.ceil(math.sqrt(len(config.views)))
 
 

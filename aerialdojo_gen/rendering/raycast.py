@@ -1,8 +1,7 @@
-"""Small pictures by casting a ray a pixel: no start-up, exact at any size, with the instance of every pixel.
+"""Small pictures by ray casting: no start-up, exact at any size, with the instance of every pixel.
 
-For thumbnails and for scores that must be the same on every machine. Of the shading only the shadows are missing. A
-picture of 96 x 96 takes a tenth of what TinyRenderer needs to visit a scene's triangles; from about 500 x 500 on
-TinyRenderer is the faster one.
+For thumbnails and for scores that must be the same on every machine; shaded, but without shadows. A picture of
+96 x 96 takes a tenth of the time of TinyRenderer, which is faster from about 500 x 500 on.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.rendering.shading import shade
-from aerialdojo_gen.rendering.texels import Backdrop, scene_texels, seen_caster
+from aerialdojo_gen.rendering.texels import Backdrop, masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
@@ -32,10 +31,7 @@ _WIDE_M = 4.0
 
 
 class RayRenderer:
-    """A scene pictured by ray casts, both sides of its triangles seen.
-
-    See `aerialdojo_gen.rendering.backend.Renderer`.
-    """
+    """A renderer by ray casts, of both sides of triangles; see `aerialdojo_gen.rendering.backend.Renderer`."""
 
     name = "rays"
     device = "Embree"
@@ -50,12 +46,12 @@ class RayRenderer:
         self._material = np.repeat(np.array([number[part.material] for _, part in parts], np.int32), counts)
         self._corners = vertices[faces]
         self._uv = np.concatenate([part.uv for _, part in parts]).astype(np.float64)[faces]
-        # What is that wide both ways and level is ground, a road, a floor or a roof.
+        # Instances that wide both ways are ground, roads, floors or roofs.
         bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
         self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
-        self._rays = seen_caster(scene, caster or TriangleRayCaster(vertices, faces))
-        painted = any(part.colours is not None for _, part in parts)
-        self._painted = scene_texels(scene) if painted else None
+        self._rays = masked_caster(scene, caster or TriangleRayCaster(vertices, faces))
+        with_vertex_colours = any(part.colours is not None for _, part in parts)
+        self._has_vertex_colours = scene_texels(scene) if with_vertex_colours else None
         self._backdrop = Backdrop(scene)
         self._light: Lighting = light_of(scene, materials)
         textures = [scene.materials[name].texture for name in materials]
@@ -69,26 +65,26 @@ class RayRenderer:
                 [t.shape[1] for t in tiles],
             ]
         ).astype(np.int64)
-        # One texel that nothing hides from the sun, far below all points: none may lie in the sun camera's plane.
-        below = np.eye(4)
-        below[2, 3] = -1e6
-        self._no_shadow = ShadowMap(Camera(1, 1, 90.0), below, np.full((1, 1), np.inf, np.float32))
+        # One texel without an occluder, far below all points: none may lie in the sun camera's plane.
+        far_below = np.eye(4)
+        far_below[2, 3] = -1e6
+        self._no_shadow = ShadowMap(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = True) -> Picture:
-        """Take a picture; the instance id map comes with it unasked."""
+        """Take a picture, always with its instance id map."""
         local, length = pixel_rays(camera)
         shape = (camera.height, camera.width)
         directions = local @ world_from_camera[:3, :3].T
         distance, face = self._rays.first_hit(world_from_camera[:3, 3], directions)
-        albedo, depth, surface, owner = _seen(
+        albedo, depth, surface, owner = _hit_attributes(
             np.ascontiguousarray(world_from_camera[:3, 3]), directions, distance, length, face, self._corners,
             self._uv, self._material, self._owner, self._tiles, self._texels,
         )  # fmt: skip
-        if self._painted is not None:
+        if self._has_vertex_colours is not None:
             hit = np.flatnonzero(face >= 0)
             along = distance[hit] / length[hit]
             points = world_from_camera[:3, 3] + along[:, None] * directions[hit]
-            albedo[hit] = self._painted.painted(face[hit], points, albedo[hit])
+            albedo[hit] = self._has_vertex_colours.with_vertex_colours(face[hit], points, albedo[hit])
         depth = depth.reshape(shape)
         rgb = shade(
             camera,
@@ -123,7 +119,7 @@ def pixel_rays(camera: Camera) -> tuple[Floats, Floats]:
 
 
 @njit(cache=True, error_model="numpy")
-def _seen(
+def _hit_attributes(
     eye: Floats, directions: Floats, distance: Floats, length: Floats, face: Ints, corners: Floats, uv: Floats,
     material: Ints, owner: Ints, tiles: NDArray[np.int64], texels: NDArray[np.uint8],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32], Ints, Ints]:  # fmt: skip

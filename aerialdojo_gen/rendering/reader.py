@@ -5,7 +5,7 @@
 >>> recording.depth_m["down"][12]     # (640, 640) float32, metres, inf where nothing lies within range
 >>> recording.cameras["front"]["K"]   # intrinsics; pixel centres are at (column + 0.5, row + 0.5)
 
-The files are plain ones, for any other reader: `docs/recordings.md` has examples for PyAV and OpenCV.
+Other readers work too: `docs/recordings.md` has examples for PyAV and OpenCV.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from aerialdojo_gen.rendering.video import Tile, Video
 
 
 class DepthVideo(Sequence[NDArray[np.float32]]):
-    """Depth in metres, over a `Video` of what is stored.
+    """Depth in metres, over a `Video` of the stored values.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class DepthVideo(Sequence[NDArray[np.float32]]):
             They are not.
         """
         if self.step:
-            raise RenderError(f"{self.stored.path} stores no millimetres, but steps of {self.step:g} of the depth")
+            raise RenderError(f"{self.stored.path} stores relative steps of {self.step:g}, not millimetres")
         return self.stored
 
     def __len__(self) -> int:
@@ -118,7 +118,7 @@ def read_recording(folder: str | Path) -> Recording:
     """
     folder = Path(folder)
     if (folder / TILED).is_file():
-        return _tiled(folder / TILED)
+        return _read_tiled(folder / TILED)
     rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
     if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
         raise RenderError(f"no complete recording in {folder}: run {command('render')}")
@@ -160,21 +160,21 @@ def open_view(path: str | Path, view: str, modality: str) -> Video:
 def _tiles(path: Path) -> tuple[dict[str, dict[str, Video]], dict[str, dict[str, Any]]]:
     """Open the views of a tiled file, by modality and view, and return their cameras."""
     first = Video(path)
-    said = _camera(first)
-    cameras, names = said.get("tiles"), said.get("streams")
+    metadata = _camera(first)
+    cameras, names = metadata.get("tiles"), metadata.get("streams")
     if not (
         isinstance(cameras, dict) and cameras and all(isinstance(c, dict) for c in cameras.values())
         and isinstance(names, list) and names[:2] == ["rgb", "depth"] and names[2:] in ([], ["instance"])
     ):  # fmt: skip
-        raise RenderError(f"{path} does not say which views it holds: render it again")
-    wholes = {name: first if k == 0 else Video(path, k) for k, name in enumerate(names)}
-    if len({len(whole) for whole in wholes.values()}) != 1:
+        raise RenderError(f"{path} has no list of its views: render it again")
+    videos = {name: first if k == 0 else Video(path, k) for k, name in enumerate(names)}
+    if len({len(whole) for whole in videos.values()}) != 1:
         raise RenderError(f"the videos in {path} differ in length: render them again")
-    tiles = {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in wholes.items()}
+    tiles = {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in videos.items()}
     return {name: dict(views) for name, views in tiles.items()}, cameras
 
 
-def _tiled(path: Path) -> Recording:
+def _read_tiled(path: Path) -> Recording:
     videos, cameras = _tiles(path)
     depth = {view: DepthVideo(video, _step(cameras[view], video)) for view, video in videos["depth"].items()}
     fps = next(iter(videos["rgb"].values())).fps
@@ -182,10 +182,10 @@ def _tiled(path: Path) -> Recording:
 
 
 def _step(camera: dict[str, Any], video: Video) -> float:
-    """Return the step of stored depth; recordings from before there was a choice say nothing: millimetres."""
+    """Return the step of stored depth; old recordings have none: millimetres."""
     step = camera.get("depth_step", 0.0)
     if type(step) not in (int, float) or not 0.0 <= step <= 0.1:
-        raise RenderError(f"{video.path}: what it says of its camera has no depth_step from 0 to 0.1")
+        raise RenderError(f"{video.path}: its camera comment has no depth_step from 0 to 0.1")
     return float(step)
 
 
@@ -193,9 +193,9 @@ def _camera(video: Video) -> dict[str, Any]:
     try:
         camera = loads_json(video.metadata.get("comment", "{}"))
     except Malformed as error:
-        raise RenderError(f"{video.path}: what it says of its camera {error}: render it again") from None
+        raise RenderError(f"{video.path}: its camera comment {error}: render it again") from None
     if not isinstance(camera, dict):
-        raise RenderError(f"{video.path}: what it says of its camera is no object: render it again")
+        raise RenderError(f"{video.path}: its camera comment is no JSON object: render it again")
     return camera
 
 

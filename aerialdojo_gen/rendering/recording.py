@@ -40,21 +40,21 @@ def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
 def record_views(
     renderer: Renderer, solid: Solid, views: Sequence[str], poses: FramePoses, config: RenderConfig, folder: Path
 ) -> dict[str, set[str]]:
-    """Render and encode views of a trajectory; two poses' frames at most are held together in memory."""
+    """Render and encode views of a trajectory, with frames of at most two poses in memory; return flags by view."""
     camera = Camera(config.width, config.height, config.fov_deg)
     checks = {view: ViewChecks(camera, solid) for view in views}
     with ExitStack() as stack:
         write = _writers(stack, folder, views, camera, config)
-        # One thread: the frames of a video come in their order.
+        # One thread keeps the frames in order.
         encoder = stack.enter_context(ThreadPoolExecutor(1))
         pending: Future[None] | None = None
         for position, yaw in zip(poses.position, poses.yaw_rad, strict=True):
-            at = [camera_pose(position, float(yaw), view, config) for view in views]
-            pictures = renderer.render_views(camera, at, config.instances)
+            camera_poses = [camera_pose(position, float(yaw), view, config) for view in views]
+            pictures = renderer.render_views(camera, camera_poses, config.instances)
             if pending is not None:
                 pending.result()
             pending = encoder.submit(write, dict(zip(views, pictures, strict=True)))
-            for view, picture, pose in zip(views, pictures, at, strict=True):
+            for view, picture, pose in zip(views, pictures, camera_poses, strict=True):
                 checks[view].add(picture, pose)
         if pending is not None:
             pending.result()
@@ -68,7 +68,7 @@ def record_views(
 def _writers(
     stack: ExitStack, folder: Path, views: Sequence[str], camera: Camera, config: RenderConfig
 ) -> Callable[[dict[str, Picture]], None]:
-    """Open what is written; returns what encodes the pictures of a pose, by view."""
+    """Open the writers; return the function that encodes the pictures of a pose, by view."""
     comments = {view: camera_comment(camera, view, config) for view in views}
     own = [place for place in places(config) if place.view in comments]
     if config.layout == "files":
@@ -79,7 +79,7 @@ def _writers(
             writers.append((place, writer))
 
         def write(pictures: dict[str, Picture]) -> None:
-            stored = {view: _stored(picture, config) for view, picture in pictures.items()}
+            stored = {view: _encodable(picture, config) for view, picture in pictures.items()}
             for place, writer in writers:
                 writer.write(stored[place.view])
 
@@ -93,7 +93,7 @@ def _writers(
     )  # fmt: skip
 
     def write_tiles(pictures: dict[str, Picture]) -> None:
-        stored = {view: _stored(picture, config) for view, picture in pictures.items()}
+        stored = {view: _encodable(picture, config) for view, picture in pictures.items()}
         one.write(
             {m: tiled({view: frames[m] for view, frames in stored.items()}, config) for m in modalities(config)}
         )
@@ -110,7 +110,7 @@ def _writer(folder: Path, place: Place, comments: dict[str, str], config: Render
     )
 
 
-def _stored(picture: Picture, config: RenderConfig) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
+def _encodable(picture: Picture, config: RenderConfig) -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
     frames: dict[str, NDArray[np.uint8] | NDArray[np.uint16]] = {
         "rgb": picture.rgb,
         "depth": to_stored(picture.depth_m, config.depth_step),
@@ -138,7 +138,7 @@ def camera_pose(position: ArrayLike, yaw_rad: float, view: str, config: RenderCo
 
 
 def camera_comment(camera: Camera, view: str, config: RenderConfig) -> str:
-    """Describe a camera in the words that a recording's files carry: JSON."""
+    """Camera parameters as JSON, for a recording's files."""
     factor = 1.0 + config.depth_step
     depth = f"metres = 0.1 * {factor!r} ** (value - 1)" if config.depth_step else "millimetres"
     return json.dumps(
@@ -159,7 +159,7 @@ def camera_comment(camera: Camera, view: str, config: RenderConfig) -> str:
 
 
 def tiles_comment(own: Sequence[Place], comments: dict[str, str]) -> str:
-    """Describe the views of a tiled file: JSON, with every view's camera and place, and what the streams are."""
+    """Views of a tiled file as JSON: every view's camera and place, and the streams' modalities."""
     return json.dumps(
         {
             "tiles": {

@@ -14,14 +14,14 @@ from aerialdojo_gen.store.schemas import SETTINGS
 
 
 def tables(config: RenderConfig, scene: str) -> tuple[str, ...]:
-    """Return the tables of routes that the configuration records of a scene: none where its split has none of it."""
+    """Return the route tables to record of a scene; none if the configured split excludes it."""
     *partition, subset = config.split.split("_")
     if partition and partition[0] != partition_of(scene):
         return ()
     return ("routes/train", "routes/test") if subset == "all" else (f"routes/{subset}",)
 
 
-def choose(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str]:
+def choose_trajectories(rows: Iterable[Mapping[str, Any]], limit: int, seed: int) -> list[str]:
     """Draw a sample of each length setting."""
     by_setting: dict[str, list[str]] = {setting: [] for setting in SETTINGS}
     for row in rows:
@@ -40,5 +40,5 @@ def n_parts(data: Where, scene: str, config: RenderConfig) -> int:
         for table in tables(config, scene)
         for row in store.read_scene(data, table, scene, ["nav_id", "setting"]).to_pylist()
     ]
-    # How many are drawn does not depend on the seed; which, does.
-    return max(1, -(-len(choose(rows, config.limit, 0)) // config.trajectories_per_part))
+    # Their number does not depend on the seed.
+    return max(1, -(-len(choose_trajectories(rows, config.limit, 0)) // config.trajectories_per_part))

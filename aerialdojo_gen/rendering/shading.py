@@ -2,7 +2,7 @@
 
 The rasteriser delivers unlit texture colour, depth and the material's number; normals follow from depth. Sun, shadow,
 sky light, haze and the sky itself are added here, so that every rendering backend gives the same picture. Light is
-computed in sRGB values, which is not physics, but what the eye expects of a game.
+computed in sRGB values: not physical, but it looks as in a game.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap
 
 Floats = NDArray[np.float64]
 
-# Light on a surface, as shares of its colour: from everywhere, more from above, a little from east and north so that
-# the faces of a building in the shade can be told apart, and from the sun.
+# Light on a surface, as shares of its colour: ambient, from above, a little from east and north so that the shaded
+# faces of a building differ, and from the sun.
 _AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
 # Haze grows with the square of distance up to about this range, metres.
 _HAZE_RANGE_M = 420.0
@@ -128,7 +128,7 @@ def _shade(
             stretch = math.sqrt(dx * dx + dy * dy + dz * dz)
             k = surface[row, col]
             if k < 0:
-                # Beyond the ground's end nothing is hit below the horizon either: haze stands there.
+                # Below the horizon, beyond the ground's edge: haze.
                 up = max(0.0, dz / stretch) ** 0.55
                 for c in range(3):
                     out[row, col, c] = np.uint8(horizon[c] + (zenith[c] - horizon[c]) * up + 0.5)
@@ -146,16 +146,16 @@ def _shade(
             for c in range(3):
                 base[c] = colour[k, c]
             if texel[k] > 0.0:
-                # The rasteriser picks the nearest texel: far away, fade into the mean colour instead of noise.
+                # The rasteriser samples the nearest texel: fade into the mean colour with distance, against noise.
                 texels = z * stretch / focal / math.sqrt(max(facing, 0.02)) / texel[k]
-                keep = min(1.0, max(0.0, (_FADE_TEXELS - texels) / (_FADE_TEXELS - 1.0)))
+                sharpness = min(1.0, max(0.0, (_FADE_TEXELS - texels) / (_FADE_TEXELS - 1.0)))
                 for c in range(3):
-                    base[c] += (albedo[row, col, c] - base[c]) * keep
+                    base[c] += (albedo[row, col, c] - base[c]) * sharpness
             lit = nx * sun[0] + ny * sun[1] + nz * sun[2]
             if lit <= 0.0:
                 lit = 0.0
             else:
-                # Off the surface by more than a texel of the map, or it would shade itself.
+                # Offset by more than a texel of the map, against self-shadowing.
                 px = pose[0, 3] + dx * z + nx * bias_m
                 py = pose[1, 3] + dy * z + ny * bias_m
                 pz = pose[2, 3] + dz * z + nz * bias_m

@@ -1,9 +1,7 @@
-"""A scene's triangles merged by material: what a renderer draws as one body.
+"""A scene's triangles merged by material, for TinyRenderer: its segmentation mask then holds every pixel's material.
 
-The segmentation mask then tells the shader the material of every pixel.
-
-A software rasteriser visits every pixel of a triangle's bounding box, seen or not. So triangles that no camera
-can see from the front are left out, and long ones are cut up: a ground of slivers would cost a picture each.
+A software rasteriser visits every pixel of a triangle's bounding box, visible or not. So triangles that no camera can
+see from the front are dropped, and long ones are cut: a long sliver would cost as much as a whole picture.
 """
 
 from __future__ import annotations
@@ -19,10 +17,10 @@ from aerialdojo_gen.scenes.sampling import texel
 
 # Edges longer than this are halved, metres.
 _LONGEST_EDGE_M = 10.0
-# Cameras stand within so much of the flight volume at its sides and above it, and so much over its floor, metres.
+# Margins of the cameras' box around the flight volume and above its floor, metres.
 _AROUND_M, _FLOOR_M = 300.0, 0.1
-# How often triangles with holes are cut into four, and how many that may make.
-_HALVINGS, _MOST_HOLED = 4, 200_000
+# Subdivisions of masked triangles into four, and the maximum number of triangles.
+_HALVINGS, _MAX_CUT = 4, 200_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,48 +41,50 @@ def surfaces(scene: Scene) -> list[Surface]:
         for part in instance.parts:
             by_material.setdefault(part.material, []).append(part)
     low, high = scene.bounds[0], scene.bounds[1]
-    room = np.stack([low + np.array([-_AROUND_M, -_AROUND_M, _FLOOR_M]), high + _AROUND_M])
-    merged = (_foreign(_merge(name, by_material[name]), scene.materials[name]) for name in sorted(by_material))
-    cut = (_cut(_visible(surface, room)) for surface in merged)
+    camera_box = np.stack([low + np.array([-_AROUND_M, -_AROUND_M, _FLOOR_M]), high + _AROUND_M])
+    merged = (_apply_material(_merge(name, by_material[name]), scene.materials[name]) for name in sorted(by_material))
+    cut = (_cut(_drop_back_faces(surface, camera_box)) for surface in merged)
     return [surface for surface in cut if len(surface.faces)]
 
 
 def _merge(material: str, parts: list[Part]) -> Surface:
     if any(p.colours is not None for p in parts):
-        return _painted(material, parts)
+        return _merge_coloured(material, parts)
     vertices, faces = soup(parts)
     uv = np.concatenate([p.uv for p in parts]).astype(np.float64)
     return Surface(material, vertices, uv, faces.astype(np.int64))
 
 
-def _painted(material: str, parts: list[Part]) -> Surface:
-    """Merge parts with vertex colours: TinyRenderer mixes none, so that each face has the mean of its own."""
+def _merge_coloured(material: str, parts: list[Part]) -> Surface:
+    """Merge parts with vertex colours: TinyRenderer interpolates none, so every face gets its mean colour."""
     vertices, faces = soup(parts)
-    own = np.concatenate([np.zeros((0, 3, 3)), *(p.colours[p.faces] for p in parts if p.colours is not None)])
-    side = max(1, int(np.ceil(np.sqrt(len(own)))))
+    corner_colours = np.concatenate(
+        [np.zeros((0, 3, 3)), *(p.colours[p.faces] for p in parts if p.colours is not None)]
+    )
+    side = max(1, int(np.ceil(np.sqrt(len(corner_colours)))))
     palette = np.zeros((side * side, 3), dtype=np.uint8)
-    palette[: len(own)] = np.rint(own.mean(axis=1))
-    k = np.arange(len(own))
+    palette[: len(corner_colours)] = np.rint(corner_colours.mean(axis=1))
+    k = np.arange(len(corner_colours))
     uv = np.stack([(k % side + 0.5) / side, 1.0 - (k // side + 0.5) / side], axis=1)
     corners = vertices[faces].reshape(-1, 3)
     index = np.arange(len(corners)).reshape(-1, 3)
     return Surface(material, corners, np.repeat(uv, 3, axis=0), index, palette.reshape(side, side, 3))
 
 
-def _foreign(surface: Surface, material: Material) -> Surface:
-    """Give a surface its holes and its back: TinyRenderer knows neither."""
+def _apply_material(surface: Surface, material: Material) -> Surface:
+    """Apply alpha mask and back faces as geometry: TinyRenderer supports neither."""
     if material.mask is not None:
-        surface = _holed(surface, material.mask)
+        surface = _cut_holes(surface, material.mask)
     if material.double_sided:
         surface = replace(surface, faces=np.concatenate([surface.faces, surface.faces[:, ::-1]]))
     return surface
 
 
-def _holed(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
-    """Leave out what of a surface is a hole, in pieces of its triangles."""
+def _cut_holes(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
+    """Drop the masked-out pieces of subdivided triangles."""
     vertices, uv, faces = surface.vertices, surface.uv, surface.faces
     for _ in range(_HALVINGS):
-        if 4 * len(faces) > _MOST_HOLED:
+        if 4 * len(faces) > _MAX_CUT:
             break
         n, middles = len(vertices), [(faces[:, k], faces[:, (k + 1) % 3]) for k in range(3)]
         vertices = np.concatenate([vertices, *((vertices[a] + vertices[b]) / 2.0 for a, b in middles)])
@@ -92,25 +92,22 @@ def _holed(surface: Surface, mask: NDArray[np.bool_]) -> Surface:
         ab, bc, ca = (n + k * len(faces) + np.arange(len(faces)) for k in range(3))
         a, b, c = faces.T
         faces = np.concatenate([np.stack(f, axis=1) for f in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    there = mask[texel(uv[faces].mean(axis=1), mask.shape[0], mask.shape[1])]
-    return Surface(surface.material, vertices, uv, faces[there])
+    opaque = mask[texel(uv[faces].mean(axis=1), mask.shape[0], mask.shape[1])]
+    return Surface(surface.material, vertices, uv, faces[opaque])
 
 
-def _visible(surface: Surface, room: NDArray[np.float64]) -> Surface:
-    """Drop the triangles that turn their backs on every point of a box, and those without an area."""
+def _drop_back_faces(surface: Surface, camera_box: NDArray[np.float64]) -> Surface:
+    """Drop the triangles that face away from every point of a box, and those without an area."""
     corners = surface.vertices[surface.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # The box's corner farthest along the normal is the one that would see the front.
-    farthest = np.where(normal > 0.0, room[1], room[0])
+    farthest = np.where(normal > 0.0, camera_box[1], camera_box[0])
     front = np.einsum("ij,ij->i", normal, farthest - corners[:, 0]) > 0.0
     return replace(surface, faces=surface.faces[front])
 
 
 def _cut(surface: Surface) -> Surface:
-    """Halve the longest edge of every triangle until none is too long.
-
-    Every edge that is too long is halved in both of its triangles at the same point, so that no gap opens.
-    """
+    """Halve the longest edge of every triangle until none is too long, at the same point in both of its triangles."""
     vertices, uv, faces = surface.vertices, surface.uv, surface.faces
     done = []
     while len(faces):

@@ -1,7 +1,4 @@
-"""What a place of a scene's surface shows: its texture coordinates, its colour, and whether it is a hole.
-
-For what casts rays. OpenGL finds it out by itself.
-"""
+"""Texture lookup at points of a scene's surface, for ray casts: texture coordinates, colours and alpha masks."""
 
 from __future__ import annotations
 
@@ -23,12 +20,12 @@ from aerialdojo_gen.scenes.sampling import texel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-# How often a ray goes on through a hole, and how far behind it it begins anew, metres.
-_MOST_HOLES, _ON_M = 12, 1e-3
+# How many holes a ray passes through, and how far behind each it restarts, metres.
+_MAX_HOLES, _ON_M = 12, 1e-3
 
 
 class SurfaceTexels:
-    """Looks up places on the triangles of parts."""
+    """Looks up points on the triangles of parts."""
 
     def __init__(self, parts: Sequence[Part], materials: Mapping[str, Material]) -> None:
         names = sorted({part.material for part in parts})
@@ -37,12 +34,12 @@ class SurfaceTexels:
         self.material = np.repeat(np.array([names.index(p.material) for p in parts], dtype=np.int64), counts)
         self.vertices, self.faces = soup(parts)
         self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
-        self._painted = any(part.colours is not None for part in parts)
-        if self._painted:
+        self._has_vertex_colours = any(part.colours is not None for part in parts)
+        if self._has_vertex_colours:
             self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
-            self._own = np.repeat([part.colours is not None for part in parts], counts)
+            self._is_coloured = np.repeat([part.colours is not None for part in parts], counts)
 
-    def shares(self, face: Ints, points: Floats) -> Floats:
+    def barycentric(self, face: Ints, points: Floats) -> Floats:
         """Weights (n, 3) of a face's corners at points (n, 3) on it."""
         index = self.faces[face]
         a, b, c = (self.vertices[index[:, k]] for k in range(3))
@@ -53,8 +50,8 @@ class SurfaceTexels:
         v, w = (d11 * d20 - d01 * d21) / area, (d00 * d21 - d01 * d20) / area
         return np.stack([1.0 - v - w, v, w], axis=1)
 
-    def holes(self, face: Ints, points: Floats) -> NDArray[np.bool_]:
-        """Whether places (n, 3) on faces (n,) are holes."""
+    def is_hole(self, face: Ints, points: Floats) -> NDArray[np.bool_]:
+        """Whether points (n, 3) on faces (n,) are masked out."""
         out = np.zeros(len(face), dtype=bool)
         for k in np.unique(self.material[face]):
             mask = self.materials[k].mask
@@ -65,7 +62,7 @@ class SurfaceTexels:
         return out
 
     def colours(self, face: Ints, points: Floats) -> NDArray[np.uint8]:
-        """Colours (n, 3) of places (n, 3) on faces (n,): of the nearest texel."""
+        """Colours (n, 3) of points (n, 3) on faces (n,), by the nearest texel."""
         out = np.array([m.colour for m in self.materials], dtype=np.uint8)[self.material[face]]
         for k in np.unique(self.material[face]):
             texture = self.materials[k].texture
@@ -73,23 +70,25 @@ class SurfaceTexels:
                 rows = np.flatnonzero(self.material[face] == k)
                 uv = self.uv_at(face[rows], points[rows])
                 out[rows] = texture[texel(uv, texture.shape[0], texture.shape[1])]
-        return self.painted(face, points, out)
+        return self.with_vertex_colours(face, points, out)
 
-    def painted(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
-        """Put vertex colours in the place of colours (n, 3) where there are some."""
-        if not self._painted:
+    def with_vertex_colours(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
+        """Replace colours (n, 3) by interpolated vertex colours where a part has them."""
+        if not self._has_vertex_colours:
             return colours
-        rows = np.flatnonzero(self._own[face])
+        rows = np.flatnonzero(self._is_coloured[face])
         mixed = np.einsum(
-            "nk,nkc->nc", self.shares(face[rows], points[rows]), self._colours[self.faces[face[rows]]].astype(float)
+            "nk,nkc->nc",
+            self.barycentric(face[rows], points[rows]),
+            self._colours[self.faces[face[rows]]].astype(float),
         )
         out = colours.copy()
         out[rows] = np.clip(np.rint(mixed), 0, 255)
         return out
 
     def uv_at(self, face: Ints, points: Floats) -> Floats:
-        """Texture coordinates (n, 2) of places (n, 3) on faces (n,)."""
-        share, uv = self.shares(face, points), self.uv[self.faces[face]]
+        """Texture coordinates (n, 2) of points (n, 3) on faces (n,)."""
+        share, uv = self.barycentric(face, points), self.uv[self.faces[face]]
         return np.asarray(share[:, :1] * uv[:, 0] + share[:, 1:2] * uv[:, 1] + share[:, 2:] * uv[:, 2])
 
 
@@ -99,8 +98,8 @@ def _vertex_colours(part: Part, material: Material) -> NDArray[np.uint8]:
     return np.tile(np.array(material.colour, dtype=np.uint8), (len(part.vertices), 1))
 
 
-class SeenRayCaster:
-    """Casts rays at what is to be seen of a scene: through the holes in its textures."""
+class MaskedRayCaster:
+    """Casts rays through the masked-out parts of textures."""
 
     def __init__(self, caster: TriangleRayCaster, texels: SurfaceTexels) -> None:
         self._caster = caster
@@ -109,15 +108,15 @@ class SeenRayCaster:
         self._holed = holed[texels.material]
 
     def first_hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Ints]:
-        """Find what rays hit first; see `aerialdojo_gen.geometry.rays.TriangleRayCaster.first_hit`."""
+        """Find the first opaque hits; see `aerialdojo_gen.geometry.rays.TriangleRayCaster.first_hit`."""
         distance, face = self._caster.first_hit(origins, directions)
         length = np.linalg.norm(directions, axis=1)
         origins = np.broadcast_to(origins, directions.shape)
         rows = np.flatnonzero(face >= 0)
-        for _ in range(_MOST_HOLES):
+        for _ in range(_MAX_HOLES):
             rows = rows[self._holed[face[rows]]]
             points = origins[rows] + (distance[rows] / length[rows])[:, None] * directions[rows]
-            through = self._texels.holes(face[rows], points)
+            through = self._texels.is_hole(face[rows], points)
             rows, points = rows[through], points[through]
             if not len(rows):
                 break
@@ -129,21 +128,21 @@ class SeenRayCaster:
 
 
 def scene_texels(scene: Scene) -> SurfaceTexels:
-    """Return what looks up places on a scene's instances, in their order."""
+    """Return the texture lookup of a scene's instances, in their order."""
     parts = [part for instance in scene.instances for part in instance.parts]
     return context_of(scene).part("texels", lambda: SurfaceTexels(parts, scene.materials))
 
 
-def seen_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> TriangleRayCaster | SeenRayCaster:
-    """Return what casts rays at what is to be seen of a scene: its one Embree scene, but through holes."""
+def masked_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> TriangleRayCaster | MaskedRayCaster:
+    """Return a ray caster that respects alpha masks; the plain one if the scene has none."""
     whole = caster or triangle_caster(scene)
     if all(material.mask is None for material in scene.materials.values()):
         return whole
-    return SeenRayCaster(whole, scene_texels(scene))
+    return MaskedRayCaster(whole, scene_texels(scene))
 
 
 class Backdrop:
-    """Paints what a scene has behind everything."""
+    """Paints a scene's backdrop."""
 
     def __init__(self, scene: Scene) -> None:
         parts = [part for instance in scene.backdrop for part in instance.parts]
@@ -166,8 +165,8 @@ class Backdrop:
         rgb[rows[hit], columns[hit]] = self._texels.colours(face[hit], eye + along[:, None] * directions[hit])
 
 
-def reduced(texture: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
-    """Make a texture smaller where its longer side has more pixels than `longest`."""
+def downscale(texture: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:
+    """Shrink a texture to at most `longest` pixels on its longer side."""
     height, width = texture.shape[:2]
     if max(height, width) <= longest:
         return texture

@@ -17,10 +17,10 @@ class FramePoses:
     """Where the body is in every frame."""
 
     time_s: Floats  # (n,) float64; since the first frame
-    step: NDArray[np.int32]  # (n,) int32; trajectory pose that the frame belongs to: the last one reached
-    action: NDArray[np.int8]  # (n,) int8; action under way: the one done at that pose
+    step: NDArray[np.int32]  # (n,) int32; the frame's trajectory pose: the last one reached
+    action: NDArray[np.int8]  # (n,) int8; the action at that pose
     position: Floats  # (n, 3) float64; the body's centre, metres, world frame
-    yaw_rad: Floats  # (n,) float64; in (-π, π] where it is interpolated, as stored where it is not
+    yaw_rad: Floats  # (n,) float64; in (-π, π] if interpolated, else as stored
 
 
 def by_steps(position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float) -> FramePoses:
@@ -34,17 +34,14 @@ def by_steps(position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: fl
 def by_time(
     position: ArrayLike, yaw_rad: ArrayLike, action: ArrayLike, fps: float, cruise_m_s: float, yaw_rate_deg_s: float
 ) -> FramePoses:
-    """Frames at a constant rate along the path.
-
-    A segment takes the longer of flying and turning the short way round.
-    """
+    """Frames at a constant rate along the path; a segment takes the longer of flying and turning the short way."""
     p, yaw = np.asarray(position, dtype=np.float64), np.asarray(yaw_rad, dtype=np.float64)
     turn = wrap_angle_rad(np.diff(yaw))
     seconds = np.maximum(
         np.linalg.norm(np.diff(p, axis=0), axis=1) / cruise_m_s, np.abs(np.degrees(turn)) / yaw_rate_deg_s
     )
     arrival = np.concatenate([[0.0], np.cumsum(seconds)])
-    # An ulp over a whole number of frames is no frame more.
+    # Ignore rounding above a whole number of frames.
     n = int(np.ceil(arrival[-1] * fps - 1e-9)) + 1
     time = np.arange(n) / fps
     flown = np.minimum(time, arrival[-1])

@@ -1,4 +1,4 @@
-"""The frames of a recording's videos, decoded when they are asked for."""
+"""The frames of a recording's videos, decoded on access."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from aerialdojo_gen.base.pictures import decode_as_stored
 
 
 class Video(Sequence[NDArray[Any]]):
-    """The frames of a video file, or of a folder of PNG files; decoded when asked for, in any order."""
+    """The frames of a video file, or of a folder of PNG files; decoded on access, in any order."""
 
     def __init__(self, path: str | Path, stream: int = 0) -> None:
         path = Path(path)
@@ -31,23 +31,23 @@ class Video(Sequence[NDArray[Any]]):
         try:
             with av.open(str(path)) as container:
                 own = container.streams.video[stream]
-                # A stream of a codec that FFmpeg does not know has none, and then no format either.
+                # A stream of an unknown codec has neither.
                 if own.codec_context is None or own.format is None:
-                    raise RenderError(f"{path} says nothing of its pictures: render it again")
+                    raise RenderError(f"{path} has an unknown codec: render it again")
                 self.metadata = {k.lower(): v for k, v in container.metadata.items()}
                 self.fps = float(own.average_rate or 0)
                 self.width, self.height = own.width, own.height
                 self._depth = own.format.name.startswith("gray16")
                 self._pts = sorted(p.pts for p in container.demux(own) if p.pts is not None)
         except (av.FFmpegError, OSError, IndexError, UnicodeDecodeError) as error:
-            raise RenderError(f"{path} is no video that can be read ({error}): render it again") from None
+            raise RenderError(f"{path} is no readable video ({error}): render it again") from None
 
     def _open_folder(self) -> None:
-        """Take what a video's header says from a folder: `fps` is not known there."""
+        """Read a folder's metadata as of a video's header; `fps` is unknown there."""
         camera = self.path / "camera.json"
         if not self._files or not camera.is_file():
             raise RenderError(f"{self.path} holds no frames: render it again")
-        # What is not UTF-8 is no JSON either, and `read_recording` says so.
+        # What is not UTF-8 is no JSON either: `read_recording` rejects it.
         self.metadata = {"comment": camera.read_text(encoding="utf-8", errors="surrogateescape")}
         self.fps = 0.0
         self._pts = list(range(len(self._files)))
@@ -56,7 +56,7 @@ class Video(Sequence[NDArray[Any]]):
     def _png(self, k: int) -> NDArray[Any]:
         image = decode_as_stored(self._files[k].read_bytes())
         if image is None:
-            raise RenderError(f"{self._files[k]} is no picture that can be read: render it again")
+            raise RenderError(f"{self._files[k]} is no readable picture: render it again")
         return image
 
     def __len__(self) -> int:
@@ -87,8 +87,8 @@ class Video(Sequence[NDArray[Any]]):
         array = frame.to_ndarray() if self._depth else frame.to_ndarray(format="rgb24")
         return np.asarray(array)
 
-    def kept(self, k: int) -> NDArray[Any]:
-        """Decode frame k, or return it where it was the last one asked for here; not to be written to."""
+    def cached(self, k: int) -> NDArray[Any]:
+        """Decode frame k, or return it if it was the last one decoded here; read-only."""
         if self._last is None or self._last[0] != k:
             self._last = (k, self[k])
         return self._last[1]
@@ -109,13 +109,13 @@ class Tile(Video):
     def __init__(self, whole: Video, camera: dict[str, Any]) -> None:
         self.path, self.fps, self._pts = whole.path, whole.fps, whole._pts
         self.metadata = {"comment": json.dumps(camera)}
-        self._whole = whole
+        self._parent = whole
         box = [camera.get(name) for name in ("left_px", "top_px", "width", "height")]
         if not all(isinstance(edge, int) and 0 <= edge < 1 << 16 for edge in box):
-            raise RenderError(f"{whole.path} does not say where its views lie: render it again")
+            raise RenderError(f"{whole.path} lacks the positions of its views: render it again")
         self._left, self._top, self.width, self.height = (int(edge) for edge in box if edge is not None)
         if self._left + self.width > whole.width or self._top + self.height > whole.height:
-            raise RenderError(f"{whole.path} says that a view lies beyond its frames: render it again")
+            raise RenderError(f"{whole.path} places a view outside its frames: render it again")
 
     @overload
     def __getitem__(self, k: int) -> NDArray[Any]: ...
@@ -125,5 +125,5 @@ class Tile(Video):
         """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 of depth in the file's units."""
         if isinstance(k, slice):
             return [self[i] for i in range(*k.indices(len(self)))]
-        frame = self._whole.kept(k)
+        frame = self._parent.cached(k)
         return frame[self._top : self._top + self.height, self._left : self._left + self.width].copy()

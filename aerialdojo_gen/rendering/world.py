@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import sys
 from pathlib import Path
-from types import TracebackType
+from types import ModuleType, TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +15,44 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import encode_png
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.rendering.bullet import pybullet
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
-from aerialdojo_gen.rendering.texels import Backdrop, reduced
+from aerialdojo_gen.rendering.texels import Backdrop, downscale
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
 
+
+def _import_silently() -> ModuleType:
+    """Import PyBullet; RenderError where it is not installed: it has no wheel for Python 3.12 and later."""
+    sys.stderr.flush()
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        import pybullet as module
+
+        # C's stdio may hold the line back until after the descriptor is restored.
+        ctypes.CDLL(None).fflush(None)
+    except ImportError:
+        raise RenderError(
+            "the renderer pybullet lacks the package pybullet, which has wheels up to Python 3.11: take gl, or build "
+            "it with a C++ compiler and Python's headers (pip install 'aerialdojo-gen[pybullet]')"
+        ) from None
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+    result: ModuleType = module
+    return result
+
+
+pybullet = _import_silently()
+
 Floats = NDArray[np.float64]
 
-# Steps by which a camera gives way to a vertex in its own plane, and the gap that float32 needs, metres.
+# Steps by which a camera moves off a vertex in its own plane, and the gap that float32 needs, metres.
 _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
 _LARGEST_ATLAS_PX = 2048
 
@@ -40,7 +68,7 @@ class RenderWorld:
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise RenderError("PyBullet's DIRECT client did not start: too many renderers are open in this process")
-        # A reused file name would otherwise bring back the mesh that it once held.
+        # Otherwise PyBullet would return the cached mesh of a reused file name.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         # Meshes go through OBJ files: inline vertices leak about 50 MB a scene in PyBullet.
         with scratch_folder() as folder:
@@ -68,9 +96,11 @@ class RenderWorld:
         if texture is not None:
             if material.name not in textures:
                 picture = folder / f"texture{len(textures)}.png"
-                # It samples the nearest texel at any distance: what is finer than a pixel would only flicker.
-                shown = reduced(texture, _LARGEST_ATLAS_PX) if material.atlas and surface.palette is None else texture
-                picture.write_bytes(encode_png(shown))
+                # TinyRenderer samples the nearest texel: details finer than a pixel would flicker.
+                downscaled = (
+                    downscale(texture, _LARGEST_ATLAS_PX) if material.atlas and surface.palette is None else texture
+                )
+                picture.write_bytes(encode_png(downscaled))
                 textures[material.name] = pybullet.loadTexture(str(picture), physicsClientId=client)
             pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
 
@@ -84,10 +114,7 @@ class RenderWorld:
     def rasterise(
         self, camera: Camera, world_from_camera: Floats, near_m: float = NEAR_M, far_m: float = FAR_M
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.int32]]:
-        """Rasterise without light.
-
-        Albedo (H, W, 3) uint8, planar depth (inf for no hit) and surface number (-1 for none).
-        """
+        """Rasterise without light: albedo (H, W, 3) uint8, planar depth (inf: no hit), surface number (-1: none)."""
         w, h = camera.width, camera.height
         projection = _projection(camera, near_m, far_m)
         view = np.linalg.inv(world_from_camera)
@@ -134,10 +161,7 @@ def _close_to_plane(points: Floats, plane: Floats, reach_m: float) -> Floats:
 
 
 def _nudge(close: Floats) -> float:
-    """How far, metres, the camera steps back so that no vertex lies in its plane.
-
-    TinyRenderer divides by a vertex's depth.
-    """
+    """How far, metres, the camera steps back so that no vertex lies in its plane: TinyRenderer divides by depth."""
     if not len(close):
         return 0.0
     steps = _NUDGE_M * np.array([k * sign for k in range(40) for sign in (1, -1)])
@@ -164,7 +188,7 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
 
 
 def render_world(scene: Scene) -> RenderWorld:
-    """Return the scene's world in TinyRenderer: its context's, not for the caller to close."""
+    """Return the scene's world in TinyRenderer, owned by its context: do not close it."""
     return context_of(scene).part("render world", lambda: RenderWorld(scene))
 
 

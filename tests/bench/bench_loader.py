@@ -66,7 +66,7 @@ def scene_rows(data: str, scene: str) -> None:
                     clips = [clip_from_world(camera, view_pose(pose[:3], pose[3], v), NEAR_M, FAR_M) for v in views]
                     nearness = np.zeros((len(views), size, size), np.float32)
                     for culling in renderer.bodies()._cullings:
-                        culling.seen(np.stack(clips), pose[:3].copy(), size, size, nearness)
+                        culling.visible_indices(np.stack(clips), pose[:3].copy(), size, size, nearness)
 
             def load(loaded=loaded, numbers=numbers):
                 loaded.batch(numbers)
@@ -98,10 +98,12 @@ def drawing_ms(
             world = [view_pose(pose[:3], pose[3], view) for view in views]
             clips = np.stack([clip_from_world(camera, matrix, NEAR_M, FAR_M) for matrix in world])
             nearness = np.zeros((len(views), size, size), np.float32)
-            seen = [c.seen(clips, pose[:3].copy(), size, size, nearness) for c in renderer.bodies()._cullings]
+            visible = [
+                c.visible_indices(clips, pose[:3].copy(), size, size, nearness) for c in renderer.bodies()._cullings
+            ]
             for v, matrix in enumerate(world):
                 begun = time.process_time()
-                target = renderer.draw_seen(camera, matrix, clips[v], [of_kind[v] for of_kind in seen])
+                target = renderer.draw_triangles(camera, matrix, clips[v], [of_kind[v] for of_kind in visible])
                 between = time.process_time()
                 read_pixels(target, rgb, depth)
                 handed, read = handed + between - begun, read + time.process_time() - between

@@ -28,7 +28,7 @@ from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.viewpoints import viewed
 from aerialdojo_gen.pipeline.progress import Reporter
-from aerialdojo_gen.rendering.sight import in_sight
+from aerialdojo_gen.rendering.casters import in_sight
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 

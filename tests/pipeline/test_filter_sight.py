@@ -9,7 +9,7 @@ from support.walled import SCENE, VIEWPOINTS, filled, walled, write_walled
 from aerialdojo_gen.base.config.sections import Embodiment, FilterConfig
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.filter import run
-from aerialdojo_gen.rendering.sight import all_in_sight, in_sight
+from aerialdojo_gen.rendering.casters import all_in_sight, in_sight
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 from aerialdojo_gen.store.tables import from_rows

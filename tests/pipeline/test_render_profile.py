@@ -68,7 +68,7 @@ def test_every_view_comes_back_as_it_was_drawn(data):
         assert np.array_equal(recording.instance[view][k] == 0, np.isinf(depth))
         assert np.array(recording.cameras[view]["K"]) == pytest.approx(camera.matrix)
     assert np.array_equal(recording.rgb["left"][2:4][1], recording.rgb["left"][3])
-    with pytest.raises(RenderError, match="stores no millimetres"):
+    with pytest.raises(RenderError, match="not millimetres"):
         recording.depth_m["front"].millimetres  # noqa: B018
 
 

@@ -19,7 +19,7 @@ from aerialdojo_gen.base.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.pipeline.stages.work import reference_images
 from aerialdojo_gen.rendering.reader import read_recording
-from aerialdojo_gen.rendering.sample import choose
+from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.rendering.trajectory import by_steps, by_time
 from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.store import schemas
@@ -109,10 +109,10 @@ def test_a_subset_without_routes_gives_empty_tables(data):
 @given(st.lists(st.sampled_from(schemas.SETTINGS), max_size=40), st.integers(1, 10), st.integers(0, 3))
 def test_a_larger_limit_only_adds(settings, limit, seed):
     rows = [{"nav_id": f"n{k}", "setting": s} for k, s in enumerate(settings)]
-    some, more = choose(rows, limit, seed), choose(rows, limit + 1, seed)
+    some, more = choose_trajectories(rows, limit, seed), choose_trajectories(rows, limit + 1, seed)
     assert set(some) <= set(more)
     assert len(some) == sum(min(limit, settings.count(s)) for s in schemas.SETTINGS)
-    assert choose(rows[::-1], limit, seed) == some
+    assert choose_trajectories(rows[::-1], limit, seed) == some
 
 
 poses = st.lists(

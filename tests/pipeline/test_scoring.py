@@ -22,9 +22,8 @@ from aerialdojo_gen.pipeline.scoring.geometric import WEIGHTS, Parts, judge
 from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.rendering.backend import check, open_renderer
+from aerialdojo_gen.rendering.backend import check, open_renderer, probe_scene
 from aerialdojo_gen.rendering.casters import ray_caster
-from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.scenes.model import Instance
 

@@ -56,8 +56,8 @@ def test_what_stands_behind_a_wall_is_not_drawn():
         matrices = [view_pose(pose[:3], yaw, "front") for yaw in (0.0, np.pi)]
         clips = np.stack([clip_from_world(camera, m, NEAR_M, FAR_M) for m in matrices])
         nearness = np.zeros((2, 128, 128), np.float32)
-        seen = [c.seen(clips, pose[:3], 128, 128, nearness) for c in renderer.bodies()._cullings]
-        ahead, behind = (sum(len(kind[v]) // 3 for kind in seen) for v in (0, 1))
+        visible = [c.visible_indices(clips, pose[:3], 128, 128, nearness) for c in renderer.bodies()._cullings]
+        ahead, behind = (sum(len(kind[v]) // 3 for kind in visible) for v in (0, 1))
         assert ahead < 40, "but for pixels on the seam of the wall's triangles"
         assert behind > 100
         rgb, depth_m = draw_bodies(renderer, camera, pose[None], ["front"])

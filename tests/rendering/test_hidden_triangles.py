@@ -21,14 +21,15 @@ def chosen(renderer, camera, poses, tiles):
     eye = np.ascontiguousarray(poses[0][:3, 3])
     none = Tiles.empty(len(poses), camera.width, camera.height)
     found = [
-        d.kind.chunks.seen(clips, eye, tiles or none, tiles is not None and d.kind.hides) for d in renderer._sets
+        d.kind.chunks.visible_indices(clips, eye, tiles or none, tiles is not None and d.kind.hides)
+        for d in renderer._sets
     ]
     return clips, [[of_kind[v] for of_kind in found] for v in range(len(poses))]
 
 
-def count(seen):
+def count(visible):
     """Triangles of views."""
-    return sum(len(kind) // 3 for view in seen for kind in view)
+    return sum(len(kind) // 3 for view in visible for kind in view)
 
 
 def anywhere(world, n, seed):
@@ -45,10 +46,10 @@ def test_pictures_are_those_of_all_triangles(make, width, height, fov):
     with GlRenderer(world) as renderer:
         for poses in anywhere(world, 5, width):
             clips, every = chosen(renderer, camera, poses, None)
-            _, seen = chosen(renderer, camera, poses, Tiles.empty(4, width, height))
-            less, more = less + count(seen), more + count(every)
+            _, visible = chosen(renderer, camera, poses, Tiles.empty(4, width, height))
+            less, more = less + count(visible), more + count(every)
             for v, picture in enumerate(renderer.render_views(camera, poses)):
-                full = read_picture(renderer.draw_seen(camera, poses[v], clips[v], every[v]), camera, False)
+                full = read_picture(renderer.draw_triangles(camera, poses[v], clips[v], every[v]), camera, False)
                 assert np.array_equal(picture.depth_m, full.depth_m)
                 assert np.array_equal(picture.rgb, full.rgb)
     assert less <= more
@@ -86,10 +87,10 @@ def test_what_stands_behind_a_wall_is_not_drawn():
     camera = Camera(320, 320, 90.0)
     with GlRenderer(world) as renderer:
         poses = [view_pose((0.0, 0.0, 3.0), yaw, "front") for yaw in (0.0, np.pi)]
-        _, seen = chosen(renderer, camera, poses, Tiles.empty(2, 320, 320))
+        _, visible = chosen(renderer, camera, poses, Tiles.empty(2, 320, 320))
         _, every = chosen(renderer, camera, poses, None)
-        assert count(seen[:1]) < count(every[:1]) / 3, "but for the tiles on the seam of the wall's triangles"
-        assert count(seen[1:]) > 0.9 * count(every[1:]) > 100
+        assert count(visible[:1]) < count(every[:1]) / 3, "but for the tiles on the seam of the wall's triangles"
+        assert count(visible[1:]) > 0.9 * count(every[1:]) > 100
         picture = renderer.render(camera, poses[0])
         assert picture.depth_m[160, 160] == pytest.approx(10.0, abs=1e-3)
 

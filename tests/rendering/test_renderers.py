@@ -17,8 +17,13 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering import backend
-from aerialdojo_gen.rendering.backend import check, choose_renderer, kept_renderer, open_renderer
-from aerialdojo_gen.rendering.probe import probe_scene
+from aerialdojo_gen.rendering.backend import (
+    check_renderer,
+    choose_renderer,
+    open_renderer,
+    probe_scene,
+    scene_renderer,
+)
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
@@ -224,8 +229,8 @@ def wrong_renderer(fault):
     ],
 )
 def test_a_renderer_that_draws_what_is_not_there_is_refused(fault):
-    with wrong_renderer(fault)(probe_scene()) as renderer, pytest.raises(RenderError, match="is refused: "):
-        check(renderer)
+    with wrong_renderer(fault)(probe_scene()) as renderer, pytest.raises(RenderError, match="rejected: "):
+        check_renderer(renderer)
 
 
 def test_auto_passes_over_what_does_not_work_and_says_so(monkeypatch, fresh_choice):
@@ -248,7 +253,7 @@ def test_auto_takes_the_fast_one():
 
 
 def test_an_unknown_renderer_is_named():
-    with pytest.raises(RenderError, match="no renderer 'blender': it is one of gl, pybullet, or auto"):
+    with pytest.raises(RenderError, match="unknown renderer 'blender': one of gl, pybullet, or auto"):
         open_renderer(probe_scene(), "blender")
 
 
@@ -259,7 +264,7 @@ def test_every_thread_draws_by_itself(scene, opened):
     expected = opened("gl").render(CAMERA, pose).rgb
 
     def drawn():
-        return kept_renderer(scene, "gl").render(CAMERA, pose).rgb, kept_renderer(scene, "gl")
+        return scene_renderer(scene, "gl").render(CAMERA, pose).rgb, scene_renderer(scene, "gl")
 
     pictures, kept = [], []
     for _ in range(2):

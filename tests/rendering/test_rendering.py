@@ -9,7 +9,7 @@ from support.rendered import MATERIALS, block, courtyard
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.preview import contact_sheet, look_at
+from aerialdojo_gen.rendering.gallery import contact_sheet, look_at
 from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.rendering.world import RenderWorld, render_world
 from aerialdojo_gen.scenes.model import Material, Scene

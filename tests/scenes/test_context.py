@@ -20,11 +20,10 @@ from aerialdojo_gen.pipeline.stages.work.plan import _planner
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.rendering.backend import forget_renderers, kept_renderer
+from aerialdojo_gen.rendering.backend import close_renderers, probe_scene, scene_renderer
 from aerialdojo_gen.rendering.casters import ray_caster, triangle_caster
-from aerialdojo_gen.rendering.checks import Solid, kept_solid
+from aerialdojo_gen.rendering.checks import Solid, scene_solid
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
-from aerialdojo_gen.rendering.probe import probe_scene
 from aerialdojo_gen.rendering.raycast import RayRenderer, ray_renderer
 from aerialdojo_gen.rendering.world import RenderWorld, render_world
 from aerialdojo_gen.scenes.context import context_of, keep_scene, open_contexts, open_scene, release_scenes
@@ -111,8 +110,8 @@ def test_a_scene_and_all_that_is_built_on_it_are_gone_before_the_next_one_is_rea
         planner = _planner(place, PlanConfig(), 0.25)
         assert _planner(place, PlanConfig(), 0.25) is planner
         world = World.of(place, 0.25, 0.05)
-        made = (place, planner, world.collisions, world.rays, kept_solid(place), ray_renderer(place),
-                orthographic_pictures(place), render_world(place), kept_renderer(place, "pybullet"))  # fmt: skip
+        made = (place, planner, world.collisions, world.rays, scene_solid(place), ray_renderer(place),
+                orthographic_pictures(place), render_world(place), scene_renderer(place, "pybullet"))  # fmt: skip
         held += [weakref.ref(part) for part in made]
         del place, planner, world, made
     assert alive_while_reading == [[False] * 9 * k for k in range(4)]
@@ -121,7 +120,7 @@ def test_a_scene_and_all_that_is_built_on_it_are_gone_before_the_next_one_is_rea
 def test_one_embree_scene_and_one_fcl_world_for_all(meshes):
     place = open_scene(*meshes[0]).scene
     caster = triangle_caster(place)
-    for part in (ray_caster(place)._triangles, kept_solid(place)._caster, ray_renderer(place)._rays,
+    for part in (ray_caster(place)._triangles, scene_solid(place)._caster, ray_renderer(place)._rays,
                  orthographic_pictures(place)._rays):  # fmt: skip
         assert part is caster
     world = World.of(place, 0.25, 0.05)
@@ -143,7 +142,7 @@ def test_what_is_shared_answers_as_one_built_alone(meshes):
     for ours, alone in ((ray_caster(place), RayCaster(place)), (triangle_caster(place), RayCaster(place)._triangles)):
         for a, b in zip(ours.first_hit(origins, directions), alone.first_hit(origins, directions), strict=True):
             assert np.array_equal(a, b)
-    a, b = kept_solid(place), Solid(place)
+    a, b = scene_solid(place), Solid(place)
     assert np.array_equal(a.first_hit(origins[0], directions)[0], b.first_hit(origins[0], directions)[0])
     camera, pose = Camera(64, 64, 90.0), view_pose((-4.0, -3.0, 2.0), 0.6, "front")
     with RayRenderer(place) as alone:
@@ -163,16 +162,16 @@ def test_what_draws_is_closed_when_its_scene_goes(meshes):
     path, digest = meshes[0]
     place = open_scene(path, digest).scene
     world, client = render_world(place), render_world(place)._client
-    renderer = kept_renderer(place, "pybullet")
-    assert kept_renderer(place, "pybullet", anew=True) is not renderer
+    renderer = scene_renderer(place, "pybullet")
+    assert scene_renderer(place, "pybullet", reopen=True) is not renderer
     assert pybullet.isConnected(client)
     open_scene(*meshes[1])
     assert not pybullet.isConnected(client)
     assert isinstance(world, RenderWorld)
     again = context_of(place)
-    drawn = kept_renderer(place, "pybullet")
-    forget_renderers()
-    assert kept_renderer(place, "pybullet") is not drawn
+    drawn = scene_renderer(place, "pybullet")
+    close_renderers()
+    assert scene_renderer(place, "pybullet") is not drawn
     assert context_of(place) is again
 
 

@@ -11,7 +11,7 @@ from support.browser import chromium, errors, until
 from support.viewing import YARD, served
 
 from aerialdojo_gen.dataset.lookup import ReleasedScene
-from aerialdojo_gen.rendering.preview import look_at
+from aerialdojo_gen.rendering.gallery import look_at
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 pytestmark = pytest.mark.browser

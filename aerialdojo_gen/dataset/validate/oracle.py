@@ -16,7 +16,7 @@ from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, Unch
 from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.planning.flight_space import FlightSpace
-from aerialdojo_gen.rendering.sight import all_in_sight
+from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 
 # These faults make an episode fail too, and are reported by their own checks.

@@ -135,12 +135,12 @@ class AnchorService:
 
     def _render(self, position_m: Floats, yaw_rad: float) -> View:
         from aerialdojo_gen.pipeline.stages.work.reference_images import box_of, instance_map
-        from aerialdojo_gen.rendering.backend import kept_renderer
+        from aerialdojo_gen.rendering.backend import scene_renderer
         from aerialdojo_gen.rendering.casters import ray_caster
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
         pose = view_pose(position_m, yaw_rad, "front")
-        picture = kept_renderer(self.scene, self._pictures.renderer).render(camera, pose)
+        picture = scene_renderer(self.scene, self._pictures.renderer).render(camera, pose)
         rays = ray_caster(self.scene)
         shown = instance_map(rays, camera, pose)
         found, counts = np.unique(shown[shown >= 0], return_counts=True)

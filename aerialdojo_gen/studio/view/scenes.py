@@ -124,11 +124,11 @@ class SceneCache:
 
 
 def _picture(scene: Scene) -> bytes:
-    from aerialdojo_gen.rendering.backend import choose_renderer, kept_renderer
+    from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 
     low, high = scene.bounds
     centre, size = (low + high) / 2, float(np.hypot(*(high - low)[:2]))
     eye = np.array([centre[0] - 0.2 * size, centre[1] - 0.3 * size, low[2] + 0.4 * size])
     camera = Camera(_WIDTH_PX, _HEIGHT_PX, _FOV_DEG)
     pose = look_at_pose(eye, np.array([centre[0], centre[1], low[2] + 2.0]))
-    return encode_jpeg(kept_renderer(scene, choose_renderer().name).render(camera, pose).rgb, GALLERY_JPEG)
+    return encode_jpeg(scene_renderer(scene, choose_renderer().name).render(camera, pose).rgb, GALLERY_JPEG)

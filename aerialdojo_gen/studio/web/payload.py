@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.pictures import PAGE_JPEG, TEXTURE_PNG, encode_jpeg, encode_masked, encode_png
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.lighting import light_of
-from aerialdojo_gen.rendering.texels import reduced
+from aerialdojo_gen.rendering.texels import downscale
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 VERSION = 1
@@ -82,7 +82,7 @@ def _texture(material: Material) -> NDArray[np.uint8] | None:
     """Return the texture in a size that browsers support."""
     if material.texture is None or not material.atlas:
         return material.texture
-    return reduced(material.texture, _LARGEST_PX)
+    return downscale(material.texture, _LARGEST_PX)
 
 
 def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
@@ -134,7 +134,7 @@ def _png(body: _Body, material: Material) -> dict[str, int]:
     texture = _texture(material)
     assert texture is not None
     if material.mask is not None:
-        mask = reduced(np.where(material.mask, 255, 0).astype(np.uint8), _LARGEST_PX) >= 128
+        mask = downscale(np.where(material.mask, 255, 0).astype(np.uint8), _LARGEST_PX) >= 128
         return body.add(encode_masked(texture, mask, TEXTURE_PNG))
     if material.atlas and texture.size > _PNG_BYTES:
         return body.add(encode_jpeg(texture, PAGE_JPEG))

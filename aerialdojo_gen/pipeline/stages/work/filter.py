@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.sections import FilterConfig
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge, settings_of
-from aerialdojo_gen.rendering.sight import all_in_sight
+from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 

@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.pipeline.scoring.views import box_px, part_shares
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.rendering.backend import kept_renderer
+from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.store.schemas import REFERENCES
@@ -40,7 +40,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
     objects = job.read("objects").to_pylist()
     anchors = {row["object_id"]: row for row in job.read("anchors").to_pylist() if row["selected"]}
     scene = job.scene_model()
-    renderer, rays = kept_renderer(scene, config.renderer), ray_caster(scene)
+    renderer, rays = scene_renderer(scene, config.renderer), ray_caster(scene)
     index = {node: k for k, node in enumerate(rays.nodes)}
     camera = Camera(config.width, config.height, config.fov_deg)
     counts = {"no_anchor": 0, "not_in_view": 0}

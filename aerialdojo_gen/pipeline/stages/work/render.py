@@ -12,12 +12,12 @@ from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import BudgetSpent
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering import finished
-from aerialdojo_gen.rendering.backend import kept_renderer
-from aerialdojo_gen.rendering.checks import CONCERNS, FLAGS, kept_solid
+from aerialdojo_gen.rendering.backend import scene_renderer
+from aerialdojo_gen.rendering.checks import FLAGS, FLAGS_OF_MODALITY, scene_solid
 from aerialdojo_gen.rendering.codecs import CODEC
 from aerialdojo_gen.rendering.placement import places
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
-from aerialdojo_gen.rendering.sample import choose, tables
+from aerialdojo_gen.rendering.sample import choose_trajectories, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.files import sha256_of, size_of
@@ -33,7 +33,7 @@ def run(job: Job, config: RenderConfig) -> Output:
     Trajectories that lie there finished are not recorded again.
     """
     routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
-    mine = choose(routes.values(), config.limit, job.seed)[job.part :: job.parts]
+    mine = choose_trajectories(routes.values(), config.limit, job.seed)[job.part :: job.parts]
     mesh = job.read("scenes")["mesh_sha256"][0].as_py()
     recordings: list[dict[str, Any]] = []
     frames: list[dict[str, Any]] = []
@@ -46,7 +46,7 @@ def run(job: Job, config: RenderConfig) -> Output:
             if job.deadline is not None and time.time() >= job.deadline:
                 raise BudgetSpent(f"the budget was spent in {job.scene}")
             rows = _Trajectory(job.scene_model(), nav_id, poses, config).record(job.roots.data, folder, fingerprint)
-        job.files.extend([f"{folder}/{finished.NOTE}", *dict.fromkeys(row["path"] for row in rows)])
+        job.files.extend([f"{folder}/{finished.MANIFEST}", *dict.fromkeys(row["path"] for row in rows)])
         recordings += rows
         frames += _frame_rows(job.scene, nav_id, poses)
     counts = Counter(flag for row in recordings for flag in row["flags"])
@@ -75,7 +75,7 @@ class _Trajectory:
     def _views(self, here: Path) -> dict[str, set[str]]:
         """Record the views into a folder; returns their quality flags."""
         config = self.config
-        renderer, solid = kept_renderer(self.scene, config.renderer), kept_solid(self.scene)
+        renderer, solid = scene_renderer(self.scene, config.renderer), scene_solid(self.scene)
         flags = record_views(renderer, solid, config.views, self.poses, config, here)
         wrong = [view for view in config.views if flags[view]]
         if not wrong:
@@ -85,12 +85,12 @@ class _Trajectory:
             wrong = list(config.views)
         for file in {place.file for place in places(config) if place.view in wrong}:
             remove(here / file)
-        renderer = kept_renderer(self.scene, config.renderer, anew=True)
+        renderer = scene_renderer(self.scene, config.renderer, reopen=True)
         return flags | record_views(renderer, solid, wrong, self.poses, config, here)
 
     def _rows(self, here: Path, folder: str, flags: dict[str, set[str]]) -> list[dict[str, Any]]:
         config = self.config
-        renderer = kept_renderer(self.scene, config.renderer)
+        renderer = scene_renderer(self.scene, config.renderer)
         own = places(config)
         facts = {file: (size_of(here / file), sha256_of(here / file)) for file in {place.file for place in own}}
         return [
@@ -115,8 +115,8 @@ class _Trajectory:
                 "device": renderer.device,
                 "bytes": facts[place.file][0],
                 "sha256": facts[place.file][1],
-                "ok": not flags[place.view] & CONCERNS[place.modality],
-                "flags": [flag for flag in FLAGS if flag in flags[place.view] & CONCERNS[place.modality]],
+                "ok": not flags[place.view] & FLAGS_OF_MODALITY[place.modality],
+                "flags": [flag for flag in FLAGS if flag in flags[place.view] & FLAGS_OF_MODALITY[place.modality]],
             }
             for place in own
         ]
