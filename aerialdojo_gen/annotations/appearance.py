@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.scenes.claims import untrue
-from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.claims import false_claims
+from aerialdojo_gen.scenes.colours import colour_name, shown_colours
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
-from aerialdojo_gen.scenes.sampling import shown_colours
 
 # Colour words and the results of `colour_name` that each may stand for.
 SHADES: Mapping[str, frozenset[str]] = {
@@ -114,12 +113,12 @@ def false_phrases(
     """Yield the catalogue's phrases in a text that are false for its instance, or about hidden parts."""
     normalized = _normalize(text)
     for look in looks.get(instance.category, ()):
-        if f" {_normalize(look.say).strip()} " in normalized:
-            wrong = untrue(look, instance, materials)[:1]
+        if f" {_normalize(look.phrase).strip()} " in normalized:
+            wrong = false_claims(look, instance, materials)[:1]
             if not wrong and surface is not None and not surface.shows(look, instance):
                 wrong = ["that is under the ground or under water"]
             for claim in wrong:
-                yield f"{look.say!r} is not so of {instance.node}: {claim}"
+                yield f"{look.phrase!r} is not so of {instance.node}: {claim}"
 
 
 def false_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:

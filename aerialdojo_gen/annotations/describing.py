@@ -17,8 +17,7 @@ from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, place_of, words_of
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.catalogue_check import LEAST_TRUE
-from aerialdojo_gen.scenes.claims import true_looks
+from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 STAGE = "annotate-draft"
@@ -70,10 +69,10 @@ class Vocabulary:
     def looks(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
         looks = self._looks.get(instance.category, ())
-        true = true_looks(looks, instance, self.scene.materials)
-        visible = tuple(look.say for look in true if self._surface.shows(look, instance))
+        true = valid_looks(looks, instance, self.scene.materials)
+        visible = tuple(look.phrase for look in true if self._surface.shows(look, instance))
         new = tuple(say for say in visible if not repeats(say, instance))
-        return new if len(new) >= LEAST_TRUE else visible
+        return new if len(new) >= MIN_TRUE_LOOKS else visible
 
     def faults(self, instance: Instance, text: str) -> list[str]:
         """Return the false statements of a text about an instance's appearance."""

@@ -18,7 +18,7 @@ from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space, prefetch_flight_space
-from aerialdojo_gen.scenes.context import SEVERAL, forget_scene, hold_scenes
+from aerialdojo_gen.scenes.context import SEVERAL, hold_scenes, release_scene
 from aerialdojo_gen.store.root import Where, open_root
 
 _NONE = np.empty((0, 3))
@@ -94,7 +94,7 @@ class Flight:
             self._reader = None
         hold_scenes(self, 0)
         while self._opened:
-            forget_scene(self._opened.pop())
+            release_scene(self._opened.pop())
         self.__dict__.pop("space", None)
 
     def view(self) -> View | None:

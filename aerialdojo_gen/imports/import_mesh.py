@@ -26,9 +26,9 @@ from aerialdojo_gen.imports.surfaces import (
     ground_cover,
     ground_plane,
 )
+from aerialdojo_gen.scenes.colours import colour_words, shown_colours
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.scenes.sampling import colour_words, shown_colours
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.imports.map_tags import Tags, below_ground, colour, count, metres
 from aerialdojo_gen.imports.osm import Feature
-from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.materials import parse_colour
 

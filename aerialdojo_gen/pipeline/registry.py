@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from aerialdojo_gen.pipeline.stage import Stage
 from aerialdojo_gen.pipeline.stages import hooks
-from aerialdojo_gen.rendering.resolve_config import idle_renderers, renderer_choices, settle_renderer
+from aerialdojo_gen.rendering.resolve_config import renderer_choices, resolve_renderer, unused_renderers
 
 STAGES: tuple[Stage, ...] = (
     Stage(
@@ -41,9 +41,9 @@ STAGES: tuple[Stage, ...] = (
         "Render each object's picture from its selected anchor.",
         reads=("scenes", "objects", "anchors"),
         writes=("references",),
-        resolve_config=settle_renderer,
+        resolve_config=resolve_renderer,
         choices=renderer_choices,
-        idle=idle_renderers,
+        idle=unused_renderers,
         seconds=(1.0, 0.1),
     ),
     Stage(
@@ -94,9 +94,9 @@ STAGES: tuple[Stage, ...] = (
         reads=("scenes", "routes/train", "routes/test"),
         writes=("recordings", "frames"),
         parts=hooks.render_parts,
-        resolve_config=settle_renderer,
+        resolve_config=resolve_renderer,
         choices=renderer_choices,
-        idle=idle_renderers,
+        idle=unused_renderers,
         digests=("recordings", "path", "sha256"),
         seconds=(10.0, 0.0),
         barrier=True,

@@ -72,7 +72,6 @@ class CollisionWorld:
 
     def __init__(self, scene: Scene) -> None:
         self._instances = scene.instances
-        self._index = {instance.node: k for k, instance in enumerate(scene.instances)}
         self._boxes = np.array([i.bounds for i in scene.instances], np.float64).reshape(-1, 6)
         # A hierarchy takes milliseconds to build, and most instances are never near a route.
         self._objects: dict[int, fcl.CollisionObject] = {}
@@ -134,12 +133,6 @@ class CollisionWorld:
         data = fcl.DistanceData()
         self._manager.distance(sphere, data, fcl.defaultDistanceCallback)
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M
-
-    def instance_distance_m(self, node: str, p: ArrayLike) -> float:
-        """Distance, metres, from a point to the surface of one instance."""
-        sphere = self._sphere(p, _POINT_RADIUS_M)
-        distance = fcl.distance(sphere, self._object(self._index[node]), self._distances)
-        return max(float(distance), 0.0) + _POINT_RADIUS_M
 
     def route_in_collision(self, points: Sequence[ArrayLike] | NDArray[np.float64], radius_m: float) -> bool:
         """Whether a ball that follows a polyline (n, 3), world metres, touches a surface."""

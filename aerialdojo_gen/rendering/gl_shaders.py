@@ -126,7 +126,7 @@ void main() {
     base = texel.rgb * 255.0;
 #endif
 #ifdef MASK
-    // At a distance the smaller sizes' alpha is a mean: less is asked for there, or trees lose their leaves.
+    // Mipmaps average alpha: a lower threshold at a distance, or trees would lose their leaves.
     if (texel.a < 0.5 - 0.2 * clamp(textureQueryLod(textures, v_uv).y / 4.0, 0.0, 1.0)) discard;
 #endif
 #ifdef BACKDROP

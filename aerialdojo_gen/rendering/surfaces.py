@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.colours import texel
 from aerialdojo_gen.scenes.model import Material, Part, Scene
-from aerialdojo_gen.scenes.sampling import texel
 
 # Edges longer than this are halved, metres.
 _LONGEST_EDGE_M = 10.0

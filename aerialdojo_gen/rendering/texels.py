@@ -13,9 +13,9 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.scenes.colours import texel
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Material, Part, Scene
-from aerialdojo_gen.scenes.sampling import texel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

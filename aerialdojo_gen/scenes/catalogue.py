@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, moved
+from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
@@ -69,10 +69,7 @@ class Catalogue:
         roles: Mapping[str, str] | None = None,
         attributes: Mapping[str, str] | None = None,
     ) -> Instance:
-        """Make an instance of a category at a position (world metres).
-
-        Variant, parameters and builders draw from `rng` in file order.
-        """
+        """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order."""
         prop = self[category]
         look = self._draw_variant(prop, variant, rng)
         sizes = self._draw_params(prop, look, params or {}, rng)
@@ -81,7 +78,7 @@ class Catalogue:
         refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
         words = dict(look.attributes) | dict(attributes or {})
         if prop.builder is not None:
-            made = self._built(prop, prop.builder, sizes, surfaces, rng)
+            assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
             key = (category, look.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
@@ -89,17 +86,17 @@ class Catalogue:
                 if len(self._parts) >= _CACHE_SIZE:
                     self._parts.clear()
                 self._parts[key] = self._assembled(prop, look, sizes, surfaces, words, shape_seed)
-            made = self._parts[key]
-        there, kept = _placed(made.parts, position, yaw_deg, scale)
-        if not there:
+            assembly = self._parts[key]
+        placed_parts, kept_faces = _placed(assembly.parts, position, yaw_deg, scale)
+        if not placed_parts:
             raise AssetError(f"{prop.source}: no triangle of variant {look.name!r} has an area")
         anatomy = None
         if prop.front:
             yaw = math.radians(yaw_deg)
             fronts = tuple(float(wrap_angle_rad(yaw + math.radians(side))) for side in FRONTS[prop.front])
-            tells = tuple(dict.fromkeys((*prop.tells, *look.tells)))
-            anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, tells, moved(made.runs, kept))
-        return Instance(node, category, look.name, words, there, anatomy)
+            identifying = tuple(dict.fromkeys((*prop.identifying_parts, *look.identifying_parts)))
+            anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, identifying, remap_runs(assembly.runs, kept_faces))
+        return Instance(node, category, look.name, words, placed_parts, anatomy)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -115,7 +112,7 @@ class Catalogue:
         for name, ends in prop.params.items():
             low, high = look.params.get(name, ends)
             drawn = float(rng.uniform(low, high)) if low < high else low
-            # Centimetres: no eye sees less, and equal sizes share their geometry.
+            # Rounded to centimetres, so that equal sizes share their geometry.
             out[name] = float(fixed[name]) if name in fixed else round(drawn, 2) if low < high else low
         return out
 
@@ -142,7 +139,7 @@ class Catalogue:
             meshes.append(_Piece(part["role"], body, tags_of(part), copies))
         total = sum(len(piece.body.faces) for piece in meshes)
         if total > MAX_TRIANGLES:
-            raise AssetError(f"{prop.source} has {total:,} triangles, {MAX_TRIANGLES:,} are the most")
+            raise AssetError(f"{prop.source} has {total:,} triangles, the maximum is {MAX_TRIANGLES:,}")
         return self._textured(prop, meshes, surfaces)
 
     def _built(
@@ -180,7 +177,7 @@ class Catalogue:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A part of a prop before it has its material: so many copies of a shape."""
+    """A part of a prop without its material: copies of a shape."""
 
     role: str
     body: Mesh
@@ -190,7 +187,7 @@ class _Piece:
 
 @dataclass(frozen=True, eq=False)
 class _Assembly:
-    """A prop in its own frame, and which faces are which of its parts."""
+    """A prop in its own frame, with its named parts."""
 
     parts: tuple[Part, ...]
     runs: Mapping[str, tuple[Run, ...]]
@@ -199,25 +196,25 @@ class _Assembly:
 def placed(
     parts: Sequence[Part], position: Sequence[float], yaw_deg: float = 0.0, scale: float = 1.0
 ) -> tuple[Part, ...]:
-    """Scale, turn and move parts into the world, rounded to what float32 holds."""
+    """Scale, turn and move parts into the world, rounded to float32."""
     return _placed(parts, position, yaw_deg, scale)[0]
 
 
 def _placed(
     parts: Sequence[Part], position: Sequence[float], yaw_deg: float, scale: float
 ) -> tuple[tuple[Part, ...], list[NDArray[np.bool_]]]:
-    """The placed parts, and which faces of each of the old ones are left."""
+    """The placed parts, and which faces of each original part are kept."""
     turn = rotation(0.0, 0.0, yaw_deg).T
     offset = np.asarray(position, dtype=np.float64)
-    out, kept = [], []
+    out, kept_faces = [], []
     for p in parts:
         vertices = single(p.vertices * scale @ turn + offset)
         # Far from the origin float32 may flatten a sliver to nothing.
         solid = areas(vertices, p.faces) > 0.0
-        kept.append(solid)
+        kept_faces.append(solid)
         if solid.any():
             out.append(Part(vertices, p.faces[solid], p.uv * np.float32(scale), p.material))
-    return tuple(out), kept
+    return tuple(out), kept_faces
 
 
 def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -226,18 +223,15 @@ def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def load_catalogue(folder: Path) -> Catalogue:
-    """Read a `scene_assets` folder: `materials.toml` and the files of `catalogue_files`.
-
-    A process reads it once, as long as no file changes.
-    """
-    return _load(folder, tuple(_state(path) for path in (folder / _MATERIALS, *catalogue_files(folder))))
+    """Read a `scene_assets` folder: `materials.toml` and `catalogue_files`; cached while no file changes."""
+    return _load(folder, tuple(_file_state(path) for path in (folder / _MATERIALS, *catalogue_files(folder))))
 
 
-def _state(path: Path) -> tuple[str, int, int, int]:
+def _file_state(path: Path) -> tuple[str, int, int, int]:
     try:
         status = path.stat()
     except OSError:
-        return path.name, 0, 0, 0  # who reads it says what is wrong
+        return path.name, 0, 0, 0  # reading it raises the error
     return path.name, status.st_ino, status.st_size, status.st_mtime_ns
 
 
@@ -248,6 +242,6 @@ def _load(folder: Path, files: tuple[tuple[str, int, int, int], ...]) -> Catalog
     for path in catalogue_files(folder):
         for name, body in read_toml(path).items():
             if name in categories:
-                raise AssetError(f"{path}: [{name}] stands already in {categories[name].source.partition(':')[0]}")
+                raise AssetError(f"{path}: [{name}] is already in {categories[name].source.partition(':')[0]}")
             categories[name] = parse_category(path, name, body, materials, path.parent.name == TARGETS)
     return Catalogue(categories, materials)

@@ -1,10 +1,10 @@
-"""Where the catalogue's files lie; by itself, so that who asks only for that loads no geometry."""
+"""Paths of the catalogue's files; a module of its own, so that listing them loads no geometry."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-# What tasks may ask for, what they are told from, and what else a place is full of.
+# Target categories, landmarks for descriptions, and scenery.
 TARGETS = "props"
 FOLDERS = ("landmarks", TARGETS, "scenery")
 

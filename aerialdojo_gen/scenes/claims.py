@@ -1,4 +1,4 @@
-"""Whether a phrase is true of an instance: its claims, measured on the mesh."""
+"""Verification of a phrase's claims about an instance, measured on its mesh."""
 
 from __future__ import annotations
 
@@ -10,20 +10,24 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.looks import Comparison, Look, Order
 from aerialdojo_gen.scenes.model import Instance, Material
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Copies whose middles are nearer than this are one: a part in the plane of symmetry is mirrored onto itself.
+# Copies with centres nearer than this count once: a part in the plane of symmetry is mirrored onto itself.
 _SAME_PLACE_M = 0.02
 _FEW_DIRECTIONS, _ROUND_SHARE, _BOXY_SHARE = 6, 0.8, 0.9
 _FLAT, _SLENDER, _TAPERING, _POINTED = 0.2, 3.5, 0.8, 1 / 3
 _SLOPE_COS = (0.15, 0.95)
 _SLOPING_SHARE = 0.2
 _END = 0.1
+
+
+# Descriptions need a choice: with fewer phrases true of an instance, all of its kind would read alike.
+MIN_TRUE_LOOKS = 2
 
 
 class Materials(Protocol):
@@ -34,15 +38,15 @@ class Materials(Protocol):
         ...
 
 
-def untrue(look: Look, instance: Instance, materials: Materials) -> list[str]:
+def false_claims(look: Look, instance: Instance, materials: Materials) -> list[str]:
     """List the claims of a phrase that do not hold of an instance."""
     if instance.anatomy is None:
-        return ["nothing is known of its parts"]
-    return Body(instance, materials).untrue(look)
+        return ["its parts are unknown"]
+    return Body(instance, materials).false_claims(look)
 
 
 class Body:
-    """An instance's mesh in its own frame, as claims ask of it."""
+    """Measurements of an instance's mesh in its own frame."""
 
     def __init__(self, instance: Instance, materials: Materials) -> None:
         assert instance.anatomy is not None
@@ -55,7 +59,7 @@ class Body:
         counts = instance.face_counts
         self._part_of = np.repeat(np.arange(len(counts)), counts)
 
-    def untrue(self, look: Look) -> list[str]:
+    def false_claims(self, look: Look) -> list[str]:
         """List the claims of a phrase that do not hold."""
         wrong = [f"has no {name}" for name in look.parts if not len(self._instance.faces_of(name))]
         wrong += [f"has {name}" for name in look.lacks if len(self._instance.faces_of(name))]
@@ -74,12 +78,12 @@ class Body:
         for name, words in look.material.items():
             found = self._shown(name, lambda m: m.name.partition(":")[0])
             wrong += [] if found in words else [f"its {name} is of {found}"]
-        wrong += [f"{c.text} is not so" for c in look.size if not self._compares(c)]
-        wrong += [f"{o.text} is not so" for o in look.order if not self._ordered(o)]
+        wrong += [f"{c.text} is false" for c in look.size if not self._compares(c)]
+        wrong += [f"{o.text} is false" for o in look.order if not self._ordered(o)]
         return wrong
 
     def count(self, name: str) -> int:
-        """Number of copies of a part, those at the same place counted once."""
+        """Number of copies of a part; copies at the same place count once."""
         middles = np.array([self._box(faces).mean(axis=0) for faces in self._instance.copies_of(name)])
         return len(np.unique(np.round(middles / _SAME_PLACE_M), axis=0)) if len(middles) else 0
 
@@ -126,14 +130,14 @@ class Body:
         return _RELATIONS[order.relation](a, self._box(self._instance.faces_of(order.other)))
 
     def extents(self, faces: Ints) -> Floats:
-        """Extents of faces along their principal axes, (3,) float64, metres, the least first."""
+        """Extents of faces along their principal axes, (3,) float64, metres, ascending."""
         points = np.unique(np.round(self._vertices[self._faces[faces]].reshape(-1, 3), 4), axis=0)
         axes = np.linalg.eigh(np.cov(points.T))[1] if len(points) > 3 else np.eye(3)
         along = (points - points.mean(axis=0)) @ axes
         return np.sort(np.ptp(along, axis=0))
 
     def few_directions(self, faces: Ints) -> float:
-        """Share of the faces' area that the six directions that face most of it hold."""
+        """Share of the faces' area with one of the six most common normals."""
         size = self._areas[faces]
         solid = size > 0
         towards = np.round(self._cross[faces][solid] / (2.0 * size[solid, None]) * 8.0)
@@ -195,9 +199,9 @@ _PLACES: Mapping[str, _Boxes] = {
 }
 
 
-def true_looks(looks: Iterable[Look], instance: Instance, materials: Materials) -> tuple[Look, ...]:
-    """Those phrases that hold of an instance; see `untrue`."""
+def valid_looks(looks: Iterable[Look], instance: Instance, materials: Materials) -> tuple[Look, ...]:
+    """Phrases without false claims about an instance."""
     if instance.anatomy is None:
         return ()
     body = Body(instance, materials)
-    return tuple(look for look in looks if not body.untrue(look))
+    return tuple(look for look in looks if not body.false_claims(look))

@@ -1,9 +1,8 @@
-"""One context a scene: its mesh, and what is built on it, shared by all who work on the scene in a process.
+"""One context per scene: its mesh and what is built on it, shared within a process.
 
 A ray caster, a collision world, a clearance grid or a renderer takes tens of megabytes and seconds to build. Each is
-a part of the scene's context: made when it is first asked for, and gone when the context is. Contexts are found by
-the mesh's digest, few are kept, and the oldest goes before the next scene is read, so that memory stays that of so
-many scenes however many are worked on. One more is read ahead where somebody asks for that.
+a part of the scene's context, built on first use and released with it. Contexts are cached by the mesh's digest; the
+oldest is evicted before the next scene is read, which bounds memory. One more can be prefetched.
 """
 
 from __future__ import annotations
@@ -20,96 +19,96 @@ from aerialdojo_gen.scenes.model import Scene
 
 _T = TypeVar("_T")
 
-# For who goes back and forth between scenes: environments, people. A scene takes up to about 200 MB.
+# For environments and viewers, which switch between scenes. A scene takes up to about 200 MB.
 SEVERAL = 3
-# A scene that was made in memory comes beside the one that is worked on.
-_BESIDE = 2
+# A scene made in memory is kept in addition to the current one.
+_KEEP_IN_MEMORY = 2
 
-# Of which contexts there are. Each has a lock of its own for its parts: what is made of a scene that is read ahead
-# keeps nobody from the scene that is worked on. Nobody asks for a context's lock who holds this one.
+# Guards the tables below. Each context has a lock of its own for its parts, so that prefetching does not block the
+# current scene; it is never acquired while this one is held.
 _lock = threading.RLock()
 _contexts: OrderedDict[Hashable, SceneContext] = OrderedDict()
-_ahead: dict[str, SceneContext] = {}
+_prefetched: dict[str, SceneContext] = {}
 _holders: WeakKeyDictionary[object, int] = WeakKeyDictionary()
 
 
 class SceneContext:
-    """A scene, and what is built on it."""
+    """A scene and what is built on it."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        # Making a part may ask for another one.
+        # Reentrant: building a part may need another one.
         self._lock = threading.RLock()
         self._parts: dict[str, tuple[tuple[Hashable, ...], Any]] = {}
 
-    def part(self, kind: str, make: Callable[[], _T], *given: Hashable) -> _T:
-        """Return a part, made by the first who asks; who asks meanwhile waits for it."""
+    def part(self, kind: str, make: Callable[[], _T], *key: Hashable) -> _T:
+        """Return a part, built by the first caller; concurrent callers wait for it."""
         with self._lock:
-            known = self._parts.get(kind)
-            if known is None or known[0] != given:
+            cached = self._parts.get(kind)
+            if cached is None or cached[0] != key:
                 self.drop(kind)
-                known = self._parts[kind] = (given, make())
-            part: _T = known[1]
+                cached = self._parts[kind] = (key, make())
+            part: _T = cached[1]
             return part
 
     def drop(self, kind: str) -> None:
-        """Let go of a part, where there is one."""
+        """Release a part, if it was built."""
         with self._lock:
             _, part = self._parts.pop(kind, ((), None))
             if hasattr(part, "close"):
                 part.close()
 
     def release(self) -> None:
-        """Let go of all parts; who asks again gets new ones."""
+        """Release all parts; they are built again on the next use."""
         with self._lock:
             while self._parts:
                 self.drop(next(reversed(self._parts)))
 
 
 def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
-    """Return the context of a scene's mesh; it is read where it is not among those kept."""
+    """Return the context of a scene's mesh, read unless cached."""
     with _lock:
-        context = _contexts.pop(sha256, None) or _ahead.pop(sha256, None)
-        gone = _oldest_beyond(max(keep, *_holders.values(), 1) - 1)
+        context = _contexts.pop(sha256, None) or _prefetched.pop(sha256, None)
+        evicted = _evict(max(keep, *_holders.values(), 1) - 1)
         if context is not None:
             _contexts[sha256] = context
-    _release(gone)
+    _release(evicted)
     if context is not None:
         return context
     with _lock:
-        # Somebody else may have read it meanwhile.
+        # Another thread may have read it meanwhile.
         context = _contexts.get(sha256) or SceneContext(read_glb(mesh, sha256))
-        # Of a file without a digest nothing tells whether it is the same the next time.
+        # A file without a digest may have changed the next time.
         _contexts[sha256 or id(context.scene)] = context
         return context
 
 
 def keep_scene(scene: Scene, sha256: str) -> None:
-    """Keep a scene that was just written to a mesh, in the place of others: `open_scene` need not read it."""
+    """Cache a scene that was just written to a mesh: `open_scene` need not read it."""
     with _lock:
         if sha256 in _contexts:
             return
-        gone = _oldest_beyond(max((*_holders.values(), 1)) - 1)
+        evicted = _evict(max((*_holders.values(), 1)) - 1)
         _contexts[sha256] = SceneContext(scene)
-    _release(gone)
+    _release(evicted)
 
 
 def prefetch_mesh(mesh: Path, sha256: str, make: Callable[[SceneContext], object]) -> None:
-    """Read a scene and build on it, in a thread beside the work on another one; `open_scene` takes it from there.
+    """Read a scene and build on it in a background thread, for `open_scene`.
 
-    No other scene goes for it: only who works on a scene lets go of what draws it, in the thread that drew.
+    It evicts no other scene: a renderer must be released in the thread that drew with it.
     """
     with _lock:
-        if sha256 in _contexts or sha256 in _ahead:
+        if sha256 in _contexts or sha256 in _prefetched:
             return
     context = SceneContext(read_glb(mesh, sha256))
     with _lock:
-        _ahead[sha256] = context
+        _prefetched[sha256] = context
     make(context)
 
 
 def hold_scenes(owner: object, number: int) -> None:
-    """Keep so many scenes at least as long as the owner lives, whoever opens another one; 0 for no such wish."""
+    """Keep at least so many scenes while the owner lives; 0 withdraws the request."""
     with _lock:
         if number:
             _holders[owner] = number
@@ -117,11 +116,11 @@ def hold_scenes(owner: object, number: int) -> None:
             _holders.pop(owner, None)
 
 
-def forget_scene(sha256: str) -> None:
-    """Let go of a scene, where it is kept or was read ahead."""
+def release_scene(sha256: str) -> None:
+    """Release a scene, cached or prefetched."""
     with _lock:
-        gone = [context for kept in (_contexts, _ahead) if (context := kept.pop(sha256, None))]
-    _release(gone)
+        evicted = [context for kept in (_contexts, _prefetched) if (context := kept.pop(sha256, None))]
+    _release(evicted)
 
 
 def context_of(scene: Scene) -> SceneContext:
@@ -131,36 +130,36 @@ def context_of(scene: Scene) -> SceneContext:
             if context.scene is scene:
                 _contexts.move_to_end(key)
                 return context
-        for context in _ahead.values():
+        for context in _prefetched.values():
             if context.scene is scene:
                 return context
-        gone = _oldest_beyond(max(_BESIDE, *_holders.values(), 1) - 1)
-        # The context holds the scene, so that nothing else gets its id as long as this stands.
+        evicted = _evict(max(_KEEP_IN_MEMORY, *_holders.values(), 1) - 1)
+        # The context holds the scene, so its id stays unique while cached.
         context = _contexts[id(scene)] = SceneContext(scene)
-    _release(gone)
+    _release(evicted)
     return context
 
 
 def open_contexts() -> tuple[SceneContext, ...]:
-    """Those that are kept, the one last asked for at the end."""
+    """Cached contexts, the most recently used last."""
     with _lock:
         return tuple(_contexts.values())
 
 
 def release_scenes() -> None:
-    """Let go of all scenes."""
+    """Release all scenes."""
     with _lock:
-        gone = [*_oldest_beyond(0), *_ahead.values()]
-        _ahead.clear()
-    _release(gone)
+        evicted = [*_evict(0), *_prefetched.values()]
+        _prefetched.clear()
+    _release(evicted)
 
 
-def _oldest_beyond(number: int) -> list[SceneContext]:
-    """Take out those that are more than so many; to be released when the lock is let go."""
+def _evict(number: int) -> list[SceneContext]:
+    """Remove the oldest contexts beyond a number; to be released after the lock."""
     return [_contexts.popitem(last=False)[1] for _ in range(len(_contexts) - number)]
 
 
 def _release(contexts: list[SceneContext]) -> None:
-    """Let go of them one by one, so that none of them is left when the next scene is read."""
+    """Release contexts one by one, so that none is left when the next scene is read."""
     while contexts:
         contexts.pop(0).release()

@@ -31,7 +31,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
     "tan": lambda d: math.tan(math.radians(d)), "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
 }  # fmt: skip
-# Least and most arguments of those that do not take one.
+# Minimum and maximum number of arguments, where it is not one.
 _ARITY = {"min": (2, 99), "max": (2, 99), "round": (1, 2), "atan2": (2, 2)}
 _CONSTANTS = {"pi": math.pi}
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.scenes.anatomy import read_anatomy
+from aerialdojo_gen.scenes.anatomy import parse_anatomy
 from aerialdojo_gen.scenes.glb_materials import linear_colours, material_entry, read_material, srgb_colours
 from aerialdojo_gen.scenes.model import SURFACES, Instance, Material, Part, Scene
 
@@ -70,13 +70,13 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
     path : Path
         The file.
     sha256 : str
-        What its bytes must have, hexadecimal: ``mesh_sha256`` of the scene's row. Not asked for where empty.
+        Expected digest, hexadecimal: ``mesh_sha256`` of the scene's row. Not checked where empty.
 
     Raises
     ------
     AssetError
-        The file is missing, cut short, no scene of this program (other meshes come in through ``add-scene``), or not
-        the one that is asked for.
+        The file is missing, cut short, not a scene of this program (import other meshes by ``add-scene``), or has
+        another digest.
     """
     try:
         raw = path.read_bytes()
@@ -161,7 +161,7 @@ class _Writer:
             "variant": instance.variant,
             "attributes": instance.attributes,
             **({"surface": instance.surface} if instance.surface else {}),
-            **({} if instance.anatomy is None else {"anatomy": instance.anatomy.document()}),
+            **({} if instance.anatomy is None else {"anatomy": instance.anatomy.to_json()}),
         }
         self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
         self._meshes.append({"primitives": primitives})
@@ -232,7 +232,7 @@ def _chunks(whole: bytes) -> tuple[dict[str, Any], memoryview]:
 
 
 def _check(scene: Scene) -> None:
-    """Raise ValueError for values that no scene has: what reads as JSON may still say anything."""
+    """Raise ValueError for values that no scene has, though they are valid JSON."""
     if not scene.instances:
         raise ValueError("a scene shows at least one instance")
     shown = (*scene.instances, *scene.backdrop)
@@ -277,7 +277,7 @@ def _read_instance(
                 raise ValueError("as many colours as vertices")
         parts.append(Part(v, faces, uv.astype(np.float32), materials[primitive["material"]], colours))
     extras = node["extras"]
-    anatomy = read_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
+    anatomy = parse_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
     words = dict(extras["attributes"])
     return Instance(
         node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy, extras.get("surface", "")

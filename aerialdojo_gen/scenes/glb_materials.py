@@ -1,4 +1,4 @@
-"""Materials and vertex colours in a scene's GLB: what glTF says of them, both ways."""
+"""Materials and vertex colours of a scene's GLB, to glTF and back."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> 
     source = entry["pbrMetallicRoughness"].get("baseColorTexture")
     if source is not None:
         file = image(source["index"])
-        # A kilobyte can ask for a gigabyte of pixels, and whatever is a picture would be decoded.
+        # A kilobyte can declare a gigabyte of pixels: check the size before decoding.
         head, size = bytes(file[:8]), image_size(file)
         stored_as_jpeg = head.startswith(b"\xff\xd8\xff")
         if not (stored_as_jpeg or head == b"\x89PNG\r\n\x1a\n") or size is None:
@@ -65,7 +65,7 @@ def read_material(entry: dict[str, Any], image: Callable[[int], memoryview]) -> 
         if entry.get("alphaMode") == "MASK":
             texture, mask = decode_masked(file)
         else:
-            # As it is stored: cameras write how they were held, which is no matter of texture coordinates.
+            # As stored: EXIF orientation does not apply to texture coordinates.
             texture = decode_as_stored(file) if stored_as_jpeg else decode_rgb(file)
         jpeg = bytes(file) if atlas and stored_as_jpeg else b""
         if texture is None or texture.ndim != 3 or max(texture.shape[:2]) > _LARGEST_TEXTURE_PX:
@@ -92,19 +92,19 @@ def _png(material: Material) -> bytes:
 
 
 def linear_colours(colours: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Turn vertex colours (n, 3) into what glTF stores of them, (n, 4): linear, of 65,535."""
+    """Convert vertex colours (n, 3) to glTF's (n, 4): linear, 0-65,535."""
     out = np.full((len(colours), 4), 65535, dtype="<u2")
     out[:, :3] = _TABLE[colours]
     return out
 
 
 def srgb_colours(stored: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """Turn what `linear_colours` made back into vertex colours, exactly."""
+    """Invert `linear_colours`, exactly."""
     return np.asarray(_INVERSE[stored[:, :3]])
 
 
 def _linear(channel: int) -> float:
-    """Turn an sRGB channel, 0-255, into the linear factor that glTF wants, 0-1."""
+    """Convert an sRGB channel, 0-255, to glTF's linear factor, 0-1."""
     c = channel / 255.0
     return round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 6)
 

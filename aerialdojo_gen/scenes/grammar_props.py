@@ -1,4 +1,4 @@
-"""Grammar of layouts: props put where they are to stand, of the variant that is rarest so far."""
+"""Grammar of layouts: placement of props, always of the variant used least so far."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from aerialdojo_gen.scenes.site import Site
 
 
 def next_variant(site: Site, category: str) -> str | None:
-    """Name the variant of a category that stands least often on the site so far; None where it has none."""
+    """Name the variant of a category used least on the site so far; None where it has none."""
     names = [v.name for v in site.catalogue[category].variants]
     used = Counter(i.variant for i in site.instances if i.category == category)
     return min(names, key=lambda n: (used[n], names.index(n)), default=None)
@@ -21,7 +21,7 @@ def next_variant(site: Site, category: str) -> str | None:
 def deal(
     site: Site, categories: Sequence[str], poses: Sequence[Pose], place: str = "", **options: Any
 ) -> list[Instance]:
-    """Set out props, a pose each and the categories in turn, always the variant that is rarest so far."""
+    """Place props at poses, cycling through the categories, always of the variant used least so far."""
     out: list[Instance] = []
     for pose in poses:
         category = categories[len(out) % len(categories)]
@@ -37,6 +37,6 @@ def deal(
 def put(
     site: Site, category: str, x: float, y: float, yaw_deg: float = 0.0, place: str = "", **options: Any
 ) -> Instance:
-    """Place a prop as `Site.place` does, of the variant that is rarest so far unless one is asked for."""
+    """Place a prop as of `Site.place`, by default of the variant used least so far."""
     options.setdefault("variant", next_variant(site, category))
     return site.place(category, x, y, yaw_deg, attributes={"place": place} if place else None, **options)

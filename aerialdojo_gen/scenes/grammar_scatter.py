@@ -72,7 +72,7 @@ def place_along(
     """Set a prop in the middle of every stretch of `spacing_m` (fence panels, hedges, rails), turned with the path.
 
     The stretches are shortened or lengthened to fit each straight leg; legs shorter than half a stretch stay empty.
-    A panel that runs along its own y axis wants ``turn_deg=90``.
+    A panel along its own y axis needs ``turn_deg=90``.
     """
     points = [*path, path[0]] if closed else list(path)
     out = []
@@ -162,8 +162,8 @@ def _room(
         for b in range(max(j - reach, 0), min(j + reach + 1, cells.shape[1])):
             k = cells[a, b]
             while k >= 0:
-                u, v, apart = x - discs[k, 0], y - discs[k, 1], max(own, discs[k, 2])
-                if u * u + v * v < apart * apart:
+                u, v, gap = x - discs[k, 0], y - discs[k, 1], max(own, discs[k, 2])
+                if u * u + v * v < gap * gap:
                     return False
                 k = after[k]
     return True

@@ -32,7 +32,7 @@ class Surface:
     """A painted area."""
 
     area: BaseGeometry  # World frame, metres
-    material: str  # What it shows
+    material: str
     rise_m: float = 0.0  # Height over the terrain, metres: a pavement's 0.12, say; its edge becomes a kerb
     edge: str = "concrete"  # Material of that kerb
 
@@ -64,7 +64,7 @@ def ground_meshes(
 
 
 def visible_surfaces(extent: Polygon, base: str, surfaces: Sequence[Surface]) -> list[Surface]:
-    """Work out what is seen of every surface: disjoint areas that cover the extent."""
+    """Compute the visible part of every surface: disjoint areas that cover the extent."""
     groups = [Surface(extent, base)]
     for (material, rise, edge), members in groupby(surfaces, lambda s: (s.material, s.rise_m, s.edge)):
         union = shapely.unary_union([_snapped(m.area) for m in members])
@@ -131,7 +131,7 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
         flat, whose, cut_faces = triangulate_all([piece for some in seen for piece in some])
         tile = np.repeat(cut, [len(some) for some in seen])
         z = np.empty(len(flat))
-        # Product by product: the scenes' digests hang on how a processor rounds one of this size.
+        # Product by product: the scenes' digests depend on the processor's rounding of this product.
         for k, some in zip(
             tile.tolist(), np.split(np.arange(len(flat)), np.flatnonzero(np.diff(whose)) + 1), strict=True
         ):

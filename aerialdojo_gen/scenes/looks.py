@@ -1,4 +1,4 @@
-"""What may be said of how a category looks, and what each phrase claims of the mesh."""
+"""Phrases about a category's appearance, and what each claims of the mesh."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
-from aerialdojo_gen.scenes.colour_names import COLOURS
+from aerialdojo_gen.scenes.colours import COLOURS
 
 FORMS = ("round", "boxy", "flat", "slender", "tapering", "pointed", "sloping", "upright", "level")
 MEASURES = ("length", "width", "height")
@@ -28,19 +28,19 @@ _ORDER = re.compile(
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measure of the body, or of a part, against a number or ``factor`` times another measure; metres."""
+    """A measure of the body or a part, compared with a number or ``factor`` times another measure; metres."""
 
     part: str  # Empty for the whole body
     measure: str  # One of `MEASURES`
     greater: bool  # Whether it must be the greater of the two
-    factor: float  # The number, or what the other measure is multiplied with
-    other: tuple[str, str] | None  # (str, str) or None; part and measure that it is held against
+    factor: float  # The number, or the factor of the other measure
+    other: tuple[str, str] | None  # (str, str) or None; part and measure compared with
     text: str  # As it was written
 
 
 @dataclass(frozen=True)
 class Order:
-    """Where a part is: relative to another one, or in the body."""
+    """Position of a part: relative to another one, or in the body."""
 
     part: str
     relation: str  # One of `RELATIONS`, or of `PLACES`
@@ -50,9 +50,9 @@ class Order:
 
 @dataclass(frozen=True)
 class Look:
-    """A phrase, and what it claims."""
+    """A phrase and its claims."""
 
-    say: str  # A noun phrase that follows "with" or "it has"
+    phrase: str  # A noun phrase that follows "with" or "it has"
     has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
     lacks: tuple[str, ...] = ()
     count: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # Copies of a part
@@ -64,7 +64,7 @@ class Look:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """All parts that it speaks of and that must be there."""
+        """All parts that its claims require."""
         ordered = [name for o in self.order for name in (o.part, o.other) if name]
         sized = [name for c in self.size for name in (c.part, c.other[0] if c.other else "") if name]
         return tuple(
@@ -73,14 +73,14 @@ class Look:
 
 
 def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where: str) -> tuple[Look, ...]:
-    """Read a category's looks."""
+    """Parse a category's looks."""
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
     looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
-    said = [look.say for look in looks]
-    for k, say in enumerate(said):
-        if say in said[:k]:
-            raise AssetError(f"{where} looks[{k}]: {say!r} stands twice")
+    phrases = [look.phrase for look in looks]
+    for k, phrase in enumerate(phrases):
+        if phrase in phrases[:k]:
+            raise AssetError(f"{where} looks[{k}]: duplicate phrase {phrase!r}")
     return looks
 
 

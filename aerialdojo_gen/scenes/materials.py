@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.base import safe_parse
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Material
-from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
+from aerialdojo_gen.scenes.noise import balanced
+from aerialdojo_gen.scenes.textures_built import BUILT
+from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _KEYS = {"texture", "colour", "tile_m"}
@@ -19,7 +25,7 @@ _SMALLEST_TILE_M, _LARGEST_TILE_M = 0.01, 1000.0
 
 
 class MaterialLibrary:
-    """The surfaces of `materials.toml`, made when first asked for.
+    """The surfaces of `materials.toml`, made on first use.
 
     A material's specification is a name (``"brick"``), a name with a colour (``"brick:#8a4b3c"``) or a bare colour
     (``"#8a4b3c"``).
@@ -28,7 +34,7 @@ class MaterialLibrary:
     def __init__(self, entries: dict[str, tuple[str | None, str, float]], source: str) -> None:
         self._entries = entries
         self._source = source
-        self._made: dict[str, Material] = {}
+        self._cache: dict[str, Material] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -46,15 +52,15 @@ class MaterialLibrary:
 
     def __getitem__(self, spec: str) -> Material:
         """Make or look up the material of a specification; its name is the specification."""
-        if spec not in self._made:
+        if spec not in self._cache:
             self.check(spec, "material")
             name, _, colour = spec.partition(":")
             texture, default, tile_m = self._entries.get(name, (None, spec, 1.0))
             rgb = parse_colour(colour or default)
             image = None if texture is None else make_texture(texture, rgb)
             mean = rgb if image is None else tuple(int(c) for c in image.reshape(-1, 3).mean(axis=0).round())
-            self._made[spec] = Material(spec, (mean[0], mean[1], mean[2]), image, tile_m)
-        return self._made[spec]
+            self._cache[spec] = Material(spec, (mean[0], mean[1], mean[2]), image, tile_m)
+        return self._cache[spec]
 
     def tile_m(self, spec: str) -> float:
         """Edge of a texture tile of a material, metres; 1 for a flat colour."""
@@ -99,3 +105,18 @@ def read_toml(path: Path) -> dict[str, Any]:
         return safe_parse.read_toml(path, AssetError)
     except FileNotFoundError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+TEXTURES = {**NATURAL, **BUILT}
+
+
+@lru_cache(maxsize=256)
+def make_texture(name: str, colour: tuple[int, int, int]) -> NDArray[np.uint8]:
+    """Draw one of `TEXTURES` in a base colour: (H, W, 3) uint8 sRGB, 64 to 256 pixels a side, seamless, read-only."""
+    base = np.array(colour, dtype=np.float64)
+    image = TEXTURES[name](base)
+    if name in NATURAL:
+        image = balanced(image, base)
+    out = np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    out.flags.writeable = False
+    return out

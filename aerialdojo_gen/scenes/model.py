@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.anatomy import Anatomy
 
-# Closed; open and there from both sides; open and the ground, which nobody flies below; behind everything.
+# Closed body; open sheet, solid from both sides; open ground, below which no body flies; backdrop.
 SURFACES = ("solid", "sheet", "ground", "dome")
 
 
@@ -26,15 +26,15 @@ class Material:
     colour: tuple[int, int, int]  # sRGB, 0-255; for a textured material the texture's mean colour
     texture: NDArray[np.uint8] | None = None  # sRGB tile, repeated over the surface; row 0 is the top (v = 1)
     tile_m: float = 1.0  # Edge of one texture tile in metres; UVs are metres divided by it
-    mask: NDArray[np.bool_] | None = None  # Where the texture is there, of its size; None where it is everywhere
+    mask: NDArray[np.bool_] | None = None  # Opaque texels, of the texture's size; None for all
     atlas: bool = False
-    double_sided: bool = False  # Whether its triangles are there from both sides; else from the front alone
+    double_sided: bool = False  # Whether its triangles are visible from both sides
     unlit: bool = False
     jpeg: bytes = b""
 
     @property
     def foreign(self) -> bool:
-        """Whether it is drawn as only a foreign mesh's materials are."""
+        """Whether it has properties that only imported materials have."""
         return self.atlas or self.double_sided or self.unlit or self.mask is not None
 
 
@@ -51,14 +51,14 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """A named thing that stands in the scene, in world coordinates."""
+    """A named object of the scene, in world coordinates."""
 
     node: str  # Unique in the scene and stable between builds, e.g. ``"delivery_van_003"``
     category: str
     variant: str  # Name of the catalogue's variant, empty if it has none
-    attributes: dict[str, str]  # What a description may speak of, e.g. ``{"colour": "red", "state": "open"}``
+    attributes: dict[str, str]  # For descriptions, e.g. ``{"colour": "red", "state": "open"}``
     parts: tuple[Part, ...]  # At least one, none of them empty
-    anatomy: Anatomy | None = None  # Its fronts and named parts, where its catalogue says them
+    anatomy: Anatomy | None = None  # Its fronts and named parts, if its catalogue has them
     surface: str = ""
 
     @property
@@ -110,16 +110,16 @@ class Scene:
     bounds: NDArray[np.float64]  # (2, 3) float64
     sky: tuple[int, int, int] = (150, 190, 230)  # sRGB of the sky, 0-255
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)  # Unit vector from the scene towards the sun, world frame
-    imported: bool = False  # Whether it comes from a mesh of another make, whose categories are its own
+    imported: bool = False  # Whether it is an imported mesh, with categories of its own
     backdrop: tuple[Instance, ...] = ()
-    attribution: str = ""  # Whose data it is made of, and under which licence; empty for what is this program's own
+    attribution: str = ""  # Source and licence of imported data
     _by_node: dict[str, Instance] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Index the instances and refuse a node name that stands twice."""
+        """Index the instances; ValueError for a duplicate node name."""
         for instance in (*self.instances, *self.backdrop):
             if instance.node in self._by_node:
-                raise ValueError(f"scene {self.name}: node {instance.node!r} stands twice")
+                raise ValueError(f"scene {self.name}: duplicate node {instance.node!r}")
             self._by_node[instance.node] = instance
         for instance in self.backdrop:
             del self._by_node[instance.node]
@@ -135,7 +135,7 @@ class Scene:
         return sum(len(p.faces) for i in self.instances for p in i.parts)
 
     def __contains__(self, node: object) -> bool:
-        """Whether an instance of that node name stands in the scene."""
+        """Whether the scene has an instance of that node name."""
         return node in self._by_node
 
     def __getitem__(self, node: str) -> Instance:

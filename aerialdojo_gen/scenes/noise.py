@@ -88,7 +88,7 @@ def leaves(image: Floats, name: str, count: int, length_px: tuple[float, float],
 
 
 def balanced(image: Floats, colour: Floats) -> Floats:
-    """Scale an image so that its mean is the colour: a surface seen from afar keeps the tint asked for."""
+    """Scale an image so that its mean is the colour, also when seen from afar."""
     return np.asarray(image * (colour / np.maximum(image.mean(axis=(0, 1)), 1.0)))
 
 

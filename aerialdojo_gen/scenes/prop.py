@@ -20,13 +20,13 @@ Range = tuple[float, float]
 _CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells")
 _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "tells")
 _MIRRORS = ("x", "y", "xy")
-_MOST_PARTS = 1000
-_LARGEST = 10_000.0
+_MAX_PARTS = 1000
+_MAX_VALUE = 10_000.0
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A named look of a category: what differs from the default."""
+    """A variant of a category: its differences from the default."""
 
     name: str
     attributes: Mapping[str, str]
@@ -34,15 +34,15 @@ class Variant:
     params: Mapping[str, Range]
     without: frozenset[str]
     weight: float
-    tells: tuple[str, ...] = ()
+    identifying_parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Category:
-    """A kind of thing that scenes are furnished with."""
+    """A category of props."""
 
     category: str  # Its key, e.g. ``"delivery_van"``
-    name: str  # What a person says, e.g. ``"delivery van"``
+    name: str  # Common noun, e.g. ``"delivery van"``
     kind: str  # One of `KINDS`
     looks: tuple[Look, ...]
     params: Mapping[str, Range]  # Sizes drawn once an instance; a fixed one has low == high
@@ -53,7 +53,7 @@ class Category:
     source: str  # File and category, for messages
     target: bool = True  # Whether tasks may ask for it: false of landmarks and of scenery
     front: str = ""
-    tells: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
+    identifying_parts: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
@@ -91,12 +91,12 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
         raise AssetError(f"{where}: parts must be an array of tables, [[{category}.parts]]")
     for k, part in enumerate(parts):
         _check_part(part, params, roles, materials, f"{where} parts[{k}]")
-    if len(parts) > _MOST_PARTS:
-        raise AssetError(f"{where}: {len(parts):,} parts, {_MOST_PARTS} are the most")
+    if len(parts) > _MAX_PARTS:
+        raise AssetError(f"{where}: {len(parts):,} parts, the maximum is {_MAX_PARTS}")
     tags = {tag for p in parts for tag in tags_of(p)}
     named = sorted({*tags, *roles, *(p["role"] for p in parts)})
     looks = parse_looks(body.get("looks", []), named, materials.names, where)
-    tells = _tells(body.get("tells", []), named, where)
+    identifying_parts = _identifying_parts(body.get("tells", []), named, where)
     raw = body.get("variants", [])
     if not isinstance(raw, list):
         raise AssetError(f"{where}: variants must be an array of tables, [[{category}.variants]]")
@@ -104,7 +104,7 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
     for k, v in enumerate(raw):
         variants.append(_variant(v, params, roles, tags, named, materials, f"{where} variants[{k}]"))
         if variants[-1].name in {x.name for x in variants[:-1]}:
-            raise AssetError(f"{where} variants[{k}]: variant {variants[-1].name!r} stands twice")
+            raise AssetError(f"{where} variants[{k}]: duplicate variant {variants[-1].name!r}")
     if not variants:
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
     return Category(
@@ -120,7 +120,7 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
         where,
         target,
         front,
-        tells,
+        identifying_parts,
     )
 
 
@@ -130,7 +130,7 @@ def tags_of(part: Mapping[str, Any]) -> tuple[str, ...]:
     return (tag,) if isinstance(tag, str) else tuple(tag)
 
 
-def _tells(raw: Any, named: Sequence[str], where: str) -> tuple[str, ...]:
+def _identifying_parts(raw: Any, named: Sequence[str], where: str) -> tuple[str, ...]:
     if not isinstance(raw, list) or not all(isinstance(name, str) for name in raw):
         raise AssetError(f"{where}: tells must be a list of parts, got {raw!r}")
     for name in raw:
@@ -206,8 +206,10 @@ def _variant(
     if not isinstance(weight, int | float) or weight <= 0:
         raise AssetError(f"{where}: weight must be a positive number, got {weight!r}")
     own_roles = _roles(body.get("roles", {}), roles, materials, f"{where} roles")
-    tells = _tells(body.get("tells", []), named, where)
-    return Variant(body["name"], attributes, own_roles, own_params, frozenset(without), float(weight), tells)
+    identifying_parts = _identifying_parts(body.get("tells", []), named, where)
+    return Variant(
+        body["name"], attributes, own_roles, own_params, frozenset(without), float(weight), identifying_parts
+    )
 
 
 def _params(body: Any, where: str) -> dict[str, Range]:
@@ -218,8 +220,8 @@ def _params(body: Any, where: str) -> dict[str, Range]:
         ends = value if isinstance(value, list) else [value, value]
         if len(ends) != 2 or not all(isinstance(v, int | float) for v in ends) or ends[0] > ends[1]:
             raise AssetError(f"{where}: {key} must be a number or [low, high], got {value!r}")
-        if not -_LARGEST <= ends[0] <= ends[1] <= _LARGEST:
-            raise AssetError(f"{where}: {key} must lie within {_LARGEST:,.0f}, got {value!r}")
+        if not -_MAX_VALUE <= ends[0] <= ends[1] <= _MAX_VALUE:
+            raise AssetError(f"{where}: {key} must lie within {_MAX_VALUE:,.0f}, got {value!r}")
         out[key] = (float(ends[0]), float(ends[1]))
     return out
 

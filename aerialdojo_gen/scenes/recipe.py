@@ -15,7 +15,7 @@ from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
 # Of a layout's parameters: metres, degrees and counts all stay far below.
-_LARGEST, _MOST_ENTRIES, _LONGEST = 2000.0, 1000, 200
+_MAX_VALUE, _MAX_ENTRIES, _MAX_TEXT = 2000.0, 1000, 200
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 # Ground is cut into cells of a metre or so: larger sites than this take gigabytes, and more than a drone can fly.
 Extent = Annotated[float, Field(ge=2, le=1000)]
@@ -48,18 +48,18 @@ class Level(BaseModel):
 
 
 class Move(BaseModel):
-    """How far one node stands from where its layout puts it."""
+    """Displacement of one node from where its layout places it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     by_m: tuple[Place, Place] = (0.0, 0.0)  # World frame, metres; what stands on the ground keeps its height above it
     up_m: Place = 0.0  # Upwards, metres
     turn_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0  # Counter-clockwise, about its origin
-    place: Annotated[str, Field(min_length=1, max_length=_LONGEST)] | None = None
+    place: Annotated[str, Field(min_length=1, max_length=_MAX_TEXT)] | None = None
 
 
 class Origin(BaseModel):
-    """Where the origin of a real place's scene lies."""
+    """Geographic position of the origin of a real place's scene."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -71,7 +71,7 @@ class Origin(BaseModel):
 
 
 class Recipe(BaseModel):
-    """What a scene is made from."""
+    """Recipe of a scene."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -108,7 +108,7 @@ class Cut(BaseModel):
 
 
 class Imported(BaseModel):
-    """Where a scene comes from that ``add-scene`` made of a mesh, and what may still be set of it."""
+    """Source and settings of a scene that ``add-scene`` imported from a mesh."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -131,7 +131,7 @@ def load_imported(path: Path) -> Imported | None:
     if "imported" not in body:
         return None
     if set(body) != {"imported"} or not isinstance(body["imported"], dict):
-        raise AssetError(f"{path}: a scene is imported or has a layout: nothing may stand beside [imported]")
+        raise AssetError(f"{path}: a scene is imported or has a layout: remove all other keys than [imported]")
     return validated(Imported, body["imported"], f"{path}: imported")
 
 
@@ -144,21 +144,21 @@ def load_recipe(path: Path) -> Recipe:
 
 
 def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
-    """Hold whatever a layout takes against bounds, before it becomes a count of things, a length or an array."""
+    """Check a layout's parameters against general bounds, before they become counts, lengths or arrays."""
     where = f"{path}: parameters: {brief('.'.join(keys))}"
     if isinstance(value, dict | list):
-        if len(value) > _MOST_ENTRIES:
-            raise AssetError(f"{where} has {len(value):,} entries, {_MOST_ENTRIES:,} are the most")
+        if len(value) > _MAX_ENTRIES:
+            raise AssetError(f"{where} has {len(value):,} entries, the maximum is {_MAX_ENTRIES:,}")
         for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
             _check_parameters(inner, (*keys, str(key)), path)
-    elif isinstance(value, int | float) and abs(value) > _LARGEST:
-        raise AssetError(f"{where} must lie within {_LARGEST:,.0f}, got {value:g}")
-    elif isinstance(value, str) and len(value) > _LONGEST:
-        raise AssetError(f"{where} has {len(value):,} characters, {_LONGEST} are the most")
+    elif isinstance(value, int | float) and abs(value) > _MAX_VALUE:
+        raise AssetError(f"{where} must lie within {_MAX_VALUE:,.0f}, got {value:g}")
+    elif isinstance(value, str) and len(value) > _MAX_TEXT:
+        raise AssetError(f"{where} has {len(value):,} characters, the maximum is {_MAX_TEXT}")
 
 
 def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
-    """Check a table against its model, a number a number; an `AssetError` says what is wrong at which key."""
+    """Validate a table strictly against its model; an `AssetError` names the key."""
     try:
         # As JSON, because only there a list is a strict tuple: "nan" and false are numbers to a lenient model.
         return model.model_validate_json(pydantic_core.to_json(body), strict=True)

@@ -188,7 +188,7 @@ def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
 
 
 def number(key: str, value: Any) -> float:
-    """Hold a shape's number, metres or a fraction, against its bounds."""
+    """Check a shape's number, metres or a fraction, against its bounds."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         raise ShapeError(f"{key} must be a number, got {str(value)[:40]!r}")
     held = float(value)
@@ -198,14 +198,14 @@ def number(key: str, value: Any) -> float:
 
 
 def whole(key: str, value: Any, low: int, high: int) -> int:
-    """Hold a count that makes vertices against its bounds; expressions give floats, whose fraction is cut."""
+    """Check a count against its bounds; expressions give floats, which are truncated."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not low <= value < high + 1:
         raise ShapeError(f"{key} must be {low} to {high}, got {str(value)[:40]}")
     return int(value)
 
 
 def rows_of(key: str, rows: Any, width: int, least: int = 2) -> list[tuple[float, ...]]:
-    """Hold a shape's list of points against its bounds."""
+    """Check a shape's list of points against its bounds."""
     if isinstance(rows, str | dict) or not hasattr(rows, "__len__") or not least <= len(rows) <= MAX_POINTS:
         raise ShapeError(f"{key} must be {least} to {MAX_POINTS:,} points")
     return [_numbers(key, row, width) for row in rows]

@@ -1,20 +1,19 @@
-"""A scene under construction: what layouts place things on."""
+"""A scene under construction, on which layouts place things, and the footprints of what was placed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely.geometry import Point
+from shapely.geometry import MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
-from aerialdojo_gen.scenes.footprints import Footprints, disc, footprint
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
@@ -23,7 +22,7 @@ from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
 # The largest scene of the dataset has 479.
-_MOST_NODES = 5_000
+_MAX_NODES = 5_000
 
 
 class Site:
@@ -40,7 +39,7 @@ class Site:
         self.instances: list[Instance] = []
         self._counts: dict[str, int] = {}
         self._nodes: set[str] = set()
-        self._met: set[str] = set()
+        self._moved_nodes: set[str] = set()
         self._footprints = Footprints()
         self._terrain = flat_terrain(recipe.size_m)
         self._base = "grass"
@@ -90,7 +89,7 @@ class Site:
         """Height of the painted ground at a point, metres."""
         z = self._terrain.at(x, y)
         for surface in reversed(self._surfaces):
-            # Hundreds of lane marks are painted: their boxes are cheaper to ask than their areas.
+            # Hundreds of lane marks are painted: test their boxes first.
             x0, y0, x1, y1 = surface.bounds
             if x0 <= x <= x1 and y0 <= y <= y1 and shapely.contains_xy(surface.area, x, y):
                 return z + surface.rise_m
@@ -118,7 +117,7 @@ class Site:
 
         On the ground unless `z` is given.
         """
-        name = self._claim(node or self.node(category))
+        name = self._reserve_node(node or self.node(category))
         base = self.ground_z(x, y) if z is None else z
         instance = self.catalogue.instantiate(
             category,
@@ -135,7 +134,7 @@ class Site:
         if solid:
             self._footprints.add(footprint(instance, base), base, float(instance.bounds[1, 2]))
         options = {"variant": variant, "scale": scale, "params": params, "roles": roles, "attributes": attributes}
-        self.instances.append(self._moved(category, name, (x, y, base), yaw_deg, options) or instance)
+        self.instances.append(self._at_moved_pose(category, name, (x, y, base), yaw_deg, options) or instance)
         return instance
 
     def try_place(self, category: str, x: float, y: float, yaw_deg: float = 0.0, **options: Any) -> Instance | None:
@@ -152,35 +151,37 @@ class Site:
         if not (self.extent.contains(area) and self._footprints.is_free(area, base, float(instance.bounds[1, 2]))):
             self._counts = before
             return None
-        self._claim(name)
+        self._reserve_node(name)
         if options.get("solid", True):
             self._footprints.add(area, base, float(instance.bounds[1, 2]))
-        self.instances.append(self._moved(category, name, (x, y, base), yaw_deg, trial) or instance)
+        self.instances.append(self._at_moved_pose(category, name, (x, y, base), yaw_deg, trial) or instance)
         return instance
 
-    def _moved(
+    def _at_moved_pose(
         self, category: str, node: str, at: tuple[float, float, float], yaw_deg: float, options: Mapping[str, Any]
     ) -> Instance | None:
         """Instantiate a prop where the recipe moves it to; None where it is not moved.
 
-        It keeps the ground that the layout gave it, so that all that is placed after it stays where it is.
+        Its original footprint stays occupied, so that everything placed later keeps its place.
         """
         move = self.recipe.moves.get(node)
         if move is None:
             return None
         x, y, z = at
-        there = (x + move.by_m[0], y + move.by_m[1])
+        target = (x + move.by_m[0], y + move.by_m[1])
         above = z - self.ground_z(x, y)
         if above < 0.0:
-            # Let into a slope: only as deep as the new one asks for.
-            ring = [self.ground_z(there[0] + u, there[1] + v) for u, v in ((0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5))]
-            above = max(above, min((min(ring) - self.ground_z(*there)) / 2.0, 0.0))
-        base = self.ground_z(*there) + above
-        self._met.add(node)
+            # Sunk into a slope: only as deep as the new slope requires.
+            ring = [
+                self.ground_z(target[0] + u, target[1] + v) for u, v in ((0.5, 0), (0, 0.5), (-0.5, 0), (0, -0.5))
+            ]
+            above = max(above, min((min(ring) - self.ground_z(*target)) / 2.0, 0.0))
+        base = self.ground_z(*target) + above
+        self._moved_nodes.add(node)
         if move.place is not None:
             options = {**options, "attributes": {**(options.get("attributes") or {}), "place": move.place}}
         return self.catalogue.instantiate(
-            category, node, self.rng_for("prop", node), (*there, base + move.up_m), yaw_deg + move.turn_deg,
+            category, node, self.rng_for("prop", node), (*target, base + move.up_m), yaw_deg + move.turn_deg,
             **options,
         )  # fmt: skip
 
@@ -194,11 +195,8 @@ class Site:
         variant: str = "",
         footprint: BaseGeometry | None = None,
     ) -> Instance:
-        """Add structure made by the layout.
-
-        Parts in world metres, the ground that it takes, and what a description may say.
-        """
-        name = self._claim(node or self.node(category))
+        """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
+        name = self._reserve_node(node or self.node(category))
         instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
@@ -215,7 +213,7 @@ class Site:
     # Room
 
     def occupy(self, area: BaseGeometry, z0_m: float = -100.0, z1_m: float = 1000.0) -> None:
-        """Take an area, over all heights by default: nothing that asks `is_free` is put there."""
+        """Occupy an area, over all heights by default."""
         self._footprints.add(area, z0_m, z1_m)
 
     def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
@@ -226,9 +224,9 @@ class Site:
 
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
-        unmet = next((node for node in self.recipe.moves if node not in self._met), None)
-        if unmet is not None:
-            raise AssetError(f"{self.name}: moves: no prop {unmet!r} is placed{nearest(unmet, self._nodes)}")
+        missing = next((node for node in self.recipe.moves if node not in self._moved_nodes), None)
+        if missing is not None:
+            raise AssetError(f"{self.name}: moves: no prop {missing!r} is placed{nearest(missing, self._nodes)}")
         ground = self._ground()
         instances = (ground, *self.instances)
         specs = sorted({p.material for i in instances for p in i.parts})
@@ -242,7 +240,7 @@ class Site:
     def _ground(self) -> Instance:
         meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)
         parts = placed(self._as_parts(meshes), (0, 0, 0))
-        return Instance(self._claim("ground"), "ground", "", {}, parts)
+        return Instance(self._reserve_node("ground"), "ground", "", {}, parts)
 
     def _as_parts(self, parts: Sequence[Part | tuple[str, Mesh]]) -> tuple[Part, ...]:
         by_material: dict[str, list[Mesh]] = {}
@@ -254,10 +252,55 @@ class Site:
                 by_material.setdefault(part[0], []).append(part[1])
         return (*done, *(self.part(merge(m), spec) for spec, m in by_material.items()))
 
-    def _claim(self, node: str) -> str:
+    def _reserve_node(self, node: str) -> str:
         if node in self._nodes:
-            raise AssetError(f"{self.name}: node {node!r} stands twice; choose another name")
-        if len(self._nodes) >= _MOST_NODES:
-            raise AssetError(f"{self.name}: more than {_MOST_NODES:,} things stand in the scene")
+            raise AssetError(f"{self.name}: node {node!r} exists already; choose another name")
+        if len(self._nodes) >= _MAX_NODES:
+            raise AssetError(f"{self.name}: more than {_MAX_NODES:,} instances in the scene")
         self._nodes.add(node)
         return node
+
+
+_CELL_M = 10.0
+# Parts higher than this above a prop's base (a tree's crown, a lamp's arm) have no footprint.
+_REACH_M = 2.5
+
+
+class Footprints:
+    """Occupied areas, each over a range of heights, in a grid of buckets."""
+
+    def __init__(self) -> None:
+        self._buckets: dict[tuple[int, int], list[tuple[BaseGeometry, float, float]]] = {}
+
+    def add(self, area: BaseGeometry, z0_m: float, z1_m: float) -> None:
+        """Occupy an area (world frame) between two heights, metres."""
+        shapely.prepare(area)
+        for cell in _cells(area.bounds):
+            self._buckets.setdefault(cell, []).append((area, z0_m, z1_m))
+
+    def is_free(self, area: BaseGeometry, z0_m: float, z1_m: float) -> bool:
+        """Whether the area is unoccupied between two heights, metres."""
+        for cell in _cells(area.bounds):
+            for taken, low, high in self._buckets.get(cell, ()):
+                if low < z1_m and high > z0_m and taken.intersects(area):
+                    return False
+        return True
+
+
+def footprint(instance: Instance, base_z_m: float) -> BaseGeometry:
+    """Outline on the ground: the convex hull of what is less than 2.5 m above `base_z_m`, or of all if nothing is."""
+    v = instance.vertices
+    low = v[v[:, 2] < base_z_m + _REACH_M]
+    return MultiPoint((low if len(low) else v)[:, :2]).convex_hull
+
+
+def disc(x: float, y: float, radius_m: float) -> BaseGeometry:
+    """Round area about a point."""
+    return Point(x, y).buffer(radius_m, quad_segs=4)
+
+
+def _cells(bounds: tuple[float, float, float, float]) -> Iterator[tuple[int, int]]:
+    x0, y0, x1, y1 = (int(b // _CELL_M) for b in bounds)
+    for i in range(x0, x1 + 1):
+        for j in range(y0, y1 + 1):
+            yield i, j

@@ -1,4 +1,4 @@
-"""A scene's mesh from a data root."""
+"""Meshes of a data root."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.root import DataRoot, Where, is_outside, open_root
 
 
-def mesh_copy(where: Where, told: str) -> Path:
-    """Return the mesh that a row of `scenes` names, on this machine."""
+def mesh_copy(where: Where, mesh_path: str) -> Path:
+    """Return the local copy of a release's mesh; FileNotFoundError where it is missing."""
     root = open_root(where)
-    if is_outside(root, told):
-        raise AssetError(f"release/scenes: mesh_path {told!r} leads out of {root}")
-    path = root.local_copy(told)
+    if is_outside(root, mesh_path):
+        raise AssetError(f"release/scenes: mesh_path {mesh_path!r} leads out of {root}")
+    path = root.local_copy(mesh_path)
     if not path.is_file():
         raise FileNotFoundError(2, os.strerror(2), str(path))
     return path
 
 
 def mesh_file(data: DataRoot, relative: str) -> Path:
-    """Return the mesh that a row of `scenes` names, on this machine."""
+    """Return the local copy of a built scene's mesh; an `AssetError` names the command that makes it."""
     try:
         return data.local_copy(relative)
     except FileNotFoundError:

@@ -39,7 +39,7 @@ class Terrain:
         return np.where(u >= v, below, above)
 
     def at(self, x: float, y: float) -> float:
-        """Height at one point: what `z` says of it, without arrays."""
+        """Height at one point, as of `z` without arrays."""
         rows, columns = (n - 1 for n in self.heights_m.shape)
         u = min(max((float(x) - self.x0_m) / self.cell_m, 0.0), float(columns))
         v = min(max((float(y) - self.y0_m) / self.cell_m, 0.0), float(rows))

@@ -1,4 +1,4 @@
-"""Textures of masonry, paving, roofs, metal, cloth and façades; see `aerialdojo_gen.scenes.textures`."""
+"""Textures of masonry, paving, roofs, metal, cloth and façades; see `aerialdojo_gen.scenes.materials`."""
 
 from __future__ import annotations
 

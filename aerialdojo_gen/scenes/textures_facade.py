@@ -1,4 +1,4 @@
-"""Textures of façades: rows of windows, curtain walls, shopfronts; see `aerialdojo_gen.scenes.textures`."""
+"""Textures of façades: rows of windows, curtain walls, shopfronts; see `aerialdojo_gen.scenes.materials`."""
 
 from __future__ import annotations
 

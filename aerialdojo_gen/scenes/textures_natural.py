@@ -1,4 +1,4 @@
-"""Textures of ground, plants, rock, wood and water; see `aerialdojo_gen.scenes.textures`."""
+"""Textures of ground, plants, rock, wood and water; see `aerialdojo_gen.scenes.materials`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values that a recipe gives a layout: coordinates, lengths and lines, each within limits of its own.
+"""Types of a layout's parameters: coordinates, lengths and lines, each with its limits.
 
 What becomes a coordinate, a length or an array is bounded here, so that no layout has to ask whether a path has a
 length or a hill a radius.
@@ -32,7 +32,7 @@ def _line(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float],
         raise ValueError("a line needs two points or more")
     legs = [math.dist(a, b) for a, b in pairwise(points)]
     if min(legs) < _SHORTEST_M:
-        raise ValueError(f"points of a line must lie {_SHORTEST_M:g} m apart or more, one from the next")
+        raise ValueError(f"consecutive points of a line must be at least {_SHORTEST_M:g} m from each other")
     if sum(legs) > _LONGEST_M:
         raise ValueError(f"a line may be {_LONGEST_M:,.0f} m long, this is {sum(legs):,.0f} m")
     return points
@@ -48,7 +48,7 @@ def _crest(points: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float,
     return points
 
 
-def _apart(step: tuple[float, float, float]) -> tuple[float, float, float]:
+def _separated(step: tuple[float, float, float]) -> tuple[float, float, float]:
     if step[1] - step[0] < _SHORTEST_M:
         raise ValueError(f"a step ends {_SHORTEST_M:g} m or more beyond where it begins")
     return step
@@ -80,5 +80,5 @@ Stretch = Annotated[tuple[Metres, Metres, Metres, Metres, Length], AfterValidato
 Crest = Annotated[tuple[tuple[Metres, Metres, Annotated[float, Field(ge=0, le=500)]], ...],
                   Field(min_length=1, max_length=1000), AfterValidator(_crest)]  # fmt: skip
 """A line of points x, y, z, or a peak alone, metres."""
-Step = Annotated[tuple[Metres, Metres, Rise], AfterValidator(_apart)]
+Step = Annotated[tuple[Metres, Metres, Rise], AfterValidator(_separated)]
 """From and to, distances from a line, and the rise between them, metres."""

@@ -1,4 +1,4 @@
-"""The shape vocabulary of props: which shapes there are, what keys they take, and how parts are repeated."""
+"""The shape vocabulary of props: shapes, their keys, and how parts are repeated."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ MAX_TRIANGLES = 300_000
 
 
 def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
-    """List a shape's own keys: those it must have, and all of them."""
+    """List a shape's required keys, and all its keys."""
     parameters = inspect.signature(SHAPES[shape]).parameters
     required = frozenset(n for n, p in parameters.items() if p.default is inspect.Parameter.empty)
     return required, frozenset(parameters)
 
 
 def names_used(part: Mapping[str, Any]) -> frozenset[str]:
-    """List the parameters that a part's expressions speak of; `ShapeError` for what is no expression."""
+    """List the parameters used in a part's expressions; `ShapeError` for what is no expression."""
     shape = part["shape"]
     found: set[str] = set()
     for key, value in part.items():
@@ -75,7 +75,7 @@ def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mappin
 
 
 def copies_in(part: Mapping[str, Any], names: Mapping[str, float]) -> int:
-    """How many copies of its shape `part_mesh` makes of a part, each of as many faces, one after the other."""
+    """Number of copies that `part_mesh` makes of a part, consecutive and of equally many faces."""
     count = 2 ** len(part.get("mirror", ""))
     for table, keys in (("array", ("count", "count2")), ("ring", ("count",))):
         for key in keys:
@@ -118,7 +118,7 @@ def _count(value: Any, names: Mapping[str, float], triangles: int) -> int:
     if not 1 <= count <= _MAX_COPIES:
         raise ShapeError(f"count must be 1 to {_MAX_COPIES}, got {count}")
     if count * triangles > MAX_TRIANGLES:
-        raise ShapeError(f"count {count} makes {count * triangles:,} triangles, {MAX_TRIANGLES:,} are the most")
+        raise ShapeError(f"count {count} makes {count * triangles:,} triangles, the maximum is {MAX_TRIANGLES:,}")
     return count
 
 

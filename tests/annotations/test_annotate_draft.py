@@ -151,7 +151,9 @@ def test_objects_are_described_anew_and_stay_what_they_are(plaza, catalogue):
     looks = {category: catalogue[category].looks for category in catalogue}
     text = format_annotations(after)
     assert check_source(parse_annotations(text), plaza, names, (1, 20), looks=looks) == []
-    said = [look.say for entry in after.objects for look in looks[entry.category] if look.say in entry.description]
+    said = [
+        look.phrase for entry in after.objects for look in looks[entry.category] if look.phrase in entry.description
+    ]
     assert len(said) > 10
     # Names of two of a kind that have changed places come back.
     a, b = next((x, y) for x in draft.objects for y in draft.objects if x.category == y.category and x.name != y.name)

@@ -13,8 +13,7 @@ from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.catalogue_check import LEAST_TRUE
-from aerialdojo_gen.scenes.claims import true_looks
+from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
 from aerialdojo_gen.scenes.model import Scene
 
 WHEELS = "four wheels with pale hubs"
@@ -61,13 +60,13 @@ def test_what_is_under_water_is_not_told_and_not_let_pass(catalogue):
 @pytest.mark.parametrize("category", ["hatchback", "street_lamp", "igloo", "swing_set", "garden_shed"])
 def test_more_water_hides_more(catalogue, category):
     shown = [
-        {look.say for look in catalogue[category].looks if Surface(scene).shows(look, scene.instances[0])}
+        {look.phrase for look in catalogue[category].looks if Surface(scene).shows(look, scene.instances[0])}
         for scene in (stand(catalogue, category, level) for level in (0.0, 0.3, 0.6, 0.9, 1.2))
     ]
     assert all(more >= less for more, less in pairwise(shown))
     assert len(shown[-1]) < len(shown[0])
     thing = stand(catalogue, category, 0.0).instances[0]
-    true = {look.say for look in true_looks(catalogue[category].looks, thing, catalogue.materials)}
+    true = {look.phrase for look in valid_looks(catalogue[category].looks, thing, catalogue.materials)}
     assert true <= shown[0]
 
 
@@ -96,7 +95,9 @@ def test_a_deck_overhead_hides_nothing(catalogue):
 )
 def test_a_phrase_that_says_an_attribute_again_is_not_used(catalogue, category, variant, twice):
     scene = stand(catalogue, category, 0.0, variant)
-    assert twice in {look.say for look in true_looks(catalogue[category].looks, scene.instances[0], scene.materials)}
+    assert twice in {
+        look.phrase for look in valid_looks(catalogue[category].looks, scene.instances[0], scene.materials)
+    }
     assert twice not in said(catalogue, scene)
 
 
@@ -106,7 +107,7 @@ def test_of_every_variant_of_which_a_phrase_is_not_used_there_is_something_to_te
         for category in catalogue.targets
         for variant in catalogue[category].variants
         for named in [dataclasses.replace(box("x_0", (0, 0, 0), (1, 1, 1)), attributes=dict(variant.attributes))]
-        if any(repeats(look.say, named) for look in catalogue[category].looks)
+        if any(repeats(look.phrase, named) for look in catalogue[category].looks)
     ]
     assert len(pairs) > 20
     things = tuple(
@@ -119,5 +120,5 @@ def test_of_every_variant_of_which_a_phrase_is_not_used_there_is_something_to_te
     scene = Scene("U_All_0", (*things, ground), materials, np.array([[-99.0, -99.0, -1.0], [99.0, 99.0, 99.0]]))
     vocabulary = Vocabulary(scene, catalogue)
     phrases = {thing.node: vocabulary.looks(thing) for thing in things}
-    assert [pairs[k] for k, said in enumerate(phrases.values()) if len(said) < LEAST_TRUE] == []
+    assert [pairs[k] for k, said in enumerate(phrases.values()) if len(said) < MIN_TRUE_LOOKS] == []
     assert not any(repeats(say, thing) for thing in things for say in phrases[thing.node])

@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.draw import TaskDraw
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.vector import OwnScenes
-from aerialdojo_gen.scenes.context import context_of, forget_scene, open_contexts, open_scene, prefetch_mesh
+from aerialdojo_gen.scenes.context import context_of, open_contexts, open_scene, prefetch_mesh, release_scene
 from aerialdojo_gen.scenes.context import release_scenes as let_go
 from aerialdojo_gen.store.root import open_root
 
@@ -157,7 +157,7 @@ def test_what_is_read_ahead_is_taken_up_and_keeps_nobody_waiting(smoke):
     assert taken is made[0]
     assert taken.part("slow", lambda: "anew") != "anew"
     assert open_contexts() == (taken,)
-    forget_scene(there[1])
+    release_scene(there[1])
     assert not open_contexts()
 
 

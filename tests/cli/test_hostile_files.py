@@ -110,7 +110,7 @@ def assert_named(message, start, place):
             "roofs.0: a rectangle must be 0.05 m wide and deep or more",
         ),
         ({"roofs": [[-6, -6, 0, 0, 0.1]]}, "roofs.0.4: Input should be greater than or equal to 0.3"),
-        ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: points of a line must lie 0.05 m apart or more"),
+        ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: consecutive points of a line must be at least 0.05 m"),
         (
             {"things": [{"category": "bench", "at": [0, 0], "yaw": "inf"}]},
             "things.0.yaw: Input should be a valid number",

@@ -18,7 +18,7 @@ from aerialdojo_gen.imports.files import check_glb, read_mesh
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.imports.three_ds import read_3ds
-from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.studio.annotate.drafting import draft_scene

@@ -5,12 +5,11 @@ import pytest
 import shapely
 from support.layout_checks import catalogue, props_of
 
-from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
-from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.site import Site, footprint
 
 SCENES = ["I_Harbor_0", "I_Harbor_1"]
 each_scene = pytest.mark.parametrize("name", SCENES)

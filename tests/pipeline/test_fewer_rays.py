@@ -157,7 +157,7 @@ def poses(found, n=6):
 
 def test_shares_of_parts_are_those_of_all_pixels(found):
     thing, camera = found.world.scene.instances[found.instance], Camera(160, 160)
-    parts = [thing.faces_of(name) for name in thing.anatomy.tells]
+    parts = [thing.faces_of(name) for name in thing.anatomy.identifying_parts]
     caster = instance_caster(thing)
     some = Counter()
     for pose in poses(found):

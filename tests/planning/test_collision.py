@@ -22,10 +22,8 @@ def test_distance_agrees_with_trimesh():
 def test_distance_to_one_instance_is_to_its_own_surface():
     wall = instance("wall", box((2, -5, 0), (2.5, 5, 4)))
     world = CollisionWorld(scene(wall, instance("near", box((0.5, -1, 0), (0.6, 1, 4)))))
-    assert world.instance_distance_m("wall", (0.0, 0.0, 2.0)) == pytest.approx(2.0, abs=1e-5)
+    assert world.distance_m((0.0, 0.0, 2.0), [0]) == pytest.approx(2.0, abs=1e-5)
     assert world.distance_m((0.0, 0.0, 2.0)) == pytest.approx(0.5, abs=1e-5)
-    with pytest.raises(KeyError):
-        world.instance_distance_m("wal", (0.0, 0.0, 2.0))
 
 
 coordinate = st.floats(-17, 17)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.catalogue_faults import catalogue_faults
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.anatomy import FRONTS, Run, moved, read_anatomy
+from aerialdojo_gen.scenes.anatomy import FRONTS, Run, parse_anatomy, remap_runs
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.catalogue_check import catalogue_faults
-from aerialdojo_gen.scenes.claims import true_looks, untrue
+from aerialdojo_gen.scenes.claims import false_claims, valid_looks
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
 
@@ -70,12 +70,12 @@ def lamp(assets, variant, yaw_deg=0.0, position=(0.0, 0.0, 0.0)):
 def test_phrases_are_true_of_the_variants_that_bear_them_out_whichever_way_they_stand(assets, variant, yaw_deg):
     catalogue = load_catalogue(assets)
     thing = lamp(assets, variant, yaw_deg, (120.25, -80.5, 3.0))
-    assert {look.say for look in true_looks(catalogue["lamp"].looks, thing, catalogue.materials)} == TRUE[variant]
+    assert {look.phrase for look in valid_looks(catalogue["lamp"].looks, thing, catalogue.materials)} == TRUE[variant]
 
 
 def test_a_phrase_that_is_not_true_says_what_is(assets):
     catalogue, thing = load_catalogue(assets), lamp(assets, "double")
-    wrong = {look.say: untrue(look, thing, catalogue.materials) for look in catalogue["lamp"].looks}
+    wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in catalogue["lamp"].looks}
     assert wrong["one arm"] == ["has 2 x arm"]
     assert wrong["a red glass"] == ["its glass is white"]
     assert wrong["a wooden foot"] == ["its foot is of paint"]
@@ -106,7 +106,7 @@ def test_what_the_catalogue_cannot_bear_out_is_named(assets):
         ('"height > 3"', '"height = 3"', "'height = 3' is no comparison like"),
         ('"hat on top"', '"hat atop pole"', "'hat atop pole' is none of"),
         ("count = { arm = 1 }", "count = { arm = 0 }", "must be a whole number or [least, most], got 0"),
-        ('say = "one arm"', 'say = "two arms"', "'two arms' stands twice"),
+        ('say = "one arm"', 'say = "two arms"', "duplicate phrase 'two arms'"),
         ('tag = "hat"', "tag = [3]", "tag must be a word or a list of words"),
     ],
 )
@@ -138,7 +138,10 @@ def test_a_scene_file_keeps_which_faces_are_which(assets, tmp_path, variant):
     materials = {p.material: catalogue.materials[p.material] for p in thing.parts}
     write_glb(Scene("U_Test_0", (thing,), materials, np.array([[-9.0] * 3, [9.0] * 3])), tmp_path / "s.glb")
     again = read_glb(tmp_path / "s.glb").instances[0]
-    assert (again.anatomy.fronts_rad, again.anatomy.tells) == (thing.anatomy.fronts_rad, thing.anatomy.tells)
+    assert (again.anatomy.fronts_rad, again.anatomy.identifying_parts) == (
+        thing.anatomy.fronts_rad,
+        thing.anatomy.identifying_parts,
+    )
     assert again.anatomy.runs == thing.anatomy.runs
     glass = thing.vertices[thing.faces[thing.faces_of("glass")]]
     assert len(glass)
@@ -161,7 +164,7 @@ def test_runs_follow_the_faces_that_are_left(data):
     left = np.concatenate([np.flatnonzero(k) + 100 * n for n, k in enumerate(kept)])
     there = [int(k.sum()) for k in kept if k.any()]
     offsets = np.cumsum([0, *there])
-    runs = moved({"it": [Run(part, first, faces, copies)]}, kept)
+    runs = remap_runs({"it": [Run(part, first, faces, copies)]}, kept)
     found = {int(left[offsets[r.part] + r.first + n]) for r in runs.get("it", ()) for n in range(r.faces * r.copies)}
     assert found == own & set(left.tolist()) <= set(before.tolist())
 
@@ -177,6 +180,6 @@ def test_runs_follow_the_faces_that_are_left(data):
 )  # fmt: skip
 def test_an_anatomy_of_faces_that_are_not_there_is_refused(spoil):
     sound = {"yaw_rad": 0.0, "fronts_rad": [0.0], "tells": ["pole"], "parts": {"pole": [[0, 0, 5, 2]]}}
-    assert read_anatomy(sound, [10]).runs["pole"] == (Run(0, 0, 5, 2),)
+    assert parse_anatomy(sound, [10]).runs["pole"] == (Run(0, 0, 5, 2),)
     with pytest.raises((ValueError, TypeError, KeyError)):
-        read_anatomy(sound | spoil, [10])
+        parse_anatomy(sound | spoil, [10])

@@ -312,7 +312,7 @@ def test_footprints_know_height_and_ground():
     place.occupy(rectangle(15, 5, 25, 15))
     assert not place.is_free(20, 10, 1.0)
     assert place.place(category, -20, 0).node == f"{category}_001"
-    with pytest.raises(AssetError, match="stands twice"):
+    with pytest.raises(AssetError, match="exists already"):
         place.place(category, 5, 5, node=f"{category}_000")
 
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.catalogue_faults import catalogue_faults
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.catalogue_check import catalogue_faults
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 
@@ -87,7 +87,7 @@ def spoil(assets: Path, old: str, new: str) -> str:
         ("[0.9, 1.1]", "[1.1, 0.9]", "params: body_h must be a number or [low, high], got [1.1, 0.9]"),
         ("weight = 3", "weigth = 3", "variants[0] (red): unknown key 'weigth': did you mean 'weight'?"),
         ("weight = 3", "weight = 0", "variants[0] (red): weight must be a positive number, got 0"),
-        ('name = "blue"', 'name = "red"', "variants[1]: variant 'red' stands twice"),
+        ('name = "blue"', 'name = "red"', "variants[1]: duplicate variant 'red'"),
         ('["flag"]', '["flagg"]', "without names the unknown tag 'flagg': did you mean 'flag'?"),
         ("{ body = \"paint:#2020b0\" }", "{ bod = \"metal\" }", "variants[1] (blue) roles: unknown key 'bod'"),
         ("{ body_h = 2.0 }", "{ bodyh = 2.0 }", "(blue) params: unknown key 'bodyh': did you mean 'body_h'?"),
@@ -113,7 +113,7 @@ def test_unknown_builder_is_named(assets):
 
 def test_category_that_stands_twice_names_both_files(assets):
     (assets / "props" / "twice.toml").write_text(MAILBOX)
-    with pytest.raises(AssetError, match=r"twice\.toml: \[mailbox\] stands already in .*street\.toml"):
+    with pytest.raises(AssetError, match=r"twice\.toml: \[mailbox\] is already in .*street\.toml"):
         load_catalogue(assets)
 
 

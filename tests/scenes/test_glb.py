@@ -14,9 +14,9 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes import shapes
 from aerialdojo_gen.scenes.catalogue import placed
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.materials import make_texture
 from aerialdojo_gen.scenes.mesh import to_part
 from aerialdojo_gen.scenes.model import Instance, Material, Scene
-from aerialdojo_gen.scenes.textures import make_texture
 
 BRICK = Material("brick:#9a4a3c", (150, 80, 60), make_texture("brick", (154, 74, 60)), 0.75)
 GREY = Material("#808080", (128, 128, 128))

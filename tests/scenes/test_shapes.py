@@ -12,8 +12,8 @@ from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
+from aerialdojo_gen.scenes.materials import TEXTURES, make_texture
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, to_part, translated
-from aerialdojo_gen.scenes.textures import TEXTURES, make_texture
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
 

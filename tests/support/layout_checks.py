@@ -11,8 +11,8 @@ import trimesh
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.site import footprint
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 

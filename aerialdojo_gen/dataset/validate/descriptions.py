@@ -27,7 +27,7 @@ from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, ch
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.colour_names import colour_name
+from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.model import Instance
 
 _FAULTS = ("object_node", "object_category")
@@ -225,7 +225,7 @@ def _unlike(words: _Words, instance: Instance, text: str) -> str:
 
 def _looks(words: _Words, instance: Instance) -> set[str]:
     looks = words.catalogue[instance.category].looks if instance.category in words.catalogue else ()
-    return {word for look in looks for word in _split(look.say)}
+    return {word for look in looks for word in _split(look.phrase)}
 
 
 def _shades(words: _Words, instance: Instance) -> set[str]:

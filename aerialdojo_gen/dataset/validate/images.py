@@ -153,7 +153,7 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row, place in enumerate(rows.floats(*POSE)):
         png = rows.column("reference_image")[row].as_py()
         anatomy = mesh.scene[str(nodes[row])].anatomy if nodes[row] in mesh.scene else None
-        tells = () if anatomy is None else anatomy.tells
+        tells = () if anatomy is None else anatomy.identifying_parts
         if png is None or not np.isfinite(place).all() or (picture := decode_grey(png)) is None:
             continue
         if bool(tells) == bool(np.isnan(shown[row])):

@@ -1,4 +1,4 @@
-"""Props that the shape vocabulary cannot say, as code.
+"""Props that the shape vocabulary cannot express, as code.
 
 A builder is a function ``(rng, params) -> [(role, mesh), …]``. It draws from the generator alone, takes the prop's
 parameters by name, and returns meshes in the prop's own frame (metres; base centre at the origin, front along +x),
@@ -10,11 +10,24 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
-from aerialdojo_gen.scenes.builders.registry import BUILDERS, Builder, builder
+import numpy as np
 
-__all__ = ["Builder", "builder", "builders"]
+from aerialdojo_gen.scenes.mesh import Mesh
+
+Builder = Callable[[np.random.Generator, Mapping[str, float]], Sequence[tuple[str, Mesh]]]
+BUILDERS: dict[str, Builder] = {}
+
+
+def builder(function: Builder) -> Builder:
+    """Register a builder under its function's name; ValueError for a duplicate."""
+    name = function.__name__
+    if name in BUILDERS:
+        raise ValueError(f"duplicate builder {name!r}")
+    BUILDERS[name] = function
+    return function
 
 
 @cache

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.scenes.builders.growth import clump, limb, vec, whorl
-from aerialdojo_gen.scenes.builders.registry import builder
+from aerialdojo_gen.scenes.builders import builder
+from aerialdojo_gen.scenes.builders.growth import clump, limb, split_by_slope, vec, whorl
 from aerialdojo_gen.scenes.mesh import Floats, Mesh
 
 Parts = list[tuple[str, Mesh]]
@@ -273,3 +273,22 @@ def stump(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
             )
         )
     return out
+
+
+# Cosine of the steepest twigs that still hold snow.
+_HOLDS = 0.5
+
+
+@builder
+def snowy_spruce(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
+    """Spruce whose upper sides carry snow; `load` is the share of its tiers that are white, from the top down."""
+    grown = spruce(rng, params)
+    tiers = [k for k, (role, _) in enumerate(grown) if role == "needles"]
+    out: Parts = []
+    for k, (role, body) in enumerate(grown):
+        if role != "needles" or tiers.index(k) < len(tiers) * (1.0 - params["load"]):
+            out.append((role, body))
+            continue
+        white, green = split_by_slope(body, _HOLDS)
+        out += [("snow", white), ("needles", green)]
+    return [(role, body) for role, body in out if len(body.faces)]

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import blade, clump, limb, split_by_slope, stone, vec
-from aerialdojo_gen.scenes.builders.registry import builder
 from aerialdojo_gen.scenes.mesh import Mesh, translated
 from aerialdojo_gen.scenes.shapes import lathe, sphere
 

@@ -191,7 +191,7 @@ class Candidates:
 
 def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
     """The faces of each of an instance's telling parts that it has."""
-    names = () if instance.anatomy is None else instance.anatomy.tells
+    names = () if instance.anatomy is None else instance.anatomy.identifying_parts
     return [faces for faces in map(instance.faces_of, names) if len(faces)]
 
 

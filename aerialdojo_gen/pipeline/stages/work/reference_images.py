@@ -72,8 +72,8 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         else:
             counts["not_in_view"] += 1
         missing = missing_tells(thing, camera, pose, mask)
-        if thing.anatomy is not None and thing.anatomy.tells:
-            row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.tells)
+        if thing.anatomy is not None and thing.anatomy.identifying_parts:
+            row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.identifying_parts)
             row["tells_missing"] = ", ".join(missing) or None
     pictures = sum(row["reference_image"] is not None for row in rows)
     return Output({"references": from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
@@ -83,7 +83,7 @@ def missing_tells(
     instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_]
 ) -> list[str]:
     """Names of the identifying parts with less than `LEAST_SHARE` of a picture's pixels; mask is (H, W) bool."""
-    names = () if instance.anatomy is None else instance.anatomy.tells
+    names = () if instance.anatomy is None else instance.anatomy.identifying_parts
     if not names:
         return []
     parts = [instance.faces_of(name) for name in names]

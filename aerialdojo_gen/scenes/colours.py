@@ -1,18 +1,18 @@
-"""The colours that a thing's surface shows, sampled evenly over its area."""
+"""Colours of a surface, sampled evenly over its area, and their everyday names."""
 
 from __future__ import annotations
 
+import colorsys
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from aerialdojo_gen.scenes.colour_names import colour_name
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
 _SAMPLES = 4096
-# A second colour is told where it has so much of the surface, and so much of what the first has.
+# A second colour is named from this share of the surface, and of the first colour's share.
 _SECOND, _OF_FIRST = 0.2, 0.35
 _NEUTRAL, _AS_MUCH = ("white", "grey", "black"), 1.5
 
@@ -47,7 +47,7 @@ def _sampled(part: Part, material: Material, size: NDArray[np.float64], n: int) 
     k = np.arange(n)
     reach = np.cumsum(size)
     face = part.faces[np.minimum(np.searchsorted(reach, (k + 0.5) / n * reach[-1]), len(size) - 1)]
-    # The plastic number's multiples fill the unit square evenly, without chance.
+    # Quasi-random points: multiples of the plastic number fill the unit square evenly.
     a, b = (0.5 + k / 1.324717957244746) % 1.0, (0.5 + k / 1.7548776662466927) % 1.0
     a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
     share = np.stack([1.0 - a - b, a, b], axis=1)
@@ -75,7 +75,7 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
     if not ranked:
         return ""
     first, second = ranked[0], ranked[1] if len(ranked) > 1 else ""
-    # People say blue and white, and not white and blue, where there is as much of both.
+    # Neutral colours come second if both are about equal: "blue and white".
     if first in _NEUTRAL and second not in _NEUTRAL and second and shares[first] < _AS_MUCH * shares[second]:
         first, second = second, first
     both = second and min(shares[first], shares[second]) >= max(
@@ -85,7 +85,7 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
 
 
 def named_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
-    """Sum weights (k,) by what a person calls the colours (k, 3)."""
+    """Sum weights (k,) by colour name of colours (k, 3)."""
     reduced = colours.astype(np.int64) // 4 * 4 + 2 if len(colours) > 256 else colours.astype(np.int64)
     found, index = np.unique(reduced, axis=0, return_inverse=True)
     summed = np.bincount(index.reshape(-1), weights=weights, minlength=len(found))
@@ -94,3 +94,40 @@ def named_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> di
         word = colour_name(rgb)
         shares[word] = shares.get(word, 0.0) + weight
     return shares
+
+
+# Upper ends of the hues, degrees.
+_HUES = (
+    (15, "red"),
+    (42, "orange"),
+    (68, "yellow"),
+    (165, "green"),
+    (195, "turquoise"),
+    (255, "blue"),
+    (290, "purple"),
+    (335, "pink"),
+    (361, "red"),
+)
+# Every word that a colour can have.
+COLOURS = (
+    "white", "black", "grey", "brown", "beige", "red", "orange", "yellow", "green", "turquoise", "blue", "purple",
+    "pink",
+)  # fmt: skip
+
+
+def colour_name(rgb: ArrayLike) -> str:
+    """Name an sRGB colour by one of about a dozen everyday words, e.g. ``"brown"``."""
+    red, green, blue = (float(c) / 255.0 for c in np.asarray(rgb, dtype=np.float64))
+    hue, light, saturation = colorsys.rgb_to_hls(red, green, blue)
+    if light > 0.9:
+        return "white"
+    if light < 0.12:
+        return "black"
+    if saturation < 0.16:
+        return "grey" if light < 0.82 else "white"
+    word = next(name for end, name in _HUES if hue * 360 < end)
+    if word in ("red", "orange", "yellow") and light < 0.42 and saturation < 0.75:
+        return "brown"
+    if word in ("orange", "yellow") and light > 0.68:
+        return "beige"
+    return word

@@ -1,4 +1,4 @@
-"""Whether what the catalogue says of its categories is so of what it builds."""
+"""Verification of the catalogue's statements about its categories on the meshes that it builds."""
 
 from __future__ import annotations
 
@@ -6,35 +6,33 @@ from collections.abc import Iterable
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import untrue
+from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, false_claims
 
-LEAST_LOOKS = 4
-# A draft that has one phrase a variant says it of every such object.
-LEAST_TRUE = 2
+MIN_LOOKS = 4
 
 
 def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None) -> list[str]:
-    """Build every variant of the categories that tasks ask for, and hold what is said of them against it."""
+    """Build every variant of the target categories and list the false statements about them."""
     faults = []
     for name in catalogue.targets if categories is None else categories:
         prop = catalogue[name]
         if not prop.front:
             faults.append(f"{prop.source}: front is missing")
             continue
-        if len(prop.looks) < LEAST_LOOKS:
-            faults.append(f"{prop.source}: {len(prop.looks)} looks, {LEAST_LOOKS} are the least")
-        why: dict[str, list[str]] = {look.say: [] for look in prop.looks}
+        if len(prop.looks) < MIN_LOOKS:
+            faults.append(f"{prop.source}: {len(prop.looks)} looks, {MIN_LOOKS} are the least")
+        why: dict[str, list[str]] = {look.phrase: [] for look in prop.looks}
         for variant in prop.variants:
             thing = catalogue.instantiate(
                 name, "thing", generator(0, "check", name, variant.name), variant=variant.name
             )
             assert thing.anatomy is not None
-            for tell in thing.anatomy.tells:
+            for tell in thing.anatomy.identifying_parts:
                 if not len(thing.faces_of(tell)):
                     faults.append(f"{prop.source} variant {variant.name!r}: tells: it has no {tell}")
-            wrong = {look.say: untrue(look, thing, catalogue.materials) for look in prop.looks}
+            wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in prop.looks}
             true = sum(not w for w in wrong.values())
-            if true < min(LEAST_TRUE, len(prop.looks)):
+            if true < min(MIN_TRUE_LOOKS, len(prop.looks)):
                 faults.append(
                     f"{prop.source} variant {variant.name!r}: {true} looks are true of it: {_message(wrong)}"
                 )
