@@ -9,12 +9,12 @@ from functools import cached_property
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.paper_figures import PaperResult
-from aerialdojo_gen.benchmark import breakdowns, radii, tables
+from aerialdojo_gen.benchmark import radii, tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN, Partings, parting_tables, partings_of
 from aerialdojo_gen.benchmark.grid import Table
-from aerialdojo_gen.benchmark.paper_tables import result_tables
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.metrics import Profile
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.tables import result_tables
 from aerialdojo_gen.store.root import DataRoot
 
 
@@ -42,18 +42,18 @@ def _sliced(column: str) -> Callable[[ReportRequest], list[Table]]:
 _TABLES: dict[str, Callable[[ReportRequest], list[Table]]] = {
     "overall": lambda w: [tables.main_table(w.runs, w.profiles)],
     "results": lambda w: result_tables(w.runs, w.profiles, w.intervals, w.beside),
-    "partition": lambda w: [breakdowns.partition_table(w.runs, w.profiles[0])],
+    "partition": lambda w: [tables.partition_table(w.runs, w.profiles[0])],
     "family": lambda w: [tables.family_table(w.runs, w.profiles[0])],
-    "averages": lambda w: [breakdowns.average_table(w.runs, w.profiles[0])],
+    "averages": lambda w: [tables.average_table(w.runs, w.profiles[0])],
     "setting": _sliced("setting"),
-    "goal": lambda w: [breakdowns.goal_table(w.runs, w.profiles[0])],
+    "goal": lambda w: [tables.goal_table(w.runs, w.profiles[0])],
     "modality": _sliced("modality"),
     "radius": lambda w: [radii.radius_table(w.runs, w.profiles[0], w.radii_m)],
     "visits": lambda w: [radii.visit_table(w.runs, w.profiles[0])],
     "difficulty": lambda w: parting_tables(w.partings, DIFFICULTY, w.runs, w.profiles[0]),
     "seen": lambda w: parting_tables(w.partings, SEEN, w.runs, w.profiles[0]),
     "conduct": lambda w: [tables.conduct_table(w.runs)],
-    "type": lambda w: [breakdowns.type_table(w.runs, w.profiles[0])],
+    "type": lambda w: [tables.type_table(w.runs, w.profiles[0])],
     "scene": lambda w: [tables.scene_table(w.runs, w.profiles[0])],
 }
 NAMES = tuple(_TABLES)

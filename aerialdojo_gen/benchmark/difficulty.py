@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.breakdowns import part_table
 from aerialdojo_gen.benchmark.grid import Table
-from aerialdojo_gen.benchmark.metrics import Bools
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.metrics import Bools, Profile
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.benchmark.tables import part_table
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 

@@ -17,19 +17,18 @@ from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
-from aerialdojo_gen.benchmark.draw import TaskDraw
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.observations import look, mosaic
+from aerialdojo_gen.benchmark.observations import GoalText, look, mosaic
 from aerialdojo_gen.benchmark.tasks import (
     MODALITIES,
     Selection,
     Task,
+    TaskDraw,
     check_tell,
     read_tasks,
     reference_image,
     select,
 )
-from aerialdojo_gen.benchmark.texts import GoalText
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.scenes.context import SEVERAL
 from aerialdojo_gen.store.root import DataRoot, Where, open_root

@@ -1,17 +1,23 @@
-"""What is evaluated, and what became of it."""
+"""The settings of an evaluation, its limits, its outcome, and the digest of the code that flies it."""
 
 from __future__ import annotations
 
+import hashlib
+import importlib.util
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.agents.load import BUILT_IN, look_here
 from aerialdojo_gen.benchmark.tasks import Selection, check_tell
-from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.benchmark.worker import Conditions, Failed, Finished
+from aerialdojo_gen.pipeline.code_digest import code_of
+from aerialdojo_gen.store.files import file_digest
 
 
 @dataclass(frozen=True)
@@ -99,3 +105,72 @@ class Outcome:
         rest = f" {left:,} not begun: the same command goes on with them." if left else ""
         what = f"{self.failed:,} failed, which count as no episodes: {', '.join(self.failures)}."
         return " ".join(filter(None, (self.stopped, f"{what}{rest} To fly the failed again: {again}")))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may spend and bear, over all calls for it."""
+
+    cost_usd: float | None = None  # Begin no episode once so much is spent
+    tokens: int | None = None  # Begin no episode once so many are spent, both ways
+    failures_in_row: int = 5
+
+
+class BudgetTracker:
+    """Counts what is finished, and says when it is enough."""
+
+    def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
+        self._limits = limits
+        self.cost_usd, self.tokens = cost_usd, tokens
+        self.episodes = self.actions = self.finished = 0
+        self.streak: tuple[Failed, ...] = ()
+
+    def add(self, finished: Finished) -> None:
+        """Count what was finished."""
+        self.cost_usd += finished.cost_usd
+        self.tokens += finished.tokens
+        self.episodes += finished.episodes
+        self.finished += finished.flown
+        self.actions += finished.actions
+        self.streak = finished.streak if finished.flown else self.streak + finished.streak
+
+    @property
+    def failing(self) -> Failed | None:
+        """What has failed too often in a row; None where nothing has."""
+        n = self._limits.failures_in_row
+        last = self.streak[-n:]
+        return last[-1] if len(last) == n and len({failed.kind for failed in last}) == 1 else None
+
+    @property
+    def spent(self) -> str:
+        """The limit that is reached, as its option; empty where none is."""
+        limits = self._limits
+        if limits.cost_usd is not None and self.cost_usd >= limits.cost_usd:
+            return f"--max-cost {limits.cost_usd:g}"
+        if limits.tokens is not None and self.tokens >= limits.tokens:
+            return f"--max-tokens {limits.tokens}"
+        return ""
+
+
+def flying_code(agent: str) -> str:
+    """Digest the code that flies an agent.
+
+    Libraries do not count, as they do for stages: an episode may have cost money, and a library's next patch should
+    not end a run of a thousand of them.
+    """
+    module = BUILT_IN.get(agent, agent).partition(":")[0]
+    parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
+    if module.split(".")[0] == "aerialdojo_gen":
+        parts |= code_of(module).parts
+    elif (path := _file_of(module)) is not None:
+        parts[module] = file_digest(path)
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _file_of(module: str) -> Path | None:
+    look_here()
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return None
+    return Path(spec.origin) if spec is not None and spec.origin and Path(spec.origin).is_file() else None

@@ -15,9 +15,7 @@ from scipy import stats
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.metrics import Episodes, Floats
-from aerialdojo_gen.benchmark.profiles import Profile
-from aerialdojo_gen.benchmark.scores import METRICS, summarize
+from aerialdojo_gen.benchmark.metrics import METRICS, Episodes, Floats, Profile, summarize
 
 RESAMPLES = 9_999
 LEVEL = 0.95

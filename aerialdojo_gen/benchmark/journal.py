@@ -1,15 +1,28 @@
-"""Finished episodes on their way to the tables: one line of JSON each, so that a kill loses none of them."""
+"""Finished episodes on their way to the tables: one line of JSON each, so that a kill loses none of them.
+
+In a data directory journals are in the run's folder. An object store cannot append to a file: there the journals are
+in a local folder, and new lines are committed every `CHECKPOINT_S` seconds as an object of their own. Another machine
+that resumes the run repeats what was finished after the last checkpoint.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
+import secrets
+import shutil
+import time
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from types import TracebackType
 from typing import Any
 
 from aerialdojo_gen.base.errors import Malformed, StoreError, disk_error
 from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.store.atomic import make_folder
+from aerialdojo_gen.store.cache import cache_folder
+from aerialdojo_gen.store.layout import check_run_name
+from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 
 class Journal:
@@ -20,7 +33,7 @@ class Journal:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.touch()
-            self.done = frozenset(str(record.get("task_id")) for record in read(path))
+            self.done = frozenset(str(record.get("task_id")) for record in read_journal(path))
             _cut_short_line(path)
             self._file = path.open("a", encoding="utf-8")
         except OSError as error:
@@ -51,7 +64,7 @@ def _cut_short_line(path: Path) -> None:
         file.truncate(sum(len(line) for line in file if line.endswith(b"\n")))
 
 
-def read(path: Path) -> Iterator[dict[str, Any]]:
+def read_journal(path: Path) -> Iterator[dict[str, Any]]:
     """Yield the records of a journal; a line that a kill cut short is no record."""
     with path.open("rb") as file:
         for number, line in enumerate(file, start=1):
@@ -66,3 +79,83 @@ def read(path: Path) -> Iterator[dict[str, Any]]:
             if not isinstance(record, dict):
                 raise StoreError(f"{path}: line {number} is no record: delete the file, or --restart")
             yield record
+
+
+CHECKPOINT_S = 30.0
+
+
+class Journals:
+    """The journals of a run."""
+
+    def __init__(self, root: DataRoot, run: str) -> None:
+        self._root, self._name = root, f"runs/{check_run_name(run)}/journal"
+        self._committed = not isinstance(root, LocalRoot)
+        self.folder = root.path / self._name if isinstance(root, LocalRoot) else _working_folder(root, run)
+        self._sent: dict[Path, int] = {}
+        self._call, self._batches = secrets.token_hex(4), 0
+        self._last = time.monotonic()
+
+    def path(self, scene: str, unit: int) -> Path:
+        """Return the file of a unit of a scene's episodes."""
+        return self.folder / f"{scene}.{unit:04d}.jsonl"
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self.scenes())
+
+    def scenes(self, scene: str = "*") -> dict[str, tuple[list[Path], list[str]]]:
+        """List journals by scene: files of this machine, and objects of the store; of one scene where it is named."""
+        found: dict[str, tuple[list[Path], list[str]]] = {}
+        for path in sorted(self.folder.glob(f"{scene}.*.jsonl")):
+            found.setdefault(path.name.split(".", 1)[0], ([], []))[0].append(path)
+        for name in self._root.list(self._name, f"{scene}.*.jsonl") if self._committed else ():
+            found.setdefault(PurePosixPath(name).name.split(".", 1)[0], ([], []))[1].append(name)
+        return found
+
+    def records(self, scene: str) -> list[dict[str, Any]]:
+        """Read the finished episodes of a scene; one may stand in a file and in an object."""
+        paths, names = self.scenes(scene).get(scene, ([], []))
+        return [record for path in [*map(self._root.local_copy, names), *paths] for record in read_journal(path)]
+
+    def remove(self, scene: str) -> None:
+        """Remove the journals of a scene, which are in the tables."""
+        paths, names = self.scenes(scene).get(scene, ([], []))
+        for path in paths:
+            path.unlink()
+            self._sent.pop(path, None)
+        for name in names:
+            self._root.delete(name)
+
+    def drop(self) -> None:
+        """Remove all."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+        self._root.delete(self._name)
+        self._sent.clear()
+
+    def checkpoint(self) -> None:
+        """Commit what has come since the last checkpoint, if that is long enough ago; nothing in a data directory."""
+        if not self._committed or time.monotonic() - self._last < CHECKPOINT_S:
+            return
+        self._last = time.monotonic()
+        for path in sorted(self.folder.glob("*.jsonl")):
+            begun = self._sent.get(path, 0)
+            lines = b"".join(_whole_lines(path, begun))
+            if lines:
+                name = f"{self._name}/{path.stem}.{self._call}-{self._batches:05d}.jsonl"
+                with self._root.commit(name) as temporary:
+                    temporary.write_bytes(lines)
+                self._batches += 1
+                self._sent[path] = begun + len(lines)
+
+
+def _whole_lines(path: Path, begun: int) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        file.seek(begun)
+        yield from (line for line in file if line.endswith(b"\n"))
+
+
+def _working_folder(root: DataRoot, run: str) -> Path:
+    """Return the folder of this machine that a run's journals lie in, made: the same for the same URL and name."""
+    folder = cache_folder() / "journals" / hashlib.sha256(root.url.encode()).hexdigest()[:16] / run
+    make_folder(folder)
+    return folder

@@ -1,10 +1,13 @@
-"""What every episode earns: success, oracle success, SPL, distance, collision (paper, section on evaluation).
+"""Success rules, outcomes of episodes under a rule, and scores: SR, SR-view, OSR, SPL, DTS and CR.
 
-An episode counts as a success by a `Profile`; `aerialdojo_gen.benchmark.scores` averages over episodes.
+A scene's score is the mean of its episodes, a family's the mean of its scenes, the overall score the mean of the
+families (paper, section on evaluation); ± is the standard deviation over scenes. SR-view is not in the paper.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -12,8 +15,56 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.store.schemas import FAMILIES
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A rule of success.
+
+    Distances are always measured to the goal anchor, which lies 1 m from the target's surface. Benchmarks that
+    measure to the target itself judge by up to that metre and half the target's size differently.
+    """
+
+    name: str  # What ``--profile`` takes
+    radius_m: float  # Distance to the goal, metres, that still counts as there; the boundary is inside
+    needs_stop: bool = True  # Whether the agent must have called Stop
+    fails_on_collision: bool = True  # Whether a collision rules success out
+    planar: bool = False  # Whether distances are taken in the plane, height left out
+    straight_reference: bool = False
+    about: str = ""  # Where the rule comes from, one line
+
+
+PROFILES = {
+    profile.name: profile
+    for profile in (
+        Profile(
+            "aerialdojo", 3.0, about="an explicit Stop within 3 m of the anchor, without collision, within budget"
+        ),
+        Profile("aerialdojo-5m", 5.0, about="the same at 5 m, reported beside it"),
+        Profile("uav-on", 20.0, about="UAV-ON: Stop within 20 m, a collision ends the episode"),
+        Profile("aerialvln", 20.0, planar=True, about="AerialVLN: Stop within 20 m in the plane"),
+        Profile(
+            "openfly",
+            20.0,
+            needs_stop=False,
+            fails_on_collision=False,
+            straight_reference=True,
+            about="OpenFly: the episode ends within 20 m, however it ends; SPL against the straight distance",
+        ),
+    )
+}
+DEFAULT_PROFILES = ("aerialdojo", "aerialdojo-5m")
+
+
+def profile_named(name: str) -> Profile:
+    """Return a profile by its name."""
+    if name not in PROFILES:
+        raise UsageError(unknown("no profile", name, PROFILES))
+    return PROFILES[name]
+
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -149,3 +200,115 @@ def may_succeed(episodes: Episodes, profile: Profile) -> Bools:
     if profile.fails_on_collision:
         may &= ~episodes.collision
     return may
+
+
+@dataclass(frozen=True)
+class Score:
+    """Means over some episodes, or means of such means."""
+
+    episodes: int  # How many stand behind it
+    sr: float
+    sr_view: float
+    osr: float
+    spl: float
+    dts_m: float  # Distance to the goal at the end of the episode, metres
+    cr: float
+
+
+METRICS = ("sr", "sr_view", "osr", "spl", "dts_m", "cr")
+# The paper's own.
+PAPER_METRICS = tuple(metric for metric in METRICS if metric != "sr_view")
+
+
+def score(judged: Outcomes, mask: Bools | slice = slice(None)) -> Score:
+    """Average outcomes over episodes; every value is NaN where there are none."""
+    columns = (
+        judged.success,
+        judged.success_view,
+        judged.oracle_success,
+        judged.spl,
+        judged.distance_m,
+        judged.collision,
+    )
+    chosen = [np.asarray(column[mask], dtype=np.float64) for column in columns]
+    n = len(chosen[0])
+    return Score(n, *(math.fsum(c) / n if n else math.nan for c in chosen))
+
+
+def mean_score(scores: Sequence[Score]) -> Score:
+    """Average scores, each with the same weight; every value is NaN where there are none."""
+    return Score(
+        sum(s.episodes for s in scores),
+        *(math.fsum(getattr(s, m) for s in scores) / len(scores) if scores else math.nan for m in METRICS),
+    )
+
+
+def deviation(scores: Sequence[Score]) -> Score:
+    """Standard deviation of scores (n - 1 in the denominator); NaN for fewer than two."""
+    values = np.array([[getattr(s, m) for m in METRICS] for s in scores])
+    spread = values.std(axis=0, ddof=1) if len(scores) > 1 else np.full(len(METRICS), math.nan)
+    return Score(sum(s.episodes for s in scores), *(float(v) for v in spread))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Scores of a log under a profile."""
+
+    profile: Profile  # The rule
+    scenes: dict[str, Score]  # By scene, in the order of names
+    families: dict[str, Score]  # Means over a family's scenes; families without episodes are left out
+    overall: Score  # Mean of the families that are there
+    deviation: Score  # Standard deviation over all scenes
+
+    @property
+    def missing_families(self) -> list[str]:
+        """Families without episodes, which the overall score does not speak of."""
+        return [family for family in FAMILIES.values() if family not in self.families]
+
+
+def summarize(episodes: Episodes, profile: Profile) -> Summary:
+    """Average a log by scene, family and overall."""
+    judged = outcomes(episodes, profile)
+    scenes: dict[str, Score] = {}
+    members: dict[str, list[Score]] = {}
+    for name in sorted(set(episodes.scene.tolist())):
+        mask = episodes.scene == name
+        scenes[name] = score(judged, mask)
+        members.setdefault(str(episodes.family[mask][0]), []).append(scenes[name])
+    order = [*FAMILIES.values(), *sorted(members.keys() - set(FAMILIES.values()))]
+    families = {family: mean_score(members[family]) for family in order if family in members}
+    return Summary(profile, scenes, families, mean_score(list(families.values())), deviation(list(scenes.values())))
+
+
+def weighted_score(episodes: Episodes, profile: Profile) -> Score:
+    """Average a log over all its episodes, each with the same weight: the paper's appendix C's other population."""
+    return score(outcomes(episodes, profile))
+
+
+def slices(episodes: Episodes, column: str, order: Sequence[str]) -> Iterator[tuple[str, Episodes]]:
+    """Yield the parts of a log by a column's value (``setting``, ``scene_type``, …), those that have episodes."""
+    values = getattr(episodes, column)
+    for value in order:
+        if (values == value).any():
+            yield value, episodes.where(values == value)
+
+
+def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tuple[Floats, Floats]:
+    """Overall SR and OSR, fractions (r,), at radii in metres, everything else by the profile."""
+    # An episode's share of the overall mean: its scene's among its family's scenes, its family's among the families.
+    weight = np.empty(len(episodes))
+    families = sorted(set(episodes.family.tolist()))
+    for family in families:
+        scenes = sorted(set(episodes.scene[episodes.family == family].tolist()))
+        for name in scenes:
+            mask = episodes.scene == name
+            weight[mask] = 1.0 / (mask.sum() * len(scenes) * len(families))
+    final, nearest = distances(episodes, profile)
+    may = may_succeed(episodes, profile)
+    return _share_within(final[may], weight[may], radii_m), _share_within(nearest, weight, radii_m)
+
+
+def _share_within(distance_m: Floats, weight: Floats, radii_m: Floats) -> Floats:
+    order = np.argsort(distance_m)
+    share = np.concatenate([[0.0], np.cumsum(weight[order])])
+    return np.asarray(share[np.searchsorted(distance_m[order], radii_m, side="right")])

@@ -10,10 +10,8 @@ import numpy as np
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.grid import HEADS, NONE, Measure, Table
 from aerialdojo_gen.benchmark.intervals import Paired, paired
-from aerialdojo_gen.benchmark.metrics import outcomes
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.metrics import METRICS, Profile, outcomes
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.scores import METRICS
 from aerialdojo_gen.benchmark.tables import profile_head, shown_measures
 
 

@@ -8,13 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.breakdowns import by_setting
 from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table
-from aerialdojo_gen.benchmark.metrics import Floats, outcomes
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.metrics import Floats, Profile, outcomes, success_curve
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.scores import success_curve
-from aerialdojo_gen.benchmark.tables import NAMES, line_of
+from aerialdojo_gen.benchmark.tables import NAMES, by_setting, line_of
 from aerialdojo_gen.store.schemas import SETTINGS
 
 DEFAULT_RADII_M = (3.0, 5.0)

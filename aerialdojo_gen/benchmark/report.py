@@ -16,14 +16,12 @@ import markupsafe
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.contents import ReportRequest, named_tables
-from aerialdojo_gen.benchmark.figures import encoded, radius_curve
-from aerialdojo_gen.benchmark.formats import as_latex, as_markdown
-from aerialdojo_gen.benchmark.grid import Table
-from aerialdojo_gen.benchmark.paper_tables import in_setting
-from aerialdojo_gen.benchmark.radar import family_radars, metric_radars
+from aerialdojo_gen.benchmark.figures import encoded, family_radars, metric_radars, radius_curve
+from aerialdojo_gen.benchmark.grid import Table, as_latex, as_markdown
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
+from aerialdojo_gen.benchmark.tables import in_setting
 from aerialdojo_gen.store.atomic import atomic_file
 
 # Long tables, folded away on the page.

@@ -1,6 +1,6 @@
-"""Evaluate an agent: choose tasks, fly them in processes, write the log.
+"""Evaluate an agent: select tasks, fly them in worker processes, write the log.
 
-Finished episodes are never flown again: a worker writes each to a journal, the parent brings a scene's journals into
+Finished episodes are never flown again: a worker writes each to a journal; the parent moves a scene's journals into
 the tables when the scene is finished, when the run ends, or when the next one begins. The tables of a deterministic
 agent are the same bytes whatever the number of workers and however often the run was killed.
 """
@@ -13,8 +13,9 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -22,12 +23,9 @@ import pyarrow.compute as pc
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.benchmark import episodes
-from aerialdojo_gen.benchmark.agents import ServiceDown
-from aerialdojo_gen.benchmark.evaluation import Evaluation, Outcome
-from aerialdojo_gen.benchmark.flying_code import flying_code
-from aerialdojo_gen.benchmark.journals import Journals
-from aerialdojo_gen.benchmark.limits import BudgetTracker, Limits
-from aerialdojo_gen.benchmark.preflight import preflight
+from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
+from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, flying_code
+from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.viewpoints import viewpoints_content, without_viewpoints
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
@@ -38,6 +36,10 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.benchmark.evaluation import Limits
+
 
 __all__ = ["Evaluation", "Outcome", "evaluate"]
 
@@ -260,3 +262,27 @@ class _Run:
             for k in range(parts):
                 units.append(WorkUnit(scene, rows.slice(k * size, size), self._journals.path(scene, k)))
         return units
+
+
+def preflight(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Evaluation:
+    """Check an agent that asks a service, by one request; other agents are left alone."""
+    # By the class: an agent without a check may take long to make, and is made by the workers.
+    if not hasattr(agent_class(evaluation.agent), "check"):
+        return evaluation
+    agent: Any = load_agent(evaluation.agent, **evaluation.options)
+    try:
+        if limits.cost_usd is not None and not getattr(agent, "priced", True):
+            raise UsageError(
+                "--max-cost needs prices: --option input_usd_per_million=… --option output_usd_per_million=…"
+            )
+        found = agent.check()
+        for option, limit in (("--max-cost", limits.cost_usd), ("--max-tokens", limits.tokens)):
+            if limit is not None and not getattr(agent, "tells_tokens", True):
+                raise UsageError(f"{option} cannot be kept: {found}")
+        if found:
+            reporter.line(f"{evaluation.agent}: {found}")
+        settled: dict[str, Any] = getattr(agent, "settled", dict)()
+        used: dict[str, Any] | None = agent.used_options() if hasattr(agent, "used_options") else None
+    finally:
+        agent.close()
+    return replace(evaluation, options={**evaluation.options, **settled}, used=used)

@@ -1,9 +1,9 @@
-"""Runs of an evaluation, read for tables, figures and the report."""
+"""Runs of an evaluation, read for tables, figures and the report; baselines flown on the same tasks are added."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,12 +13,50 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
+from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
-from aerialdojo_gen.benchmark.path_clearance_to_goal import STEP_COLUMNS, swept_distances
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import TERMINATIONS
+
+STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
+
+
+def swept_distances(episodes: pa.Table, steps: pa.Table) -> Floats:
+    """Smallest distance to the goal over the flown segments, (n,) metres.
+
+    A segment and its end distances fix a triangle.
+    """
+    nearest = np.array(episodes["min_distance_m"].to_numpy(), dtype=np.float64)
+    owner = pc.index_in(steps["task_id"], value_set=episodes["task_id"].combine_chunks())
+    flown = steps.filter(pc.is_valid(owner))
+    if not flown.num_rows:
+        return nearest
+    index = pc.drop_null(owner).to_numpy()
+    order = np.lexsort((flown["step"].to_numpy(), index))
+    index = index[order]
+    place = np.stack([flown[f"{a}_m"].to_numpy()[order] for a in "xyz"], axis=1)
+    distance = flown["distance_m"].to_numpy()[order]
+    first = np.concatenate([[True], index[1:] != index[:-1]])
+    begun = index[first]
+    from_place, from_distance = np.roll(place, 1, axis=0), np.roll(distance, 1)
+    from_place[first] = np.stack([episodes[f"start_{a}_m"].to_numpy()[begun] for a in "xyz"], axis=1)
+    from_distance[first] = episodes["euclidean_m"].to_numpy()[begun]
+    np.minimum.at(nearest, index, _nearest_on_segment(place - from_place, from_distance, distance))
+    return nearest
+
+
+def _nearest_on_segment(way: Floats, begin_m: Floats, end_m: Floats) -> Floats:
+    """Return the distance from a point to segments, of which the ways and the distances at both ends are known."""
+    length = np.linalg.norm(way, axis=1)
+    # How far along the segment the foot of the perpendicular is, by the law of cosines.
+    doubled = begin_m**2 + length**2 - end_m**2
+    along = np.divide(doubled, 2.0 * length, out=np.zeros_like(length), where=length > 0.0)
+    height = np.sqrt(np.maximum(begin_m**2 - along**2, 0.0))
+    return np.where((along > 0.0) & (along < length), height, np.minimum(begin_m, end_m))
+
 
 # What is no contender: the one that knows the way, and those that look at nothing.
 UPPER_BOUND, FLOORS = "upper bound", "floors"
@@ -123,3 +161,58 @@ def episode_outcomes(run: Run) -> Conduct:
         total("output_tokens"),
         None if costs.null_count else math.fsum(costs.to_pylist()),
     )
+
+
+_FLOOR_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == FLOORS)
+
+
+def with_floors(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
+    """Add the floors that were flown on the same tasks and are not among the runs."""
+    there = {run.agent for run in runs}
+    wanted = {task for run in runs for task in run.table["task_id"].to_pylist()}
+    added: dict[str, Run] = {}
+    for name in run_names(log):
+        if name in {run.name for run in runs}:
+            continue
+        (run,) = load_runs(log, [name]) if _is_floor(log, name) else (None,)
+        if run is None or run.agent in there or run.agent in added:
+            continue
+        mask = np.array([task in wanted for task in run.table["task_id"].to_pylist()], dtype=np.bool_)
+        if mask.sum() == len(wanted):
+            added[run.agent] = run.where(mask)
+    return [*runs, *(added[agent] for agent in _FLOOR_AGENTS if agent in added)]
+
+
+def _is_floor(log: DataRoot, name: str) -> bool:
+    try:
+        agents = read_run(log, name, columns=["agent"])["agent"]
+    except StoreError:
+        # Nobody asked for this run: it may be as broken as it likes.
+        return False
+    return len(agents) > 0 and agents[0].as_py() in _FLOOR_AGENTS
+
+
+def arranged(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:
+    """Put runs in order by their groups: the user's own, the others, then the upper bound and the floors."""
+    chosen = dict(groups or {})
+    for heading, names in chosen.items():
+        for name in names:
+            if name not in {n for run in runs for n in (run.name, run.agent)}:
+                raise UsageError(f"group {heading!r}: {unknown('no run', name, [run.name for run in runs])}")
+
+    others = "other agents" if chosen else "agents"
+    order = [*chosen, others, UPPER_BOUND, FLOORS]
+    grouped = [
+        replace(
+            run,
+            group=next(
+                (head for head, names in chosen.items() if run.name in names or run.agent in names),
+                GROUP_OF.get(run.agent, others),
+            ),
+        )
+        for run in runs
+    ]
+    # One group needs no heading.
+    if len({run.group for run in grouped}) == 1:
+        return [replace(run, group="") for run in grouped]
+    return sorted(grouped, key=lambda run: order.index(run.group))

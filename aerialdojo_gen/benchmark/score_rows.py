@@ -12,10 +12,17 @@ from typing import Any
 from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.benchmark.difficulty import Partings
 from aerialdojo_gen.benchmark.intervals import score_intervals
-from aerialdojo_gen.benchmark.metrics import Episodes
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.metrics import (
+    METRICS,
+    Episodes,
+    Profile,
+    Score,
+    Summary,
+    slices,
+    summarize,
+    weighted_score,
+)
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.scores import METRICS, Score, Summary, slices, summarize, weighted_score
 from aerialdojo_gen.benchmark.tables import MODALITIES
 from aerialdojo_gen.store.schemas import SETTINGS
 

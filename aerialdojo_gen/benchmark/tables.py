@@ -1,19 +1,29 @@
-"""The tables of an evaluation that speak of all its episodes: overall, families, parts, scenes, conduct, and the CSV.
+"""The tables of an evaluation: overall, the paper's Tables 4 and 5, families, parts of the tasks, scenes.
 
-Rates are per cent, distances metres; ± is the standard deviation over scenes. `formats` writes tables out.
+Rates are per cent, distances metres; ± is the standard deviation over scenes.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.benchmark.grid import NONE, Measure, Row, Table, measures_of, score_table, values_of
-from aerialdojo_gen.benchmark.metrics import knows_views
-from aerialdojo_gen.benchmark.profiles import Profile
+from aerialdojo_gen.benchmark.intervals import score_intervals
+from aerialdojo_gen.benchmark.metrics import (
+    METRICS,
+    Bools,
+    Profile,
+    Score,
+    knows_views,
+    slices,
+    summarize,
+    weighted_score,
+)
 from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run, episode_outcomes
-from aerialdojo_gen.benchmark.scores import METRICS, Score, slices, summarize
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 MODALITIES = ("semantic", "image")
@@ -188,3 +198,170 @@ def conduct_table(runs: Sequence[Run]) -> Table:
         ("service", ("requests", "tokens in", "tokens out", "USD")),
     )
     return Table("How episodes went", "agent", groups, tuple(rows), sections=sections)
+
+
+_PAPER_TABLES = {"base": "the form of the paper's Table 4", "standard": "the form of the paper's Table 5"}
+# At every radius but the first, as in the paper.
+_FURTHER = ("sr", "sr_view", "osr")
+
+
+def result_tables(
+    runs: Sequence[Run], profiles: Sequence[Profile], intervals: bool = True, beside: Sequence[PaperResult] = ()
+) -> list[Table]:
+    """Make a table for every length setting that any run has flown."""
+    return [
+        _result_table(setting, part, profiles, intervals, [r for r in beside if r.setting == setting])
+        for setting in SETTINGS
+        if (part := in_setting(runs, setting))
+    ]
+
+
+def in_setting(runs: Sequence[Run], setting: str) -> list[Run]:
+    """Return the runs' episodes of a setting; runs that have none are left out."""
+    masks = [run.episodes.setting == setting for run in runs]
+    return [run.where(mask) for run, mask in zip(runs, masks, strict=True) if mask.any()]
+
+
+def _result_table(
+    setting: str, runs: Sequence[Run], profiles: Sequence[Profile], intervals: bool, beside: Sequence[PaperResult]
+) -> Table:
+    shown: list[tuple[Profile, tuple[Measure, ...]]] = [
+        (profile, shown_measures(runs, profile, _FURTHER if k else METRICS)) for k, profile in enumerate(profiles)
+    ]
+    lines = []
+    for run in runs:
+        values: tuple[float, ...] = ()
+        spreads: tuple[float, ...] = ()
+        ends: tuple[tuple[float, float], ...] = ()
+        for profile, measures in shown:
+            summary = summarize(run.episodes, profile)
+            values += values_of(summary.overall, measures)
+            spreads += values_of(summary.deviation, measures)
+            if intervals:
+                known = dict(zip(METRICS, score_intervals(run.episodes, profile), strict=True))
+                ends += tuple(known[m.metric] for m in measures)
+        line = line_of(run, values)
+        lines.append(Row(line.label, values, line.section, line.rivals, spreads, ends))
+    lines += [_paper_line(result, shown) for result in beside]
+    notes = ["Mean of the families, each the mean of its scenes; ± is the standard deviation over scenes."]
+    if any(not math.isnan(low) for line in lines for low, _ in line.intervals):
+        notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
+    counts = {len(run.episodes) for run in runs}
+    if len(counts) == 1:
+        notes.append(f"{counts.pop():,} episodes each.")
+    else:
+        notes.append("Episodes: " + ", ".join(f"{run.label} {len(run.episodes):,}" for run in runs) + ".")
+    if beside:
+        notes.append(
+            "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks, and what its ± "
+            "is it does not say: its rows are no comparison with ours, and are ranked among themselves."
+        )
+    about = f" ({_PAPER_TABLES[setting]})" if setting in _PAPER_TABLES else ""
+    groups = [(profile_head(profile), measures) for profile, measures in shown]
+    return score_table(f"{NAMES[setting]}{about}", "agent", groups, lines, [*notes, *caveats(runs)])
+
+
+def _paper_line(result: PaperResult, shown: Sequence[tuple[Profile, tuple[Measure, ...]]]) -> Row:
+    # Another rule at the same radius is another measure.
+    keys = [
+        (m.metric, profile.radius_m) if profile.name.startswith("aerialdojo") else ("", 0.0)
+        for profile, measures in shown
+        for m in measures
+    ]
+    return Row(
+        result.model,
+        tuple(result.mean.get(key, math.nan) for key in keys),
+        f"another simulator (Unreal Engine; {result.source}), {result.group}-source",
+        "paper",
+        tuple(result.spread.get(key, math.nan) for key in keys),
+    )
+
+
+_DIFFERENCES = (Measure("SR", "sr", signed=True), Measure("OSR", "osr", signed=True))
+_SHORT = ("sr", "sr_view", "osr", "spl")
+
+
+def by_setting(runs: Sequence[Run]) -> Iterable[tuple[str, Run]]:
+    """Yield the parts of runs by length setting, with the heading that they stand under."""
+    for setting in SETTINGS:
+        for run in in_setting(runs, setting):
+            yield NAMES[setting], run
+
+
+def partition_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set scenes of the training's distribution beside those out of it, in every length setting."""
+    return _halves(runs, profile, "ID and OOD scenes", "partition", PARTITIONS, ("ID", "OOD", "OOD − ID, points"))
+
+
+def goal_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set semantic goals beside image goals, in every length setting."""
+    heads = ("Semantic goal", "Image goal", "image − semantic, points")
+    return _halves(runs, profile, "Goal type", "modality", MODALITIES, heads)
+
+
+def _halves(
+    runs: Sequence[Run], profile: Profile, title: str, column: str, names: Sequence[str], heads: tuple[str, str, str]
+) -> Table:
+    """Set the episodes of one value of a column beside those of the other, and the difference of their rates."""
+    lines = []
+    measures = shown_measures(runs, profile)
+    for section, run in by_setting(runs):
+        parts = {name: summarize(p, profile).overall for name, p in slices(run.episodes, column, names)}
+        one, other = (values_of(parts.get(name), measures) for name in names)
+        rates = (values_of(parts.get(name), _DIFFERENCES) for name in names)
+        gap = tuple(b - a for a, b in zip(*rates, strict=True))
+        lines.append(line_of(run, (*one, *other, *gap), rivals=section, section=section))
+    groups = list(zip(heads, (measures, measures, _DIFFERENCES), strict=True))
+    return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines)
+
+
+def type_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set the scene types below one another, by family, a group of columns a run."""
+    scores = []
+    home: dict[str, str] = {}
+    for run in runs:
+        home |= dict(zip(run.episodes.scene_type.tolist(), run.episodes.family.tolist(), strict=True))
+        found: dict[str, Score] = {}
+        for name, part in slices(run.episodes, "scene_type", sorted(home)):
+            found[name] = summarize(part, profile).overall
+        scores.append(found)
+    order = list(FAMILIES.values())
+    types = sorted(home, key=lambda t: (order.index(home[t]) if home[t] in order else len(order), t))
+    table = stacked_table("By scene type", "scene type", runs, profile, types, scores)
+    heads = {i: home[t] for i, t in enumerate(types) if not i or home[t] != home[types[i - 1]]}
+    return Table(table.title, table.stub, table.groups, table.rows, table.notes, heads, table.marks)
+
+
+def average_table(runs: Sequence[Run], profile: Profile) -> Table:
+    """Set the mean of the families beside the mean of all episodes (paper, appendix C: different populations)."""
+    measures = shown_measures(runs, profile)
+
+    def values(run: Run) -> Iterable[float]:
+        both = summarize(run.episodes, profile).overall, weighted_score(run.episodes, profile)
+        return (value for score in both for value in values_of(score, measures))
+
+    groups = [("mean of the families", measures), ("mean of the tasks", measures)]
+    note = "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
+    return run_table(f"Two averages, {profile_head(profile)}", runs, groups, values, [note])
+
+
+def part_table(
+    title: str, runs: Sequence[Run], profile: Profile, parts: Sequence[tuple[str, Sequence[Bools]]], note: str = ""
+) -> Table | None:
+    """Set parts of the episodes, boolean masks of (n,) a run, beside one another.
+
+    None where not two parts have episodes.
+    """
+    there = [(head, masks) for head, masks in parts if any(np.any(mask) for mask in masks)]
+    if len(there) < 2:
+        return None
+    lines: list[Row] = []
+    measures = shown_measures(runs, profile, _SHORT)
+    for k, run in enumerate(runs):
+        values: tuple[float, ...] = ()
+        for _, masks in there:
+            part = run.episodes.where(masks[k])
+            values += values_of(summarize(part, profile).overall if len(part) else None, measures)
+        lines.append(line_of(run, values))
+    groups = [(head, measures) for head, _ in there]
+    return score_table(f"{title}, {profile_head(profile)}", "agent", groups, lines, [note] if note else [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ import pyarrow.compute as pc
 
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.secrets import Secrets
-from aerialdojo_gen.benchmark import billing
 from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.benchmark.agents.goal import Observation
 from aerialdojo_gen.benchmark.agents.load import place
@@ -25,6 +24,48 @@ from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.rendering.backend import close_renderers
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import STEPS
+
+
+def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
+    """Add what two attempts used; what neither knows stays unknown."""
+    if a is None or b is None:
+        return a or b
+    both = {}
+    for name in ("input_tokens", "output_tokens", "cost_usd", "request_s"):
+        known = [v for v in (getattr(a, name), getattr(b, name)) if v is not None]
+        both[name] = sum(known) if known else None
+    longest = [v for v in (a.longest_request_s, b.longest_request_s) if v is not None]
+    return replace(a, requests=a.requests + b.requests, longest_request_s=max(longest, default=None), **both)
+
+
+def _usage_columns(used: Usage | None) -> dict[str, Any]:
+    """Return the columns of `episodes` and `failures` that tell what was used."""
+    if used is None:
+        return dict.fromkeys(("n_requests", "input_tokens", "output_tokens", "cost_usd"))
+    return {
+        "n_requests": used.requests,
+        "input_tokens": used.input_tokens,
+        "output_tokens": used.output_tokens,
+        "cost_usd": used.cost_usd,
+    }
+
+
+def _request_times(used: Usage | None) -> dict[str, Any]:
+    """Return the columns of `timings` that tell how long requests took."""
+    if used is None:
+        return {"request_s": None, "longest_request_s": None}
+    return {"request_s": used.request_s, "longest_request_s": used.longest_request_s}
+
+
+def _cost_usd(used: Usage | None) -> float:
+    """Return the cost, US dollars; 0 where it is not known."""
+    return (used.cost_usd or 0.0) if used is not None else 0.0
+
+
+def _tokens(used: Usage | None) -> int:
+    """Return the tokens, both ways; 0 where they are not known."""
+    return (used.input_tokens or 0) + (used.output_tokens or 0) if used is not None else 0
+
 
 _LONGEST_PAUSE_S = 600.0
 _COLUMNS = [name for name in STEPS.schema.names if name not in ("run_id", "task_id", "scene", "step")]
@@ -124,7 +165,7 @@ class Worker:
             try:
                 record = self._episode(task)
             except AgentUnavailable as error:
-                used = billing.sum_of(used, self._asked.usage())
+                used = _add_usage(used, self._asked.usage())
                 failed = Failed(error.kind, self._line(error))
                 if not error.again:
                     break
@@ -136,14 +177,14 @@ class Worker:
                     raise
                 failed = Failed("agent error", self._line(error))
                 break
-            used = billing.sum_of(used, self._asked.usage())
-            record["episode"] |= billing.columns(used)
-            record["timing"] |= {"attempts": attempt} | billing.times(used)
+            used = _add_usage(used, self._asked.usage())
+            record["episode"] |= _usage_columns(used)
+            record["timing"] |= {"attempts": attempt} | _request_times(used)
             actions = record["episode"]["n_actions"]
-            return record, Finished(1, actions, billing.cost(used), billing.tokens(used), 1)
-        row = {"attempts": attempt, "kind": failed.kind, "reason": failed.reason} | billing.columns(used)
+            return record, Finished(1, actions, _cost_usd(used), _tokens(used), 1)
+        row = {"attempts": attempt, "kind": failed.kind, "reason": failed.reason} | _usage_columns(used)
         record = {"task_id": task.row["task_id"], "failure": self._key(task) | row}
-        return record, Finished(1, 0, billing.cost(used), billing.tokens(used), 0, (failed,))
+        return record, Finished(1, 0, _cost_usd(used), _tokens(used), 0, (failed,))
 
     def _pause(self, attempt: int, asked_s: float | None, stopped: Callable[[], bool]) -> bool:
         """Wait before the next attempt; False if the run is stopped meanwhile."""

@@ -1,4 +1,4 @@
-"""Workers of an evaluation: what each process makes once, and how units are flown by an executor."""
+"""Worker processes of an evaluation: what each creates once, and how an executor runs work units."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.rate_limit import Pace
 from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
 from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
@@ -23,6 +22,18 @@ from aerialdojo_gen.store.root import DataRoot
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
+
+
+class Pace:
+    """Lets requests go at even intervals."""
+
+    def __init__(self, per_minute: float, link: WorkerChannel) -> None:
+        self._interval_s, self._link = 60.0 / per_minute, link
+
+    def wait(self) -> None:
+        """Wait until the next request may be sent."""
+        time.sleep(self._link.turn(self._interval_s))
+
 
 # What a process is taken to need, megabytes, not measured; a model of its own comes on top.
 MEMORY_MB = 1000

@@ -160,7 +160,7 @@ def evaluate(
     quiet: Quiet = False,
 ) -> None:
     """Evaluate an agent on released tasks, closed loop; finished episodes are kept."""
-    from aerialdojo_gen.benchmark.limits import Limits
+    from aerialdojo_gen.benchmark.evaluation import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
     from aerialdojo_gen.benchmark.tasks import Selection
@@ -228,7 +228,7 @@ def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tupl
 
     if preset is None:
         return agent or "random", read_options(agent or "random", given)
-    from aerialdojo_gen.benchmark.llm.presets import preset as find
+    from aerialdojo_gen.benchmark.llm.options import preset as find
 
     found = find(preset)
     if agent is not None and agent != found.agent:

@@ -93,12 +93,11 @@ def report(
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.base.paper_figures import results
     from aerialdojo_gen.benchmark import contents, score_rows
-    from aerialdojo_gen.benchmark.baselines import arranged, with_floors
     from aerialdojo_gen.benchmark.episodes import runs as runs_there
+    from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.paired import paired_tables
-    from aerialdojo_gen.benchmark.profiles import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
-    from aerialdojo_gen.benchmark.runs import load_runs
+    from aerialdojo_gen.benchmark.runs import arranged, load_runs, with_floors
     from aerialdojo_gen.dataset.contents import release_scenes
     from aerialdojo_gen.store.root import open_root
 
@@ -140,14 +139,14 @@ def report(
 
 
 def _show(tables: Any, style: str) -> None:
-    from aerialdojo_gen.benchmark import formats
+    from aerialdojo_gen.benchmark import grid
 
     if style == "terminal":
         width = terminal_width()
-        parts = [*(formats.as_text(table, width) for table in tables), formats.legend(tables)]
+        parts = [*(grid.as_text(table, width) for table in tables), grid.legend(tables)]
         print("\n\n".join(filter(None, parts)))
     else:
-        print("\n\n".join(formats.FORMATS[style](table) for table in tables))
+        print("\n\n".join(grid.FORMATS[style](table) for table in tables))
 
 
 def _groups(given: list[str]) -> dict[str, list[str]]:

@@ -19,7 +19,7 @@ from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
-from aerialdojo_gen.benchmark.limits import Limits
+from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, Outcome, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.benchmark.worker import Conditions

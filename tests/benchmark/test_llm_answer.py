@@ -15,8 +15,7 @@ from hypothesis.extra.numpy import arrays
 from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
-from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, eight
-from aerialdojo_gen.benchmark.llm.answer import parse_answer
+from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, eight, parse_answer
 from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 

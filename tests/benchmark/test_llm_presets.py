@@ -13,7 +13,7 @@ from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules
 from aerialdojo_gen.benchmark.estimate import estimate
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
-from aerialdojo_gen.benchmark.llm.presets import preset, presets
+from aerialdojo_gen.benchmark.llm.options import preset, presets
 from aerialdojo_gen.benchmark.runner import Evaluation
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.store.schemas import ACTION_NAMES

@@ -13,9 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.benchmark.metrics import Episodes, episodes_of, outcomes
-from aerialdojo_gen.benchmark.profiles import PROFILES, Profile, profile_named
-from aerialdojo_gen.benchmark.scores import METRICS, slices, success_curve, summarize
+from aerialdojo_gen.benchmark.metrics import (
+    METRICS,
+    PROFILES,
+    Episodes,
+    Profile,
+    episodes_of,
+    outcomes,
+    profile_named,
+    slices,
+    success_curve,
+    summarize,
+)
 from aerialdojo_gen.store.schemas import FAMILIES
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.benchmark.contents import ReportRequest, left_out, report_tables
 from aerialdojo_gen.benchmark.difficulty import partings_of
-from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv

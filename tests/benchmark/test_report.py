@@ -21,12 +21,11 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError
 from aerialdojo_gen.base.paper_figures import results
-from aerialdojo_gen.benchmark import contents, figures, formats, radar, score_rows, tables
+from aerialdojo_gen.benchmark import contents, figures, grid, score_rows, tables
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
-from aerialdojo_gen.benchmark.profiles import PROFILES, Profile
+from aerialdojo_gen.benchmark.metrics import PROFILES, Profile, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, episode_outcomes, load_runs
-from aerialdojo_gen.benchmark.scores import summarize
 from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow
@@ -135,7 +134,7 @@ def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run])
 def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
     for table in all_tables(runs, AT_3, AT_5):
         plain = dataclasses.replace(table, marks={}, sections={})
-        lines = formats.as_text(plain).splitlines()
+        lines = grid.as_text(plain).splitlines()
         rule = next(k for k, line in enumerate(lines) if set(line) == {"-"})
         body = lines[rule - 1 : rule + 1 + len(table.rows)]
         del body[1]
@@ -148,7 +147,7 @@ def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_a_terminal_of_any_width_has_every_cell_once(runs: list[Run], width: int) -> None:
     for table in all_tables(runs, AT_3, AT_5):
-        text = formats.as_text(dataclasses.replace(table, marks={}), width)
+        text = grid.as_text(dataclasses.replace(table, marks={}), width)
         assert max(map(len, text.splitlines()[1:])) <= width, table.title
         body = text.replace("\n\n", "\n").splitlines()
         for i, (label, cells) in enumerate(table.rows):
@@ -162,7 +161,7 @@ def test_the_best_and_the_second_are_marked_in_every_format() -> None:
     rows = (("a", ("3.20 ± 1.00", "7")), ("", ("2.00–4.00", "")), ("b", ("2.00 ± 1.00", "7")), ("c", ("1.00", "7")))
     table = Table("T", "agent", (("", ("SR", "n")),), rows, sections={0: "open", 3: "closed"},
                   marks={(0, 0): BEST, (2, 0): SECOND})  # fmt: skip
-    assert formats.as_text(table).splitlines()[1:] == [
+    assert grid.as_text(table).splitlines()[1:] == [
         "agent            SR  n",
         "----------------------",
         "open",
@@ -172,11 +171,11 @@ def test_the_best_and_the_second_are_marked_in_every_format() -> None:
         "closed",
         "  c            1.00  7",
     ]
-    assert formats.as_markdown(table).splitlines()[4:7] == [
+    assert grid.as_markdown(table).splitlines()[4:7] == [
         "| *open* |  |  |", "| a | **3.20 ± 1.00** | 7 |", "|  | 2.00–4.00 |  |"
     ]  # fmt: skip
-    assert "<ins>2.00 ± 1.00</ins>" in formats.as_markdown(table)
-    latex = formats.as_latex(table)
+    assert "<ins>2.00 ± 1.00</ins>" in grid.as_markdown(table)
+    latex = grid.as_latex(table)
     assert r"a & \textbf{3.20 $\pm$ 1.00} & 7 \\" in latex
     assert r"b & \underline{2.00 $\pm$ 1.00} & 7 \\" in latex
     assert "\\midrule\n\\multicolumn{3}{l}{\\emph{closed}} \\\\\n" in latex
@@ -186,12 +185,12 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
     table = tables.Table(
         "T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",)
     )
-    markdown = formats.as_markdown(table).splitlines()
+    markdown = grid.as_markdown(table).splitlines()
     assert markdown[2] == "| agent | n | 50 %: a ↑ | 50 %: b |"
     assert markdown[3] == "| --- | ---: | ---: | ---: |"
     assert r"\<script\>" in markdown[4]
     assert r"\| ä" in markdown[4]
-    latex = formats.as_latex(table)
+    latex = grid.as_latex(table)
     assert r"\begin{tabular}{lrrr}" in latex
     assert r"\multicolumn{2}{c}{50 \%}" in latex
     assert r"\cmidrule(lr){3-4}" in latex
@@ -200,17 +199,17 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
     assert r"\caption{T\_1. N \& M}" in latex
     for real in all_tables(runs, AT_3):
         columns = 1 + sum(len(names) for _, names in real.groups)
-        body = formats.as_latex(real).split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
+        body = grid.as_latex(real).split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
         lines = [line for line in body.strip().splitlines() if not line.startswith(("\\multi", "\\midrule"))]
         cells = [line.count("&") for line in lines]
         assert cells == [columns - 1] * len(real.rows)
-        assert {line.count("|") for line in formats.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
+        assert {line.count("|") for line in grid.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
 
 
 def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
     labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
     made = contents.ReportRequest(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
-    text = "\n\n".join(map(formats.as_latex, contents.report_tables(made, ["all"])))
+    text = "\n\n".join(map(grid.as_latex, contents.report_tables(made, ["all"])))
     if compiler := shutil.which("pdflatex"):
         head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
         (tmp_path / "t.tex").write_text(f"{head}\\begin{{document}}\n{text}\n\\end{{document}}\n")
@@ -245,7 +244,7 @@ def test_a_radar_of_agents_that_hardly_solve_anything_is_no_dot(tmp_path: Path) 
     runs = load_runs(tmp_path, ["a", "b"])
     weak = summarize(runs[0].episodes, AT_3)
     assert 0.0 < weak.overall.sr < 0.01
-    for draw in (radar.metric_radars, radar.family_radars):
+    for draw in (figures.metric_radars, figures.family_radars):
         figure = draw(runs, AT_3)
         axes = figure.axes
         assert [line.get_label() for line in axes[0].lines] == ["weak"]
@@ -253,11 +252,11 @@ def test_a_radar_of_agents_that_hardly_solve_anything_is_no_dot(tmp_path: Path) 
         # The best family's value lies in the outer half of some axis, and none beyond its end.
         assert max(reached) > 0.5
         assert all(0.0 <= value <= 1.0 for value in reached)
-    sr = radar.metric_radars(runs, AT_3).axes[0].lines[0].get_ydata()[:4]
-    ends = radar.axis_end(100.0 * max(s.sr for s in weak.families.values()))
+    sr = figures.metric_radars(runs, AT_3).axes[0].lines[0].get_ydata()[:4]
+    ends = figures.axis_end(100.0 * max(s.sr for s in weak.families.values()))
     assert list(sr) == pytest.approx([100.0 * s.sr / ends for s in weak.families.values()])
     # Few metres are better than many: outwards.
-    dts = radar.metric_radars(runs, AT_3).axes[3].lines[0].get_ydata()[:4]
+    dts = figures.metric_radars(runs, AT_3).axes[3].lines[0].get_ydata()[:4]
     order = [s.dts_m for s in weak.families.values()]
     assert np.argsort(dts).tolist() == np.argsort(order)[::-1].tolist()
 
@@ -266,7 +265,7 @@ def test_a_radar_of_agents_that_hardly_solve_anything_is_no_dot(tmp_path: Path) 
     ("largest", "end"), [(0.0, 1.0), (0.53, 0.6), (0.6, 0.6), (3.2, 4.0), (7.84, 8.0), (58.96, 60.0), (96.0, 100.0)]
 )
 def test_axes_end_at_round_numbers(largest: float, end: float) -> None:
-    assert radar.axis_end(largest, 100.0) == pytest.approx(end)
+    assert figures.axis_end(largest, 100.0) == pytest.approx(end)
 
 
 def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
@@ -286,7 +285,7 @@ def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
 
 
 def test_figures_have_every_run_in_its_colour_and_no_date(runs: list[Run]) -> None:
-    for draw in (radar.metric_radars, radar.family_radars, figures.radius_curve):
+    for draw in (figures.metric_radars, figures.family_radars, figures.radius_curve):
         svg, png = (figures.encoded(draw(runs, AT_3), kind) for kind in ("svg", "png"))
         assert b"dc:date" not in svg
         assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
@@ -301,7 +300,7 @@ def test_figures_have_every_run_in_its_colour_and_no_date(runs: list[Run]) -> No
 
 def test_a_figure_of_some_families_has_gaps_and_no_zeros(tmp_path: Path) -> None:
     write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0", "D_Flood_0"])
-    figure = radar.metric_radars(load_runs(tmp_path), AT_3)
+    figure = figures.metric_radars(load_runs(tmp_path), AT_3)
     values = figure.axes[0].lines[0].get_ydata()
     assert [math.isnan(v) for v in values] == [False, True, True, False, False]
 

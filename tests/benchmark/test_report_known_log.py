@@ -15,13 +15,11 @@ from support.run_logs import episode
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.paper_figures import results
-from aerialdojo_gen.benchmark import breakdowns, contents, difficulty, intervals, paired, radii, score_rows
-from aerialdojo_gen.benchmark.baselines import arranged, with_floors
-from aerialdojo_gen.benchmark.formats import as_text
-from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
-from aerialdojo_gen.benchmark.paper_tables import result_tables
-from aerialdojo_gen.benchmark.profiles import PROFILES
-from aerialdojo_gen.benchmark.runs import Run, load_runs
+from aerialdojo_gen.benchmark import contents, difficulty, intervals, paired, radii, score_rows, tables
+from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table, as_text
+from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.benchmark.runs import Run, arranged, load_runs, with_floors
+from aerialdojo_gen.benchmark.tables import result_tables
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
@@ -167,17 +165,17 @@ def test_tables_4_and_5(runs: list[Run]) -> None:
 
 def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) -> None:
     # ID scenes: ¼, ½, 0, 0; OOD scenes: 0, 0, 1, 0.
-    partition = cells(breakdowns.partition_table(runs, AT_3), "package:Alpha")
+    partition = cells(tables.partition_table(runs, AT_3), "package:Alpha")
     assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
     # OSR ¼, 1, 1, 1 and ½, 0, 1, 0.
     assert (partition[1], partition[6], partition[11]) == ("81.25", "37.50", "−43.75")
     # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
-    goal = cells(breakdowns.goal_table(runs, AT_3), "package:Alpha")
+    goal = cells(tables.goal_table(runs, AT_3), "package:Alpha")
     assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")
     # 4 of 18 tasks, 10 of 18 visits.
-    average = cells(breakdowns.average_table(runs, AT_3), "package:Alpha")
+    average = cells(tables.average_table(runs, AT_3), "package:Alpha")
     assert (average[0], average[5], average[1], average[6]) == ("21.88", "22.22", "59.38", "55.56")
-    types = breakdowns.type_table(runs, AT_3)
+    types = tables.type_table(runs, AT_3)
     assert [label for label, _ in types.rows] == ["Mall", "Coast", "Harbor", "Flood"]
     assert list(types.sections.values()) == ["Urban", "Natural", "Infrastructure", "Disaster"]
     assert [row[0] for _, row in types.rows] == ["12.50", "25.00", "50.00", "0.00"]

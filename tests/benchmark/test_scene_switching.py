@@ -9,8 +9,7 @@ import pytest
 
 from aerialdojo_gen import make_env
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.draw import TaskDraw
-from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.benchmark.tasks import TaskDraw, mesh_of
 from aerialdojo_gen.learning.vector import OwnScenes
 from aerialdojo_gen.scenes.context import context_of, open_contexts, open_scene, prefetch_mesh, release_scene
 from aerialdojo_gen.scenes.context import release_scenes as let_go

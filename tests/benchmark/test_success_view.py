@@ -21,7 +21,7 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json

@@ -17,7 +17,7 @@ from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observati
 from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.llm.prompt import Sight, goal_text, system_prompt
-from aerialdojo_gen.benchmark.profiles import PROFILES
+from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv

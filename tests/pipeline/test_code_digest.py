@@ -13,7 +13,7 @@ import pytest
 import aerialdojo_gen
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
-from aerialdojo_gen.benchmark.flying_code import flying_code
+from aerialdojo_gen.benchmark.evaluation import flying_code
 from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import code_digest
 from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code

@@ -1,6 +1,6 @@
 """A journal that a lost worker has begun."""
 
-from aerialdojo_gen.benchmark.journal import Journal, read
+from aerialdojo_gen.benchmark.journal import Journal, read_journal
 
 
 def test_a_journal_that_was_begun_is_gone_on_with(tmp_path):
@@ -13,4 +13,4 @@ def test_a_journal_that_was_begun_is_gone_on_with(tmp_path):
     with Journal(path) as journal:
         assert journal.done == {"a"}
         journal.add({"task_id": "c"})
-    assert [record["task_id"] for record in read(path)] == ["a", "c"]
+    assert [record["task_id"] for record in read_journal(path)] == ["a", "c"]

@@ -1,13 +1,18 @@
-"""Options of an agent that asks a language model."""
+"""Options of an agent that asks a language model, and presets of models by name."""
 
 from __future__ import annotations
 
+import tomllib
+from functools import cache
+from importlib.resources import files
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.llm_client.service import check_url
-from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, ActionSet, eight
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet, eight
 
 View = Literal["front", "left", "right", "down"]
 Form = Literal["auto", "json", "tool", "text"]
@@ -85,3 +90,31 @@ class Options(BaseModel):
         if input_tokens is None or output_tokens is None or prices[0] is None or prices[1] is None:
             return None
         return (input_tokens * prices[0] + output_tokens * prices[1]) / 1e6
+
+
+class Preset(BaseModel):
+    """A language model, and how it is asked."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str  # What people call it
+    paper: bool = False  # Whether it is one of the paper's nine
+    served: str  # By whom: vLLM, Ollama, or a vendor
+    serve: str | None = None  # A command that serves it on this machine
+    agent: Literal["openai", "anthropic"] = "openai"  # ``openai`` or ``anthropic``: the protocol
+    options: dict[str, Any]  # Of the agent
+
+
+@cache
+def presets() -> dict[str, Preset]:
+    """Return all presets by name, in their order."""
+    text = files("aerialdojo_gen.benchmark.llm").joinpath("presets.toml").read_text(encoding="utf-8")
+    return {name: Preset.model_validate(value) for name, value in tomllib.loads(text).items()}
+
+
+def preset(name: str) -> Preset:
+    """Find a preset."""
+    known = presets()
+    if name not in known:
+        raise UsageError(unknown("no preset", name, known))
+    return known[name]

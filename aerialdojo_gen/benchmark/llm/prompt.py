@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
-from aerialdojo_gen.benchmark.llm.actions import SIXTEEN, ActionSet
+from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet
 
 _LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
 
