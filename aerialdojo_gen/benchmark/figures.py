@@ -52,10 +52,10 @@ def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0)
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside right upper", frameon=False)
 
-    return figure_of(draw, (6.0, 3.4))
+    return draw_figure(draw, (6.0, 3.4))
 
 
-def figure_of(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
+def draw_figure(draw: Callable[[Figure], None], size_inches: tuple[float, float]) -> Figure:
     """Draw a figure in the common style; nothing of it stays behind."""
     # Not pyplot: that keeps figures for a screen that nobody looks at.
     import matplotlib
@@ -67,7 +67,7 @@ def figure_of(draw: Callable[[Figure], None], size_inches: tuple[float, float]) 
     return figure
 
 
-def encoded(figure: Figure, kind: str) -> bytes:
+def encode_figure(figure: Figure, kind: str) -> bytes:
     """Encode a figure; the same figure gives the same bytes."""
     import matplotlib
 
@@ -122,7 +122,7 @@ def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
             *panels[0].get_legend_handles_labels(), loc="center", frameon=False, title=_note(runs), title_fontsize=8
         )
 
-    return figure_of(draw, (7.6, 5.4))
+    return draw_figure(draw, (7.6, 5.4))
 
 
 def family_radars(runs: Sequence[Run], profile: Profile) -> Figure:
@@ -150,7 +150,7 @@ def family_radars(runs: Sequence[Run], profile: Profile) -> Figure:
         )
         figure.suptitle(f"At the centre: {middle}", size=8, color="#555555")
 
-    return figure_of(draw, (6.8, 7.0))
+    return draw_figure(draw, (6.8, 7.0))
 
 
 def _note(runs: Sequence[Run]) -> str | None:

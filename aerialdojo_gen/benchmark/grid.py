@@ -19,10 +19,10 @@ class Table:
     """A table of text."""
 
     title: str  # What it shows
-    stub: str  # Head of the first column
-    groups: tuple[tuple[str, tuple[str, ...]], ...]  # Groups of columns: their head, and the heads of the columns
+    stub: str  # Heading of the first column
+    groups: tuple[tuple[str, tuple[str, ...]], ...]  # Groups of columns: heading, headings of the columns
     rows: tuple[tuple[str, tuple[str, ...]], ...]  # tuple of (str, tuple of str)
-    notes: tuple[str, ...] = ()  # What must be known to read it
+    notes: tuple[str, ...] = ()  # Printed below it
     sections: Mapping[int, str] = field(default_factory=dict)
     marks: Mapping[tuple[int, int], str] = field(default_factory=dict)  # `BEST` or `SECOND`, by row and cell
 
@@ -33,7 +33,7 @@ class Measure:
 
     head: str  # Its heading
     metric: str
-    signed: bool = False  # Whether it is a difference: printed with its sign, and none is the best
+    signed: bool = False  # Whether it is a difference: printed with its sign, never marked as best
 
     def text(self, value: float) -> str:
         """Format a value: two decimals, as the paper has them; a dash for NaN."""
@@ -48,7 +48,7 @@ class Measure:
 
     @property
     def direction(self) -> int:
-        """1 where more is better, -1 where less is, 0 for differences."""
+        """1 if higher is better, -1 if lower is, 0 for differences."""
         return 0 if self.signed else -1 if self.metric in ("dts_m", "cr") else 1
 
 
@@ -57,24 +57,24 @@ MEASURES = tuple(Measure(HEADS[metric], metric) for metric in METRICS)
 
 @dataclass(frozen=True)
 class Row:
-    """A line of a table of scores."""
+    """A row of a table of scores."""
 
     label: str  # First column
-    values: tuple[float, ...]  # A value a measure: fractions and metres; NaN where there is none
-    section: str = ""  # Heading that it stands under; empty for none
-    rivals: str | None = ""
-    spreads: tuple[float, ...] = ()  # ± of every value, or empty
-    intervals: tuple[tuple[float, float], ...] = ()  # Interval of every value, or empty; printed in a row of its own
-    before: tuple[str, ...] = ()  # Cells of columns that are no measures, and stand first
+    values: tuple[float, ...]  # One per measure: fractions and metres; NaN for unknown
+    section: str = ""  # Heading of its section; empty for none
+    rank_group: str | None = ""
+    spreads: tuple[float, ...] = ()  # Deviation of every value, or empty
+    intervals: tuple[tuple[float, float], ...] = ()  # Interval of every value, or empty; printed in an extra row
+    leading_cells: tuple[str, ...] = ()  # Cells of leading columns that are no measures
 
 
 def measures_of(known: bool, metrics: Sequence[str] = METRICS) -> tuple[Measure, ...]:
-    """Take measures by their metrics; SR-view only where it is known of any run."""
+    """Select measures by metric; SR-view only if any run logs it."""
     return tuple(m for m in MEASURES if m.metric in metrics and (known or m.metric != "sr_view"))
 
 
 def values_of(score: Score | None, measures: Sequence[Measure]) -> tuple[float, ...]:
-    """Take the measures out of a score; NaN where there is none."""
+    """Return the measures of a score; NaN if there is none."""
     return tuple(math.nan if score is None else float(getattr(score, m.metric)) for m in measures)
 
 
@@ -84,9 +84,9 @@ def score_table(
     groups: Sequence[tuple[str, Sequence[Measure]]],
     lines: Sequence[Row],
     notes: Sequence[str] = (),
-    before: tuple[str, ...] = (),
+    leading_cells: tuple[str, ...] = (),
 ) -> Table:
-    """Write lines of scores as a table."""
+    """Make a table from rows of scores."""
     measures = [m for _, part in groups for m in part]
     rows: list[tuple[str, tuple[str, ...]]] = []
     sections: dict[int, str] = {}
@@ -100,19 +100,24 @@ def score_table(
         for k, spread in enumerate(line.spreads):
             if not math.isnan(spread):
                 cells[k] += f" ± {measures[k].text(spread)}"
-        rows.append((line.label, (*line.before, *cells)))
+        rows.append((line.label, (*line.leading_cells, *cells)))
         if any(not math.isnan(low) for low, _ in line.intervals):
             shown = tuple(_interval(m, *ends) for m, ends in zip(measures, line.intervals, strict=True))
-            rows.append(("", ("",) * len(before) + shown))
+            rows.append(("", ("",) * len(leading_cells) + shown))
     marks = {
-        (row_of[i], len(before) + k): mark
+        (row_of[i], len(leading_cells) + k): mark
         for k, measure in enumerate(measures)
         for i, mark in _marks(measure, lines, k).items()
     }
     heads = [(head, tuple(m.head for m in part)) for head, part in groups]
-    if before:
-        heads.insert(0, ("", before))
+    if leading_cells:
+        heads.insert(0, ("", leading_cells))
     return Table(title, stub, tuple(heads), tuple(rows), tuple(notes), sections, marks)
+
+
+def section_heads(groups: Sequence[str]) -> dict[int, str]:
+    """Headings of sections, by the row that each begins at."""
+    return {k: group for k, group in enumerate(groups) if group != (groups[k - 1] if k else "")}
 
 
 def _interval(measure: Measure, low: float, high: float) -> str:
@@ -120,24 +125,24 @@ def _interval(measure: Measure, low: float, high: float) -> str:
 
 
 def _marks(measure: Measure, lines: Sequence[Row], k: int) -> dict[int, str]:
-    """Find the best and the second best of a column among rivals, as they are printed: equal figures share a mark."""
+    """Find the best and second best of a column per rank group, as printed: equal figures share a mark."""
     if not measure.direction:
         return {}
-    races: dict[str, list[tuple[float, int]]] = {}
+    groups: dict[str, list[tuple[float, int]]] = {}
     for i, line in enumerate(lines):
-        if line.rivals is not None and not math.isnan(line.values[k]):
+        if line.rank_group is not None and not math.isnan(line.values[k]):
             value = measure.direction * measure.printed(line.values[k])
-            races.setdefault(line.rivals, []).append((value, i))
+            groups.setdefault(line.rank_group, []).append((value, i))
     marks = {}
-    for race in races.values():
-        levels = sorted({value for value, _ in race}, reverse=True)
-        # Where all are alike there is no best.
+    for ranked in groups.values():
+        levels = sorted({value for value, _ in ranked}, reverse=True)
+        # All equal: no best.
         if len(levels) < 2:
             continue
-        for value, i in race:
+        for value, i in ranked:
             if value == levels[0]:
                 marks[i] = BEST
-            # The last is second only in name.
+            # Of two values the second is the last.
             elif value == levels[1] and len(levels) > 2:
                 marks[i] = SECOND
     return marks
@@ -147,7 +152,7 @@ _SIGNS = {BEST: "¹", SECOND: "²"}
 
 
 def as_text(table: Table, width: int | None = None) -> str:
-    """Write a table for a terminal; the best has ¹, the second ²."""
+    """Format a table for a terminal; the best has ¹, the second ²."""
     columns = [Column(name, group) for group, names in table.groups for name in names]
     heads = [column.head for column in columns]
     cells = [list(row) for _, row in table.rows]
@@ -155,7 +160,7 @@ def as_text(table: Table, width: int | None = None) -> str:
     for i, line in enumerate([heads, *cells]):
         for k in range(len(heads)):
             sign = _SIGNS.get(table.marks.get((i - 1, k), ""), " ")
-            # The mean is what is marked: the sign takes the place of the blank behind it.
+            # The mark belongs to the mean: it replaces the blank behind it.
             line[k] = line[k].replace(" ± ", f"{sign}± ") if " ± " in line[k] else line[k] + sign * (k in bare)
     return "\n".join(
         TextTable(
@@ -170,14 +175,14 @@ def as_text(table: Table, width: int | None = None) -> str:
 
 
 def legend(tables: Sequence[Table]) -> str:
-    """Say what the marks in tables for a terminal mean; empty where there are none."""
+    """Explain the marks in terminal tables; empty if there are none."""
     if not any(table.marks for table in tables):
         return ""
     return "¹ best, ² second of those compared; the oracle, which is given the route, is not."
 
 
 def as_markdown(table: Table) -> str:
-    """Write a table in Markdown; a column's head has its group's, for Markdown knows no groups."""
+    """Format a table in Markdown; a column's heading includes its group's, as Markdown has no groups."""
     heads = [table.stub, *(f"{group}: {name}" if group else name for group, names in table.groups for name in names)]
     rule = ["---", *["---:"] * (len(heads) - 1)]
     lines = [f"**{_plain(table.title)}**", "", _pipes(map(_plain, heads)), _pipes(rule)]
@@ -204,7 +209,7 @@ def _plain(text: str) -> str:
 
 
 def as_latex(table: Table) -> str:
-    """Write a table in LaTeX, for the package booktabs."""
+    """Format a table in LaTeX, for the package booktabs."""
     columns = "l" + "".join("r" * len(names) for _, names in table.groups)
     notes = [*table.notes, *(["Bold: best; underlined: second."] if table.marks else [])]
     lines = [r"\begin{table}", r"\centering", r"\caption{" + _tex(" ".join((table.title + ".", *notes))) + "}"]
@@ -229,7 +234,7 @@ def as_latex(table: Table) -> str:
             for k, cell in enumerate(cells)
         ]
         row = " & ".join([_tex(label), *shown])
-        # What begins with a bracket would be an argument of the end of the row above it.
+        # A leading bracket would be read as an argument of the previous row's end.
         lines.append(("{}" if row.startswith(("[", "*")) else "") + row + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", r"\end{table}"])
 

@@ -1,4 +1,4 @@
-"""How results hang on the radius that counts as success: gains, rank reversals, visits that end as failures."""
+"""Results by success radius: gains, rank reversals, visits that end as failures."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table
+from aerialdojo_gen.benchmark.grid import Measure, Row, Table, score_table, section_heads
 from aerialdojo_gen.benchmark.metrics import Floats, Profile, outcomes, success_curve
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.tables import NAMES, by_setting, line_of
-from aerialdojo_gen.store.schemas import SETTINGS
+from aerialdojo_gen.benchmark.tables import by_setting, run_row
 
 DEFAULT_RADII_M = (3.0, 5.0)
-# Beyond these a reader looks at the ranks' own columns.
+# Reversals that a note lists.
 _MOST_REVERSALS = 6
 
 
 def at_radius(profile: Profile, radius_m: float) -> Profile:
-    """Return a rule with another radius, and a name that says so."""
+    """Return a success rule with another radius, named by it."""
     if radius_m == profile.radius_m:
         return profile
     name = "aerialdojo" if profile.name.startswith("aerialdojo") else profile.name
@@ -29,35 +28,32 @@ def at_radius(profile: Profile, radius_m: float) -> Profile:
 
 
 def radius_table(runs: Sequence[Run], profile: Profile, radii_m: Sequence[float] = DEFAULT_RADII_M) -> Table:
-    """Set SR and OSR at several radii, metres, side by side.
-
-    Notes name the agents whose order changes between radii.
-    """
+    """SR and OSR at several radii, metres; notes name the agents whose order changes between radii."""
     radii = sorted(set(radii_m))
-    swept = not profile.planar and all(run.swept_distance_m is not None for run in runs)
+    segments = not profile.planar and all(run.path_clearance_to_goal_m is not None for run in runs)
     lines: list[Row] = []
     rates: dict[str, list[tuple[str, Floats]]] = {}
     for section, run in by_setting(runs):
         sr, osr = success_curve(run.episodes, profile, np.array(radii))
         values = [*sr, *osr]
-        if swept and run.swept_distance_m is not None:
+        if segments and run.path_clearance_to_goal_m is not None:
             # The heights of the goal are not in the log: only the distance in space is known along the way.
-            passed = replace(run.episodes, min_distance_m=run.swept_distance_m)
+            passed = replace(run.episodes, min_distance_m=run.path_clearance_to_goal_m)
             values += [*success_curve(passed, profile, np.array(radii))[1]]
         values += [*np.diff(sr), *(osr - sr)]
-        lines.append(line_of(run, tuple(float(v) for v in values), rivals=section, section=section))
+        lines.append(run_row(run, tuple(float(v) for v in values), rank_group=section, section=section))
         rates.setdefault(section, []).append((run.label, sr))
     heads = [f"{radius:g} m" for radius in radii]
     gains = [Measure(f"{near:g}→{far:g} m", "sr", signed=True) for near, far in pairwise(radii)]
     groups = [
         ("SR ↑", [Measure(h, "sr") for h in heads]),
         ("OSR, at poses ↑", [Measure(h, "osr") for h in heads]),
-        *([("OSR, along the way ↑", [Measure(h, "osr") for h in heads])] if swept else []),
+        *([("OSR, along the way ↑", [Measure(h, "osr") for h in heads])] if segments else []),
         *([("SR gain, points", gains)] if gains else []),
         ("OSR − SR, points", [Measure(h, "sr", True) for h in heads]),
     ]
     notes = ["OSR at poses is the paper's: the distance is taken after every action."]
-    if swept:
+    if segments:
         notes[0] += " Along the way it is taken on every segment flown: a move may pass the goal and end beyond it."
     notes += [note for section, ranked in rates.items() for note in _reversals(section, radii, ranked)]
     rule = "" if profile.name.startswith("aerialdojo") else f", {profile.name}"
@@ -81,18 +77,10 @@ def _reversals(section: str, radii: Sequence[float], ranked: Sequence[tuple[str,
 
 
 def visit_table(runs: Sequence[Run], profile: Profile) -> Table:
-    """Say where visits are lost: episodes that were within the radius and are no success, by how they ended."""
-    rows: list[tuple[str, tuple[str, ...]]] = []
-    sections: dict[int, str] = {}
-    above = ""
-    for setting in SETTINGS:
-        for run in runs:
-            part = run.where(run.episodes.setting == setting)
-            if not len(part.episodes):
-                continue
-            if NAMES[setting] != above:
-                sections[len(rows)] = above = NAMES[setting]
-            rows.append((run.label, _visits(part, profile)))
+    """Episodes that were within the radius and are no success, by how they ended."""
+    flown = list(by_setting(runs))
+    rows = tuple((run.label, _visits(run, profile)) for _, run in flown)
+    sections = section_heads([section for section, _ in flown])
     groups = (
         ("episodes", ("flown", "visited", "solved", "lost")),
         ("lost: how they ended, %", ("too far", "collided", "ran out", "no Stop")),
@@ -102,7 +90,7 @@ def visit_table(runs: Sequence[Run], profile: Profile) -> Table:
         "stopped outside; ran out: of actions, outside; no Stop: ran out of actions within the radius. Episodes are "
         "counted, families not averaged.",
     )
-    return Table(f"Where visits are lost, {profile.radius_m:g} m", "agent", groups, tuple(rows), notes, sections)
+    return Table(f"Where visits are lost, {profile.radius_m:g} m", "agent", groups, rows, notes, sections)
 
 
 def _visits(run: Run, profile: Profile) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import markupsafe
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.contents import ReportRequest, named_tables
-from aerialdojo_gen.benchmark.figures import encoded, family_radars, metric_radars, radius_curve
+from aerialdojo_gen.benchmark.figures import encode_figure, family_radars, metric_radars, radius_curve
 from aerialdojo_gen.benchmark.grid import Table, as_latex, as_markdown
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
@@ -28,20 +28,20 @@ from aerialdojo_gen.store.atomic import atomic_file
 _FOLDED = ("type", "scene")
 
 
-def write_report(out: Path, wanted: ReportRequest, replays: Sequence[Replay]) -> list[Path]:
+def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -> list[Path]:
     """Write everything that there is to say of some runs."""
-    named = named_tables(wanted, ["all"])
+    named = named_tables(request, ["all"])
     tables = [table for made in named.values() for table in made]
-    drawn_runs, _ = _of_the_radar(wanted.runs)
+    drawn_runs, _ = _of_the_radar(request.runs)
     drawn = {
-        "families": metric_radars(drawn_runs, wanted.profiles[0]),
-        "radar": family_radars(drawn_runs, wanted.profiles[0]),
-        "radius": radius_curve(wanted.runs, wanted.profiles[0]),
+        "families": metric_radars(drawn_runs, request.profiles[0]),
+        "radar": family_radars(drawn_runs, request.profiles[0]),
+        "radius": radius_curve(request.runs, request.profiles[0]),
     }
-    figures = {(name, kind): encoded(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
-    scored = wanted.runs, wanted.profiles, wanted.beside, wanted.partings
+    figures = {(name, kind): encode_figure(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
+    scored = request.runs, request.profiles, request.paper_results, request.breakdowns
     files = {
-        "report.html": html(wanted, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
+        "report.html": html(request, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
         "metrics.csv": as_csv(*scored).encode(),
         "metrics.json": as_json(*scored).encode(),
         "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
@@ -61,7 +61,7 @@ def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
 
 
 def html(
-    wanted: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]
+    request: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]
 ) -> str:
     """Write the page."""
     folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
@@ -78,8 +78,8 @@ def html(
     environment.globals |= {
         "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "span": _span_m
     }  # fmt: skip
-    first = wanted.profiles[0]
-    _, tasks = _of_the_radar(wanted.runs)
+    first = request.profiles[0]
+    _, tasks = _of_the_radar(request.runs)
     captions = {
         "families": f"{tasks} at {first.radius_m:g} m, a chart a metric: axes end where the data does",
         "radar": f"{tasks} at {first.radius_m:g} m, a chart a family; outwards is better",
@@ -87,13 +87,13 @@ def html(
     }
     return environment.get_template("report.html.j2").render(
         version=__version__,
-        runs=wanted.runs,
-        profiles=wanted.profiles,
+        runs=request.runs,
+        profiles=request.profiles,
         tables=[table for name, made in tables.items() if name not in _FOLDED for table in made],
         folded=[table for name in _FOLDED for table in tables.get(name, [])],
         figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
         replays=replays,
-        left_out=wanted.partings.left_out,
+        missing_note=request.breakdowns.missing_note,
         style=style,
         script=script,
         style_hash=_hash(style),

@@ -24,7 +24,7 @@ from aerialdojo_gen.store.schemas import TERMINATIONS
 STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
 
 
-def swept_distances(episodes: pa.Table, steps: pa.Table) -> Floats:
+def path_clearances(episodes: pa.Table, steps: pa.Table) -> Floats:
     """Smallest distance to the goal over the flown segments, (n,) metres.
 
     A segment and its end distances fix a triangle.
@@ -59,8 +59,8 @@ def _nearest_on_segment(way: Floats, begin_m: Floats, end_m: Floats) -> Floats:
 
 
 # What is no contender: the one that knows the way, and those that look at nothing.
-UPPER_BOUND, FLOORS = "upper bound", "floors"
-GROUP_OF = {"oracle": UPPER_BOUND, "stop": FLOORS, "constant": FLOORS, "random": FLOORS}
+UPPER_BOUND, BASELINES = "upper bound", "floors"
+GROUP_OF = {"oracle": UPPER_BOUND, "stop": BASELINES, "constant": BASELINES, "random": BASELINES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +84,11 @@ class Run:
         return replace(self, table=self.table.take(pa.array(chosen)), episodes=self.episodes.where(chosen))
 
     @cached_property
-    def swept_distance_m(self) -> Floats | None:
+    def path_clearance_to_goal_m(self) -> Floats | None:
         """Smallest distance to the goal anywhere on the way, (n,) float64, metres; None where no steps are logged."""
         if self.log is None or not has_table(self.log, self.name, "steps"):
             return None
-        return swept_distances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
+        return path_clearances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
 
 
 def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
@@ -126,7 +126,7 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
 
 
 @dataclass(frozen=True)
-class Conduct:
+class EpisodeOutcomes:
     """How a run's episodes went, whatever they earned."""
 
     episodes: int  # How many
@@ -140,7 +140,7 @@ class Conduct:
     cost_usd: float | None  # None where prices are not known
 
 
-def episode_outcomes(run: Run) -> Conduct:
+def episode_outcomes(run: Run) -> EpisodeOutcomes:
     """Count how a run's episodes went."""
     n = len(run.episodes)
     ends = run.table["termination"].to_pylist()
@@ -150,7 +150,7 @@ def episode_outcomes(run: Run) -> Conduct:
         return None if run.table[name].null_count else int(pc.sum(run.table[name]).as_py() or 0)
 
     costs = run.table["cost_usd"]
-    return Conduct(
+    return EpisodeOutcomes(
         n,
         {how: ends.count(how) / n for how in TERMINATIONS},
         float(run.episodes.n_actions.mean()),
@@ -163,10 +163,10 @@ def episode_outcomes(run: Run) -> Conduct:
     )
 
 
-_FLOOR_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == FLOORS)
+_BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == BASELINES)
 
 
-def with_floors(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
+def with_baselines(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
     """Add the floors that were flown on the same tasks and are not among the runs."""
     there = {run.agent for run in runs}
     wanted = {task for run in runs for task in run.table["task_id"].to_pylist()}
@@ -174,25 +174,25 @@ def with_floors(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
     for name in run_names(log):
         if name in {run.name for run in runs}:
             continue
-        (run,) = load_runs(log, [name]) if _is_floor(log, name) else (None,)
+        (run,) = load_runs(log, [name]) if _is_baseline(log, name) else (None,)
         if run is None or run.agent in there or run.agent in added:
             continue
         mask = np.array([task in wanted for task in run.table["task_id"].to_pylist()], dtype=np.bool_)
         if mask.sum() == len(wanted):
             added[run.agent] = run.where(mask)
-    return [*runs, *(added[agent] for agent in _FLOOR_AGENTS if agent in added)]
+    return [*runs, *(added[agent] for agent in _BASELINE_AGENTS if agent in added)]
 
 
-def _is_floor(log: DataRoot, name: str) -> bool:
+def _is_baseline(log: DataRoot, name: str) -> bool:
     try:
         agents = read_run(log, name, columns=["agent"])["agent"]
     except StoreError:
         # Nobody asked for this run: it may be as broken as it likes.
         return False
-    return len(agents) > 0 and agents[0].as_py() in _FLOOR_AGENTS
+    return len(agents) > 0 and agents[0].as_py() in _BASELINE_AGENTS
 
 
-def arranged(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:
+def group_runs(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:
     """Put runs in order by their groups: the user's own, the others, then the upper bound and the floors."""
     chosen = dict(groups or {})
     for heading, names in chosen.items():
@@ -201,7 +201,7 @@ def arranged(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = N
                 raise UsageError(f"group {heading!r}: {unknown('no run', name, [run.name for run in runs])}")
 
     others = "other agents" if chosen else "agents"
-    order = [*chosen, others, UPPER_BOUND, FLOORS]
+    order = [*chosen, others, UPPER_BOUND, BASELINES]
     grouped = [
         replace(
             run,

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from aerialdojo_gen.base.paper_figures import PaperResult
-from aerialdojo_gen.benchmark.difficulty import Partings
+from aerialdojo_gen.benchmark.difficulty import Breakdowns
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import (
     METRICS,
@@ -29,20 +29,20 @@ from aerialdojo_gen.store.schemas import SETTINGS
 _HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")
 _ENDS = tuple(f"{metric}_{end}95" for metric in METRICS for end in ("low", "high"))
 COLUMNS = (*_HEAD, *METRICS, *(f"{metric}_sd" for metric in METRICS), *_ENDS, "told")
-_NO_PARTINGS = Partings()
+_NO_BREAKDOWNS = Breakdowns()
 
 
 def as_csv(
     runs: Sequence[Run],
     profiles: Sequence[Profile],
-    beside: Sequence[PaperResult] = (),
-    partings: Partings = _NO_PARTINGS,
+    paper_results: Sequence[PaperResult] = (),
+    breakdowns: Breakdowns = _NO_BREAKDOWNS,
 ) -> str:
     """Write every score as one row of a tidy CSV: fractions and metres, unrounded; empty where there is none."""
     out = io.StringIO()
     write = csv.writer(out, lineterminator="\n").writerow
     write(COLUMNS)
-    for row in _rows(runs, profiles, beside, partings):
+    for row in _rows(runs, profiles, paper_results, breakdowns):
         write(["" if value is None else value for value in row])
     return out.getvalue()
 
@@ -50,17 +50,17 @@ def as_csv(
 def as_json(
     runs: Sequence[Run],
     profiles: Sequence[Profile],
-    beside: Sequence[PaperResult] = (),
-    partings: Partings = _NO_PARTINGS,
+    paper_results: Sequence[PaperResult] = (),
+    breakdowns: Breakdowns = _NO_BREAKDOWNS,
 ) -> str:
     """Write the rows of `as_csv` as a JSON list of objects, a line each; null where there is nothing."""
-    rows = (dict(zip(COLUMNS, row, strict=True)) for row in _rows(runs, profiles, beside, partings))
+    rows = (dict(zip(COLUMNS, row, strict=True)) for row in _rows(runs, profiles, paper_results, breakdowns))
     lines = (json.dumps(row, ensure_ascii=False, allow_nan=False) for row in rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
 def _rows(
-    runs: Sequence[Run], profiles: Sequence[Profile], beside: Sequence[PaperResult], partings: Partings
+    runs: Sequence[Run], profiles: Sequence[Profile], paper_results: Sequence[PaperResult], breakdowns: Breakdowns
 ) -> Iterator[list[Any]]:
     for k, run in enumerate(runs):
         parts: list[tuple[str, str, Episodes]] = [("all", "all", run.episodes)]
@@ -76,12 +76,12 @@ def _rows(
                 head = [run.name, run.agent, profile.name, profile.radius_m, setting, modality]
                 scored = _scores(part, profile)
                 if setting == modality == "all":
-                    scored += _parted(run, k, profile, partings)
+                    scored += _breakdown_scores(run, k, profile, breakdowns)
                 for scope, name, score, more in scored:
                     values = [getattr(score, m) for m in METRICS] + more
                     known = [None if math.isnan(v) else v for v in values]
                     yield [*head, scope, name, score.episodes, *known, run.told]
-    for result in beside:
+    for result in paper_results:
         for profile in profiles:
             keys = [(metric, profile.radius_m) for metric in METRICS]
             if profile.name.startswith("aerialdojo") and any(key in result.mean for key in keys):
@@ -109,14 +109,16 @@ def _scores(part: Episodes, profile: Profile) -> list[tuple[str, str, Score, lis
     ]
 
 
-def _parted(run: Run, k: int, profile: Profile, partings: Partings) -> list[tuple[str, str, Score, list[float]]]:
+def _breakdown_scores(
+    run: Run, k: int, profile: Profile, breakdowns: Breakdowns
+) -> list[tuple[str, str, Score, list[float]]]:
     """Score the parts of the k-th run's episodes."""
     scored = []
-    for parting in partings.found:
-        for part in parting.parts:
+    for breakdown in breakdowns.found:
+        for part in breakdown.parts:
             episodes = run.episodes.where(part.masks[k])
             summary = summarize(episodes, profile)
-            scored.append((parting.name, part.head, summary.overall, _known(episodes, profile, summary)))
+            scored.append((breakdown.name, part.head, summary.overall, _known(episodes, profile, summary)))
     return scored
 
 

@@ -97,7 +97,7 @@ def report(
     from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, profile_named
     from aerialdojo_gen.benchmark.paired import paired_tables
     from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
-    from aerialdojo_gen.benchmark.runs import arranged, load_runs, with_floors
+    from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
     from aerialdojo_gen.dataset.contents import release_scenes
     from aerialdojo_gen.store.root import open_root
 
@@ -111,20 +111,20 @@ def report(
     if log is None and not runs_there(root):
         release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
-    loaded = arranged(with_floors(written, named) if floors else named, groups)
+    loaded = group_runs(with_baselines(written, named) if floors else named, groups)
     request = contents.ReportRequest(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
     if style in ("csv", "json"):
         extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
         write = score_rows.as_csv if style == "csv" else score_rows.as_json
-        print(write(loaded, [*rules, *extra_rules], request.beside, request.partings), end="")
+        print(write(loaded, [*rules, *extra_rules], request.paper_results, request.breakdowns), end="")
     elif paired and table is None:
         _show(paired_tables(named, rules), style)
     else:
         chosen = contents.report_tables(request, names)
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
-        if lacking := contents.left_out(request, names):
+        if lacking := contents.missing_note(request, names):
             typer.echo(lacking, err=True)
         if table is None and style == "terminal":
             others = ", ".join(name for name in (*contents.NAMES, "all") if name not in names)

@@ -14,8 +14,8 @@ from support.extended import set_difficulty
 from support.planting import Planted
 from typer.testing import CliRunner
 
-from aerialdojo_gen.benchmark.contents import ReportRequest, left_out, report_tables
-from aerialdojo_gen.benchmark.difficulty import partings_of
+from aerialdojo_gen.benchmark.contents import ReportRequest, missing_note, report_tables
+from aerialdojo_gen.benchmark.difficulty import find_breakdowns
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
@@ -49,9 +49,9 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
     set_difficulty(planted)
     (run,) = runs = flown(planted.data)
     rows = facts(planted, run)
-    partings = partings_of(open_root(planted.data), runs)
-    assert partings.missing == ()
-    assert partings.left_out == ""
+    breakdowns = find_breakdowns(open_root(planted.data), runs)
+    assert breakdowns.missing == ()
+    assert breakdowns.missing_note == ""
     expected = {
         "plan_detour": pd.cut(rows.plan_detour, [-np.inf, 1.05, 1.2, 1.5, np.inf], right=False,
                               labels=["1 to 1.05", "1.05 to 1.2", "1.2 to 1.5", "1.5 and more"]),
@@ -66,7 +66,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
             {0: "neither", 1: "start alone", 2: "target alone", 3: "target and start"}
         ),
     }  # fmt: skip
-    found = {parting.name: parting for parting in partings.found}
+    found = {breakdown.name: breakdown for breakdown in breakdowns.found}
     assert found.keys() == {*expected, "detour_ratio"}
     for name, wanted in expected.items():
         parts = {part.head: part.masks[0] for part in found[name].parts}
@@ -80,7 +80,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
     seen = rows[rows.target_seen_in_train]
     assert one.rows[0][1][0] == f"{100 * seen.success.mean():.2f}"
     assert one.notes[-1] == f"Episodes – seen in training: {len(seen):,}; unseen: {len(rows) - len(seen):,}."
-    lines = list(csv.DictReader(io.StringIO(as_csv(runs, [AT_3], partings=partings))))
+    lines = list(csv.DictReader(io.StringIO(as_csv(runs, [AT_3], breakdowns=breakdowns))))
     blocked = rows[~rows.straight_line_free.astype(bool)]
     (row,) = [line for line in lines if (line["scope"], line["name"]) == ("straight_line_free", "blocked")]
     assert int(row["episodes"]) == len(blocked)
@@ -97,14 +97,14 @@ def test_a_release_without_the_columns_leaves_them_out_and_says_why(planted: Pla
     wanted = ReportRequest(open_root(planted.data), runs, [AT_3])
     # Which targets training shows can be counted without the column.
     missing = [*COLUMNS, *SEEN[1:]]
-    assert left_out(wanted) == (
+    assert missing_note(wanted) == (
         f"no breakdown by {', '.join(missing)}: neither the release in --data nor the log has them "
         "(a release of this version has)"
     )
-    assert left_out(wanted, ["overall"]) == ""
+    assert missing_note(wanted, ["overall"]) == ""
     command = ["report", "--data", str(planted.data), "--table"]
     done = CliRunner().invoke(cli.app, [*command, "difficulty", "--table", "seen"])
     assert done.exit_code == 0
-    assert done.stderr.strip() == left_out(wanted)
+    assert done.stderr.strip() == missing_note(wanted)
     assert "κ" in done.stdout
     assert CliRunner().invoke(cli.app, [*command, "overall"]).stderr == ""

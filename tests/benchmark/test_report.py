@@ -208,7 +208,9 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
 
 def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
     labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
-    made = contents.ReportRequest(Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), beside=results())
+    made = contents.ReportRequest(
+        Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), paper_results=results()
+    )
     text = "\n\n".join(map(grid.as_latex, contents.report_tables(made, ["all"])))
     if compiler := shutil.which("pdflatex"):
         head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
@@ -286,7 +288,7 @@ def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
 
 def test_figures_have_every_run_in_its_colour_and_no_date(runs: list[Run]) -> None:
     for draw in (figures.metric_radars, figures.family_radars, figures.radius_curve):
-        svg, png = (figures.encoded(draw(runs, AT_3), kind) for kind in ("svg", "png"))
+        svg, png = (figures.encode_figure(draw(runs, AT_3), kind) for kind in ("svg", "png"))
         assert b"dc:date" not in svg
         assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
         picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.benchmark import contents, difficulty, intervals, paired, radii, score_rows, tables
 from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table, as_text
 from aerialdojo_gen.benchmark.metrics import PROFILES
-from aerialdojo_gen.benchmark.runs import Run, arranged, load_runs, with_floors
+from aerialdojo_gen.benchmark.runs import Run, group_runs, load_runs, with_baselines
 from aerialdojo_gen.benchmark.tables import result_tables
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -96,11 +96,11 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def runs(log: Path) -> list[Run]:
-    return arranged(with_floors(log, load_runs(log, ["alpha", "beta"])))
+    return group_runs(with_baselines(log, load_runs(log, ["alpha", "beta"])))
 
 
 def broken_down(data: Path, runs: list[Run], kind: str) -> list[Table]:
-    return difficulty.parting_tables(difficulty.partings_of(open_root(data), runs), kind, runs, AT_3)
+    return difficulty.breakdown_tables(difficulty.find_breakdowns(open_root(data), runs), kind, runs, AT_3)
 
 
 def cells(table: Table, label: str) -> tuple[str, ...]:
@@ -112,21 +112,21 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, r
         ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "floors", 18)
     ]  # fmt: skip
     # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
-    alone = with_floors(log, load_runs(log, ["floor"]))
+    alone = with_baselines(log, load_runs(log, ["floor"]))
     assert [run.name for run in alone] == ["floor"]
     write(log.parent / "other", "alpha", "package:Alpha", LOG["alpha"], more="M")
     write(log.parent / "other", "floor", "stop", LOG["stop"])
-    assert [run.name for run in with_floors(log.parent / "other", load_runs(log.parent / "other", ["alpha"]))] == [
+    assert [run.name for run in with_baselines(log.parent / "other", load_runs(log.parent / "other", ["alpha"]))] == [
         "alpha"
     ]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
-    assert [run.group for run in arranged(runs, groups)] == ["open", "closed", "floors"]
+    assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "floors"]
     with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
-        arranged(runs, {"open": ["gamma"]})
+        group_runs(runs, {"open": ["gamma"]})
 
 
 def test_tables_4_and_5(runs: list[Run]) -> None:
-    (table,) = result_tables(runs, [AT_3, AT_5], beside=[r for r in results() if r.setting == "base"])
+    (table,) = result_tables(runs, [AT_3, AT_5], paper_results=[r for r in results() if r.setting == "base"])
     assert table.title.startswith("Base")
     assert [head for head, _ in table.groups] == ["3 m", "5 m"]
     # alpha at 3 m: Urban (¼ + 0)/2, Natural (½ + 0)/2, Infrastructure (0 + 1)/2, Disaster 0: 21.875 % in the mean.
@@ -217,15 +217,15 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> N
     # T; C of Mall_1 and twice of Flood_0; R; N.
     assert lost == ("18", "10", "4", "6", "16.7", "50.0", "16.7", "16.7")
     assert cells(radii.visit_table(runs, AT_3), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
-    assert runs[0].swept_distance_m is not None
-    assert min(runs[0].swept_distance_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
+    assert runs[0].path_clearance_to_goal_m is not None
+    assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
 
 
 def test_a_log_without_steps_has_no_distances_along_the_way(log: Path, tmp_path: Path) -> None:
     write(tmp_path, "alpha", "package:Alpha", LOG["alpha"])
     store.shard_path(tmp_path, "steps", "U_Mall_1", run="alpha").unlink()
     (run,) = load_runs(tmp_path)
-    assert run.swept_distance_m is None
+    assert run.path_clearance_to_goal_m is None
     assert not any("along the way" in group for group, _ in radii.radius_table([run], AT_3).groups)
 
 
