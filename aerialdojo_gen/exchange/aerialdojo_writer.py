@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -10,12 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.errors import AssetError, StoreError
+from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
 from aerialdojo_gen.exchange.actions import words_of
 from aerialdojo_gen.exchange.aerialdojo_layout import (
     IMAGE,
@@ -28,10 +31,64 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     partition_of,
 )
 from aerialdojo_gen.exchange.frames import NED
-from aerialdojo_gen.exchange.rerendered import Redrawn
+from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
+from aerialdojo_gen.scenes.context import open_scene
+from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
+
+# Between two sizes and two renderers edges and shadows' rims differ; another view or object differs by far more.
+_SAME_VIEW = 12.0
+
+
+class RerenderedImages:
+    """Draws a scene's reference pictures from where they were taken, at another size than the release has them."""
+
+    def __init__(self, root: DataRoot, scene: str, size_px: int) -> None:
+        row = store.read_scene(root, "release/scenes", scene).to_pylist()[0]
+        keep = "--picture-size 0 exports the release's own pictures"
+        try:
+            mesh = mesh_copy(root, row["mesh_path"])
+        except FileNotFoundError:
+            missing = root.at(row["mesh_path"])
+            raise AssetError(
+                f"{missing} is missing, so its pictures cannot be drawn at {size_px} px: {keep}"
+            ) from None
+        if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
+            raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
+        self._scene_name = scene
+        rows = store.read_scene(root, "release/objects", scene).to_pylist()
+        self._poses = {
+            r["object_id"]: [r[f"reference_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad")] for r in rows
+        }
+        self._pictures = {r["object_id"]: r["reference_image"] for r in rows}
+        self._camera = Camera(size_px, size_px)
+        self._scene = open_scene(mesh, row["mesh_sha256"]).scene
+        self._renderer_name = choose_renderer("auto").name
+
+    def picture(self, object_id: int) -> bytes:
+        """Draw an object's picture."""
+        x, y, z, yaw = self._poses[object_id]
+        pose = view_pose((x, y, z), yaw, "front")
+        rgb = scene_renderer(self._scene, self._renderer_name).render(self._camera, pose).rgb
+        if _image_difference(rgb, self._pictures[object_id]) > _SAME_VIEW:
+            raise StoreError(
+                f"object {object_id} of {self._scene_name} does not look as its picture does: "
+                "--picture-size 0 exports the release's own pictures"
+            )
+        return encode_png(rgb, REFERENCE_PNG)
+
+
+def _image_difference(rgb: NDArray[np.uint8], picture: bytes) -> float:
+    """Mean absolute difference to a PNG, in steps of 255, both at 64 x 64 pixels."""
+    released = decode_rgb(picture)
+    if released is None:
+        return float("inf")
+    small = [cv2.resize(image, (64, 64), interpolation=cv2.INTER_AREA) for image in (rgb, released)]
+    return float(np.abs(small[0].astype(np.float32) - small[1].astype(np.float32)).mean())
+
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +118,7 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
     As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
     """
     objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
-    draw = Redrawn(data, scene, picture_px) if picture_px else None
+    draw = RerenderedImages(data, scene, picture_px) if picture_px else None
     pictures = _Pictures(scene, objects, draw)
     counts = dict.fromkeys(("task files", "tasks", "trajectories"), 0)
     for subset in ("train", "test"):
@@ -148,7 +205,7 @@ def _write_list(path: Path, records: Sequence[Mapping[str, Any]]) -> None:
 class _Pictures:
     """Puts an object's picture beside every task file that names it: one file, linked, where the disk can."""
 
-    def __init__(self, scene: str, objects: Mapping[int, Mapping[str, Any]], draw: Redrawn | None) -> None:
+    def __init__(self, scene: str, objects: Mapping[int, Mapping[str, Any]], draw: RerenderedImages | None) -> None:
         self._scene, self._objects, self._draw = scene, objects, draw
         self._first: dict[int, Path] = {}
         self._placed: set[Path] = set()

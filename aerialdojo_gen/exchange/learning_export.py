@@ -18,8 +18,7 @@ from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
-from aerialdojo_gen.exchange.folder import check_target, whole_folder, write_json
-from aerialdojo_gen.exchange.parts import Unfinished, whole_part
+from aerialdojo_gen.exchange.folder import PartialExport, check_target, whole_folder, whole_part, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, named_splits, planned
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
@@ -113,7 +112,7 @@ def export_for_learning(
     check_target(out, MARKER, force=force)
     root = open_root(data)
     parts = planned(root, wanted, writer.frames_a_part(wanted))
-    unfinished = Unfinished(out, _request(format_name, root, wanted, parts))
+    unfinished = PartialExport(out, _request(format_name, root, wanted, parts))
     with unfinished.held():
         left = [part for part in parts if not unfinished.has(part.number)]
         if unfinished.resumed:

@@ -1,4 +1,4 @@
-"""LeRobotDataset v3, written: a Parquet file and a video a camera for every part, then what describes them all."""
+"""LeRobotDataset v3, written: a Parquet file and a video per camera for every part, then the metadata."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.exchange import feature_stats
-from aerialdojo_gen.exchange.folder import write_json
+from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.lerobot_features import (
     DATA_PATH,
     EPISODES_PATH,
@@ -29,12 +28,57 @@ from aerialdojo_gen.exchange.lerobot_features import (
     video_kinds,
     view_key,
 )
-from aerialdojo_gen.exchange.parts import place
 from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
 from aerialdojo_gen.exchange.video_clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.store.parquet_files import read_file, write_file
 from aerialdojo_gen.store.root import DataRoot
+
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+
+Stats = dict[str, list[Any]]
+
+
+def row_stats(values: NDArray[Any]) -> Stats:
+    """Statistics of the rows of an (n, d) array.
+
+    Min, max, mean, std and quantiles of d numbers each, and the count.
+    """
+    table = np.asarray(values, np.float64).reshape(len(values), -1)
+    levels = np.quantile(table, list(QUANTILES.values()), axis=0)
+    return {
+        "min": table.min(axis=0).tolist(),
+        "max": table.max(axis=0).tolist(),
+        "mean": table.mean(axis=0).tolist(),
+        "std": table.std(axis=0).tolist(),
+        "count": [len(table)],
+        **{name: levels[k].tolist() for k, name in enumerate(QUANTILES)},
+    }
+
+
+def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
+    """Statistics of pictures from counts (channels, n) of the values (n,), shaped (channels, 1.
+
+    1) as LeRobot has them.
+    """
+    total = counts.sum(axis=1).astype(np.float64)
+    mean = counts @ values / total
+    # Of the differences, not of the squares: those of large values cancel.
+    deviation = np.sqrt(np.einsum("cv,cv->c", counts, (values[None] - mean[:, None]) ** 2) / total)
+    reached = np.cumsum(counts, axis=1)
+    found = {
+        "min": values[(counts > 0).argmax(axis=1)],
+        "max": values[-1 - (counts[:, ::-1] > 0).argmax(axis=1)],
+        "mean": mean,
+        "std": deviation,
+        **{
+            name: values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
+            for name, level in QUANTILES.items()
+        },
+    }
+    shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in found.items()}
+    return {**shaped, "count": [frames]}
+
 
 # Steps of a part: a video of so many is some MB to 200 MB large, as LeRobot's own are.
 FRAMES_A_PART = 2048
@@ -53,7 +97,7 @@ def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) 
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
     labels = Labels(root, part.index, ())
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
-    episodes: list[dict[str, feature_stats.Stats]] = []
+    episodes: list[dict[str, Stats]] = []
     sums: Counts = {}
     with ExitStack() as stack:
         clips = {
@@ -66,7 +110,7 @@ def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) 
         for k in range(len(part.index)):
             own = _columns(labels, part, k)
             counts = _seen(eyes, k, wanted, clips, part)
-            stats = {name: feature_stats.of_rows(values) for name, values in own.items()}
+            stats = {name: row_stats(values) for name, values in own.items()}
             stats |= {key: _described(key, found, wanted, len(own["index"])) for key, found in counts.items()}
             episodes.append(stats)
             for name, values in own.items():
@@ -144,10 +188,10 @@ def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
     return found.ravel().astype(np.int64)
 
 
-def _described(key: str, counts: NDArray[np.int64], wanted: ExportOptions, frames: int) -> feature_stats.Stats:
+def _described(key: str, counts: NDArray[np.int64], wanted: ExportOptions, frames: int) -> Stats:
     if video_kinds(wanted)[key] == "depth":
-        return feature_stats.of_counts(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
-    return feature_stats.of_counts(counts, np.arange(256) / 255.0, frames)
+        return count_stats(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
+    return count_stats(counts, np.arange(256) / 255.0, frames)
 
 
 def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
@@ -157,9 +201,9 @@ def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: P
     sums: Counts = {}
     for part, source in zip(parts, made, strict=True):
         at = {"chunk_index": part.number // FILES_A_CHUNK, "file_index": part.number % FILES_A_CHUNK}
-        place(source / "data.parquet", folder / DATA_PATH.format(**at))
+        link_or_copy(source / "data.parquet", folder / DATA_PATH.format(**at))
         for key in keys:
-            place(source / f"{key}.mp4", folder / VIDEO_PATH.format(video_key=key, **at))
+            link_or_copy(source / f"{key}.mp4", folder / VIDEO_PATH.format(video_key=key, **at))
         facts = json.loads((source / _FACTS).read_text(encoding="utf-8"))
         path = folder / EPISODES_PATH.format(**at)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -172,7 +216,7 @@ def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: P
     texts = dict(sorted({int(n): t for part in parts for n, t in zip(part.tasks, part.texts, strict=True)}.items()))
     write_file(folder / "meta" / "tasks.parquet", _tasks(list(texts.values())))
     every = pa.concat_tables(tables)
-    stats = {name: feature_stats.of_rows(_values(every[name])) for name in frame_schema().names}
+    stats = {name: row_stats(_values(every[name])) for name in frame_schema().names}
     stats |= {key: _described(key, found, wanted, frames) for key, found in sums.items()}
     write_json(folder / "meta" / "stats.json", stats)
     info = {
@@ -192,9 +236,7 @@ def _values(column: pa.ChunkedArray) -> NDArray[Any]:
     return np.asarray(joined)
 
 
-def _episodes(
-    part: Part, stats: list[dict[str, feature_stats.Stats]], keys: list[str], at: dict[str, int]
-) -> pa.Table:
+def _episodes(part: Part, stats: list[dict[str, Stats]], keys: list[str], at: dict[str, int]) -> pa.Table:
     index, n = part.index, len(part.index)
     begin, end = index.first[:-1], index.first[1:]
     columns: dict[str, Any] = {

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError, StoreError, brief
 from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
-from aerialdojo_gen.exchange.folder import write_json
-from aerialdojo_gen.exchange.parts import place
+from aerialdojo_gen.exchange.folder import link_or_copy, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.rendering.codecs import to_stored
@@ -127,7 +126,7 @@ def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: P
     shards = []
     for part, source in zip(parts, made, strict=True):
         name = SHARD.format(part.number)
-        place(source / _FILE, folder / name)
+        link_or_copy(source / _FILE, folder / name)
         shards.append({"url": name, "nsamples": part.frames, "filesize": (source / _FILE).stat().st_size})
     # The list that WebDataset's own reader of indexed shards takes.
     write_json(folder / "index.json", {"__kind__": "wids-shard-index-v1", "wids_version": 1, "shardlist": shards})

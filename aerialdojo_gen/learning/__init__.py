@@ -8,7 +8,7 @@
 NumPy is enough; worker processes and tensors need PyTorch, the extra ``train``.
 """
 
-from aerialdojo_gen.learning.batches import collate
+from aerialdojo_gen.learning.labels import collate
 from aerialdojo_gen.learning.loader import Loader
 from aerialdojo_gen.learning.trajectories import Trajectories
 from aerialdojo_gen.learning.vector import Flattened, OwnScenes, ProgressReward, make_vec

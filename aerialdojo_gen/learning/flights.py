@@ -1,11 +1,13 @@
-"""A policy flies training tasks while the teacher looks on: what DAgger learns from (Ross, Gordon, Bagnell 2011)."""
+"""A policy flies training tasks while the planner labels its steps: DAgger (Ross, Gordon, Bagnell 2011)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
@@ -14,17 +16,64 @@ from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.learning.encoding import Reckoning
+from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import Flying, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
 from aerialdojo_gen.learning.steps import Steps
-from aerialdojo_gen.learning.teacher import Teacher, teacher_of
 from aerialdojo_gen.learning.words import Vocabulary
+from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
-from aerialdojo_gen.scenes.context import SEVERAL, open_scene
+from aerialdojo_gen.planning.planner import Planner
+from aerialdojo_gen.scenes.context import SEVERAL, SceneContext, open_scene
+from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import STOP
+
+# In the place of an action where the planner finds no way.
+NO_LABEL = N_ACTIONS
+# Goals' cost-to-go that are kept: those of the episodes that are flown side by side.
+_FIELDS_MB = 400.0, 0.0
+
+
+class Teacher:
+    """Says what the reference would do at a pose.
+
+    The cost-to-go of a goal is made once; from every pose the planner's own search follows it, so that a label is the
+    first action of the route that the release would have from there.
+    """
+
+    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = 0.25) -> None:
+        # Who has strayed may be nearer than any task begins, or straight before the goal.
+        own = (config or PlanConfig()).model_copy(update={"min_detour_ratio": 0.0})
+        self._planner = Planner(scene, own, radius_m)
+
+    def labels(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> NDArray[np.int64]:
+        """Planner's actions (n,) for goals and poses (metres, radians, world); `NO_LABEL` where there is no way."""
+        ways = self.ways(goals, poses)
+        return np.array([way[0] if len(way) else NO_LABEL for way in ways], np.int64)
+
+    def ways(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
+        """Plan from poses: the actions of each route, Stop at its end; none where no way is found."""
+        out = [np.zeros(0, np.int8)] * len(poses)
+        keys = [np.asarray(goal, np.float64).tobytes() for goal in goals]
+        for key in dict.fromkeys(keys):
+            rows = [k for k, own in enumerate(keys) if own == key]
+            starts = np.array([np.asarray(poses[k], np.float64) for k in rows])
+            for k, route in zip(rows, self._planner.plan_target(goals[rows[0]], starts), strict=True):
+                if route.outcome == "SOLVED":
+                    out[k] = agent_actions(route.actions)
+        return out
+
+    def keeping(self) -> AbstractContextManager[None]:
+        """Keep goals' cost-to-go until the block ends."""
+        return self._planner.keeping_fields(*_FIELDS_MB)
+
+
+def teacher_of(context: SceneContext, config: PlanConfig, radius_m: float) -> Teacher:
+    """Return a scene's teacher, a part of its context."""
+    return context.part("teacher", lambda: Teacher(context.scene, config, radius_m), config, radius_m)
+
 
 # Episodes that are flown side by side.
 _TOGETHER = 32
@@ -60,7 +109,7 @@ class Flown:
         self.labels.append(label)
         self.odometry.append(self.reckoning.odometry)
         self.poses.append(pose)
-        collides, refused, _ = blocked(self.space, pose)
+        collides, refused, _ = blocked_actions(self.space, pose)
         self.blocked.append((collides | refused)[0])
         self.frames.append(frame)
 

@@ -1,4 +1,4 @@
-"""How far it is to a goal on ways that the body can fly: for rewards and teachers; no agent may know it."""
+"""Distances to a goal along flyable paths, and blocked actions: for rewards and teachers; no agent may know them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
-from aerialdojo_gen.learning.blocked import blocked
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS
 from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
@@ -18,6 +18,25 @@ from aerialdojo_gen.planning.preference import NO_PREFERENCE
 from aerialdojo_gen.scenes.context import context_of
 
 Floats = NDArray[np.float64]
+
+
+def blocked_actions(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """For poses (n, 4) and the 16 actions.
+
+    Whether each collides or is refused, (n, 16), and where it leads, (n, 16, 3).
+    """
+    p = np.asarray(poses, np.float64).reshape(-1, 4)
+    c, s = np.cos(p[:, 3])[:, None], np.sin(p[:, 3])[:, None]
+    ahead, left, up = DISPLACEMENTS[:N_ACTIONS].T
+    ends = np.stack([p[:, :1] + (c * ahead - s * left), p[:, 1:2] + (s * ahead + c * left), p[:, 2:3] + up], axis=2)
+    collides, refused = np.zeros((2, len(p), N_ACTIONS), np.bool_)
+    moves = np.flatnonzero(DISPLACEMENTS[:N_ACTIONS].any(axis=1)).tolist()
+    for k, here in enumerate(map(tuple, p[:, :3].tolist())):
+        for a in moves:
+            collides[k, a], refused[k, a] = space.motion_outcome(here, tuple(ends[k, a].tolist()))
+    ends[refused] = np.broadcast_to(p[:, None, :3], ends.shape)[refused]
+    return collides, refused, ends
+
 
 # Ways longer than this are not found, metres: the longest tasks have routes of 100 m, and who strays flies farther.
 _FARTHEST_M = 200.0
@@ -50,7 +69,7 @@ class Geodesic:
 
         (n, 16) each.
         """
-        collides, refused, ends = blocked(self._space, poses)
+        collides, refused, ends = blocked_actions(self._space, poses)
         cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
         return collides, refused, np.where(collides, np.inf, cost)
 

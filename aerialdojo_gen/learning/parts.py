@@ -13,8 +13,8 @@ from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.learning.blocked import blocked
 from aerialdojo_gen.learning.encoding import goal_picture, packed
+from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.learning.pictures import within
@@ -116,7 +116,9 @@ def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 def hindered(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Say which actions lead nowhere at poses (n, 4): (n, 16) bool."""
-    collides, refused, _ = blocked(flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses)
+    collides, refused, _ = blocked_actions(
+        flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses
+    )
     return collides | refused
 
 

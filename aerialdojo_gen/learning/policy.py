@@ -14,9 +14,8 @@ from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.encoding import Reckoning, goal_picture, packed
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.naming import named_by
 from aerialdojo_gen.learning.search import LOST_NATS, Search
-from aerialdojo_gen.learning.words import goal_text
+from aerialdojo_gen.learning.words import goal_text, named_by
 from aerialdojo_gen.store.files import file_digest
 
 # Tokens of a text: what is longer is no description.

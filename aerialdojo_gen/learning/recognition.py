@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.learning.exploration_views import NOTHING
 from aerialdojo_gen.learning.imitation import Epoch, Learner
-from aerialdojo_gen.learning.naming import named_by
 from aerialdojo_gen.learning.steps import Pool
+from aerialdojo_gen.learning.words import named_by
 
 # The phase before the references'.
 PHASE = -1

@@ -26,12 +26,11 @@ from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.naming import naming_words
 from aerialdojo_gen.learning.parts import Flying, Part
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import drawn_evenly
-from aerialdojo_gen.learning.words import Vocabulary, goal_text
+from aerialdojo_gen.learning.words import Vocabulary, goal_text, naming_words
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.store.atomic import atomic_file, make_folder

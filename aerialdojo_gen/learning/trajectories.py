@@ -18,10 +18,9 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.learning.batches import scattered, unbatched
 from aerialdojo_gen.learning.cached import Cached, Store
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.labels import PRIVILEGED, Labels
+from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
 from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
@@ -187,7 +186,7 @@ class Trajectories:
     def __getitems__(self, numbers: Sequence[int]) -> list[dict[str, Any]]:
         """Return samples, drawn together; ``torch.utils.data.DataLoader`` asks for a batch by this."""
         batch = self.batch(numbers)
-        return [unbatched(batch, k, self.past is None) for k in range(len(numbers))]
+        return [split_batch(batch, k, self.past is None) for k in range(len(numbers))]
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
         """Yield all samples in the order of their numbers."""
@@ -234,7 +233,7 @@ class Trajectories:
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
         for name, seen in (("rgb", frames.rgb), ("depth_m", frames.depth_m)):
             if seen is not None:
-                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scattered(seen, mask)
+                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scatter_rows(seen, mask)
         return out
 
     def _goals(self, rows: NDArray[np.int64]) -> dict[str, Any]:

@@ -8,8 +8,7 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.dataset.contents import release_scenes
-from aerialdojo_gen.exchange.exporting import export_release
-from aerialdojo_gen.exchange.size import Size, check_room, size_of
+from aerialdojo_gen.exchange.exporting import Size, check_room, estimate_size, export_release
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import open_root
 
@@ -26,7 +25,7 @@ def bytes_of(paths):
 @pytest.mark.parametrize(("form", "most_off"), [("aerialdojo", 0.25), ("habitat", 0.6)])
 def test_what_is_announced_is_what_is_written(smoke, tmp_path, form, most_off):
     said = io.StringIO()
-    size = size_of(form, open_root(smoke), release_scenes(smoke), 0)
+    size = estimate_size(form, open_root(smoke), release_scenes(smoke), 0)
     export_release(form, smoke, tmp_path / "out", picture_px=0 if form == "aerialdojo" else None,
                    reporter=Reporter(stream=said))  # fmt: skip
     written = files_of(tmp_path / "out")

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.exchange.folder import PartialExport
 from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
-from aerialdojo_gen.exchange.parts import Unfinished
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.rendering.codecs import to_stored
@@ -245,7 +245,7 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), wanted
 
 def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
     def parts(request):
-        unfinished = Unfinished(tmp_path / "export", request)
+        unfinished = PartialExport(tmp_path / "export", request)
         with unfinished.held():
             before = sorted(path.name for path in (unfinished.folder / "parts").iterdir())
             unfinished.part(0).mkdir(exist_ok=True)

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen.exchange.actions import actions_of, move, replay, words_of
-from aerialdojo_gen.exchange.aerialvln import MOVES as AERIALVLN
-from aerialdojo_gen.exchange.openfly import MOVES as OPENFLY
+from aerialdojo_gen.exchange.readers import AERIALVLN_MOVES as AERIALVLN
+from aerialdojo_gen.exchange.readers import OPENFLY_MOVES as OPENFLY
 from aerialdojo_gen.geometry import motion
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 

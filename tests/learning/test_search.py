@@ -12,9 +12,9 @@ from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.learning.exploration_views import NOTHING, UNTOLD, patches_of, surveyed
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.naming import named_by, naming_words
 from aerialdojo_gen.learning.parts import Part, Survey
 from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
+from aerialdojo_gen.learning.words import named_by, naming_words
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root

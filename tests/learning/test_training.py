@@ -22,11 +22,11 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
+from aerialdojo_gen.learning.flights import NO_LABEL, Teacher
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import pictures
 from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
-from aerialdojo_gen.learning.teacher import NO_LABEL, Teacher
 from aerialdojo_gen.learning.trajectories import drawn_evenly
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor

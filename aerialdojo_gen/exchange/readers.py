@@ -1,0 +1,198 @@
+"""Readers of other benchmarks' records: AerialVLN, OpenFly, CityAVOS and UAV-ON.
+
+AerialVLN: NED metres, quaternions wxyz. OpenFly: z up, yaw in radians counter-clockwise. CityAVOS: metres, z negative
+above the ground. UAV-ON: NED metres, quaternions xyzw. OpenFly and CityAVOS do not state which way x points.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from aerialdojo_gen.exchange.actions import Move, move, replay, replay_error_m
+from aerialdojo_gen.exchange.fields import BadField, Fields, Floats, rows_of, shown
+from aerialdojo_gen.exchange.folder import check_picture, inside
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task
+
+AERIALVLN_MOVES = {
+    0: move("stop"), 1: move("forward 5 m", forward=5), 2: move("turn left 15°", turn_deg=15),
+    3: move("turn right 15°", turn_deg=-15), 4: move("up 2 m", up=2), 5: move("down 2 m", up=-2),
+    6: move("left 5 m", left=5), 7: move("right 5 m", left=-5),
+}  # fmt: skip
+
+
+def moves_of(numbers: list[int], moves: dict[int, Move]) -> list[Move]:
+    """Look actions up by their numbers; BadField where there is no such action."""
+    for k, number in enumerate(numbers):
+        if number not in moves:
+            raise BadField(f"actions[{k}]", f"unknown action {number}: known are {', '.join(map(str, moves))}")
+    return [moves[number] for number in numbers]
+
+
+def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
+    """Join actions and poses; where they are not one a pose, the poses stand and the actions keep their own names."""
+    names = [m.name for m in moves]
+    done = moves[:-1] if moves[-1].name == "stop" else moves
+    if "stop" in names[: len(done)]:
+        raise BadField(f"actions[{names.index('stop')}]", "stop before the end")
+    error = replay_error_m(done, poses)
+    if len(done) != len(poses) - 1:
+        context.notes["not one action a pose: action is null, source_action has them"] += 1
+        return Route(poses, None, names, error)
+    ours = [m.ours for m in done]
+    if any(action is None for action in ours):
+        context.notes["has actions that are none of ours: action is null, source_action has them"] += 1
+        return Route(poses, None, names, error)
+    return Route(poses, [a for a in ours if a is not None] + [0], names, error)
+
+
+def read_aerialvln(record: Fields, context: Context) -> Task:
+    """Read an episode. Its path has positions; yaws follow from the start's and the turns."""
+    w, x, y, z = record.quaternion("start_rotation").tolist()
+    start = context.upright_pose(record.position("start_position"), np.array([x, y, z, w]))
+    goals = [Fields(goal, f"goals[{i}]") for i, goal in enumerate(record.items("goals"))]
+    goal = context.frame.positions_to_world(goals[0].position("position"))
+    instruction = record.child("instruction")
+    route = None
+    if record.has("reference_path"):
+        rows = record.items("reference_path")
+        for i, row in enumerate(rows):
+            if not isinstance(row, list) or len(row) not in (3, 6, 7):
+                raise BadField(f"reference_path[{i}]", f"expected x, y, z, maybe an attitude, found {shown(row)}")
+        if any(len(row) > 3 for row in rows):
+            context.notes["reference_path has attitudes: yaws are taken from start_rotation and the turns"] += 1
+        points = context.frame.positions_to_world(record.positions_of([row[:3] for row in rows], "reference_path"))
+        route = _aerialvln_route(record, context, start, points)
+    if len(goals) > 1:
+        context.notes["has several goals: the first is kept"] += 1
+    record.has("trajectory_id") and record.name("trajectory_id")
+    return Task(
+        source_id=record.name("episode_id"),
+        scene=record.name("scene_id"),
+        start=start,
+        goal=goal,
+        instances=[Instance("semantic", instruction.text("instruction_text", empty=False))],
+        route=route,
+    )
+
+
+def _aerialvln_route(record: Fields, context: Context, start: Floats, points: Floats) -> Route | None:
+    if not record.has("actions"):
+        context.notes["reference_path without actions, hence without yaws: left aside"] += 1
+        return None
+    moves = moves_of(record.whole_numbers("actions"), AERIALVLN_MOVES)
+    done = moves[:-1] if moves[-1].name == "stop" else moves
+    if len(done) == len(points) - 1:
+        yaws = replay(start, np.array([m.step for m in done], np.float64).reshape(-1, 4))[:, 3]
+    else:
+        yaws = np.full(len(points), start[3])
+    return route_of(moves, np.column_stack([points, yaws]), context)
+
+
+OPENFLY_MOVES = {
+    0: move("stop"), 1: move("forward 3 m", forward=3), 2: move("turn left 30°", turn_deg=30),
+    3: move("turn right 30°", turn_deg=-30), 4: move("up 3 m", up=3), 5: move("down 3 m", up=-3),
+    6: move("left 3 m", left=3), 7: move("right 3 m", left=-3), 8: move("forward 6 m", forward=6),
+    9: move("forward 9 m", forward=9),
+}  # fmt: skip
+_FULL_TURN = 2 * math.pi + 1e-6
+
+
+def read_openfly(record: Fields, context: Context) -> Task:
+    """Read a trajectory: an instruction and the way it describes; its end is the goal, and no object is named."""
+    image_path = record.text("image_path", empty=False)
+    points = context.frame.positions_to_world(record.positions("pos"))
+    yaws = record.numbers("yaw")
+    if len(yaws) != len(points):
+        raise BadField("yaw", f"has {len(yaws)} values for {len(points)} positions")
+    if np.abs(yaws).max() > _FULL_TURN:
+        k = int(np.abs(yaws).argmax())
+        raise BadField(f"yaw[{k}]", f"{yaws[k]:g} is more than a turn in radians: degrees?")
+    poses = np.column_stack([points, context.frame.yaw_to_world(yaws)])
+    try:
+        route = route_of(moves_of(record.whole_numbers("action"), OPENFLY_MOVES), poses, context)
+    except BadField as error:
+        raise BadField(error.field.replace("actions", "action"), error.why) from None
+    return Task(
+        source_id=image_path,
+        scene=image_path.replace("\\", "/").split("/")[0],
+        start=poses[0],
+        goal=points[-1],
+        instances=[Instance("semantic", record.text("gpt_instruction", empty=False))],
+        route=route,
+    )
+
+
+def read_cityavos(record: Fields, context: Context) -> Task:
+    """Read a mission: a target in words and as a picture, and no reference trajectory."""
+    *position, pitch, roll, yaw = rows_of([record.take("initial_pos")], 6, lambda _: "initial_pos")[0].tolist()
+    if pitch or roll:
+        context.notes["the start's attitude has roll or pitch: only its yaw is kept"] += 1
+    start = context.start_pose(record.positions_of([position], "initial_pos")[0], _radians(yaw, context))
+    goal = context.frame.positions_to_world(record.position("target_pos"))
+    text = record.text("target_text", empty=False)
+    instances = [Instance("semantic", text)]
+    if context.pictures is not None:
+        name = record.text("target_image_path", empty=False)
+        try:
+            picture = check_picture(inside(context.pictures, name))
+        except ValueError as error:
+            raise BadField("target_image_path", str(error)) from None
+        instances.append(Instance("image", picture=picture))
+    return Task(
+        source_id=record.name("mission_id"),
+        scene=record.name("scene_id"),
+        start=start,
+        goal=goal,
+        instances=instances,
+        object_key=tuple(goal.tolist()),
+        object_m=goal,
+    )
+
+
+def _radians(yaw: float, context: Context) -> float:
+    """The yaw in radians: some of these files have degrees in some rows."""
+    if context.angles == "degrees":
+        return math.radians(yaw)
+    if abs(yaw) <= _FULL_TURN:
+        return yaw
+    if context.angles == "radians":
+        raise BadField(
+            "initial_pos[5]", f"yaw {yaw:g} is more than a turn in radians: --angles degrees, or mixed if rows differ"
+        )
+    context.notes["yaw of more than a turn in radians: taken as degrees, as --angles mixed asks"] += 1
+    return math.radians(yaw)
+
+
+def read_uav_on(record: Fields, context: Context) -> Task:
+    """Read an episode; it has a target and its places, and no reference trajectory."""
+    pose = record.child("start_pose")
+    start = context.upright_pose(pose.position("start_position"), pose.quaternion("start_quaternionr"))
+    places = context.frame.positions_to_world(record.positions("pose"))
+    nearest = places[int(np.argmin(np.linalg.norm(places - start[:3], axis=1)))]
+    if len(places) > 1:
+        context.notes["pose has several places of the target: the nearest to the start is the goal"] += 1
+    scene, node = record.name("map_name"), record.text("object_name", empty=False)
+    known: dict[str, Any] = {
+        "target_name": record.text("true_name", empty=False),
+        "mesh_node": node,
+        "category": record.optional_text("category"),
+    }
+    if record.has("used-in-train"):
+        known["subset"] = "train" if record.flag("used-in-train") else "test"
+    if record.has("info"):
+        info = record.child("info")
+        if info.has("geodesic_distance"):
+            known["stated_length_m"] = info.number("geodesic_distance")
+    return Task(
+        source_id=f"{scene}/{record.name('episode_id')}",
+        scene=scene,
+        start=start,
+        goal=nearest,
+        instances=[Instance("semantic", record.optional_text("description"))],
+        object_key=(node, *nearest.tolist()),
+        object_m=nearest,
+        known=known,
+    )
