@@ -319,7 +319,7 @@ def train(
     chosen = load_recipe(recipe)
     try:
         run_training(
-            data, chosen.made_small() if small else chosen, out=out, cache=cache, device=device, workers=workers,
+            data, chosen.reduced() if small else chosen, out=out, cache=cache, device=device, workers=workers,
             renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
         )  # fmt: skip
     except KeyboardInterrupt:

@@ -143,10 +143,10 @@ def _for_training(
     from dataclasses import asdict
 
     from aerialdojo_gen.cli.common import print_json
-    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, wanted_from
+    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, export_options
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    request = wanted_from(**options)
+    request = export_options(**options)
     if estimate:
         estimated = estimate_for_learning(form, root, request, workers)
         if as_json:

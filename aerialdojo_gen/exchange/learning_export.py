@@ -19,7 +19,7 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import PartialExport, check_target, whole_folder, whole_part, write_json
-from aerialdojo_gen.exchange.samples import ExportOptions, Part, named_splits, planned
+from aerialdojo_gen.exchange.samples import ExportOptions, Part, expand_splits, plan_parts
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
@@ -35,7 +35,7 @@ _MEASURED_PARTS, _MEASURED_STEPS = 6, 24
 
 
 @dataclass(frozen=True)
-class Made:
+class ExportResult:
     """What an export consists of."""
 
     counts: dict[str, int]  # What there is of everything, by its name
@@ -68,7 +68,7 @@ class Estimate:
         )
 
 
-def wanted_from(
+def export_options(
     *,
     split: Sequence[str] = (),
     setting: Sequence[str] = (),
@@ -91,7 +91,7 @@ def wanted_from(
     sensors = Sensors(tuple(views), rgb, depth, width, height)
     name = "" if source == "recordings" else renderer_name(renderer)
     return ExportOptions(
-        named_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
+        expand_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
         jpeg_quality,
     )  # fmt: skip
 
@@ -100,24 +100,24 @@ def export_for_learning(
     format_name: str,
     data: Where,
     out: Path,
-    wanted: ExportOptions,
+    options: ExportOptions,
     *,
     force: bool = False,
     workers: int | None = None,
     reporter: Reporter | None = None,
-) -> Made:
+) -> ExportResult:
     """Write trajectories with what the body sees on them, as a data set for training."""
-    writer = _writer(format_name, wanted)
+    writer = _writer(format_name, options)
     told = reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
     root = open_root(data)
-    parts = planned(root, wanted, writer.frames_a_part(wanted))
-    unfinished = PartialExport(out, _request(format_name, root, wanted, parts))
+    parts = plan_parts(root, options, writer.frames_a_part(options))
+    unfinished = PartialExport(out, _request(format_name, root, options, parts))
     with unfinished.held():
         left = [part for part in parts if not unfinished.has(part.number)]
         if unfinished.resumed:
             told.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
-        jobs = [_Job(format_name, root.url, wanted, part, unfinished.folder) for part in left]
+        jobs = [_Job(format_name, root.url, options, part, unfinished.folder) for part in left]
         with told.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
             for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
                 if isinstance(outcome, AerialDojoError):
@@ -125,20 +125,20 @@ def export_for_learning(
                 bar.advance(frames=outcome)
         with whole_folder(out, MARKER, force=force) as folder:
             made = [unfinished.part(part.number) for part in parts]
-            counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, wanted, made, folder)
-            write_json(folder / MARKER, _marker(format_name, wanted, parts, counts, writer))
+            counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, options, made, folder)
+            write_json(folder / MARKER, _marker(format_name, options, parts, counts, writer))
         unfinished.remove()
-    return Made(counts, len(parts), len(parts) - len(left))
+    return ExportResult(counts, len(parts), len(parts) - len(left))
 
 
 def estimate_for_learning(
-    format_name: str, data: Where, wanted: ExportOptions, workers: int | None = None
+    format_name: str, data: Where, options: ExportOptions, workers: int | None = None
 ) -> Estimate:  # fmt: skip
     """Measure a few trajectories and say what all of them will take; nothing is written."""
-    writer = _writer(format_name, wanted)
+    writer = _writer(format_name, options)
     root = open_root(data)
-    parts = planned(root, wanted, writer.frames_a_part(wanted))
-    drawn = sorted(parts, key=lambda part: rng.rank(wanted.seed, "estimate", part.scene))[:_MEASURED_PARTS]
+    parts = plan_parts(root, options, writer.frames_a_part(options))
+    drawn = sorted(parts, key=lambda part: rng.rank(options.seed, "estimate", part.scene))[:_MEASURED_PARTS]
     measured = size = 0
     seconds = opening = 0.0
     for part in drawn:
@@ -147,7 +147,7 @@ def estimate_for_learning(
         for what, sample in (("open", part.cut(1, 1)), ("all", part.cut(2, _MEASURED_STEPS))):
             with scratch_folder() as folder:
                 begun = time.process_time()
-                writer.write_part(root, sample, wanted, folder)
+                writer.write_part(root, sample, options, folder)
                 seconds_of[what] = time.process_time() - begun
                 written = sum(size_of(path) for path in folder.iterdir())
         opening += seconds_of["open"]
@@ -162,11 +162,11 @@ def estimate_for_learning(
     )  # fmt: skip
 
 
-def _writer(format_name: str, wanted: ExportOptions) -> ModuleType:
-    s = wanted.sensors
+def _writer(format_name: str, options: ExportOptions) -> ModuleType:
+    s = options.sensors
     if format_name == "lerobot" and (s.width % 2 or s.height % 2):
         raise UsageError(f"a video has even --width and --height, not {s.width} x {s.height}")
-    if format_name == "lerobot" and wanted.jpeg_quality:
+    if format_name == "lerobot" and options.jpeg_quality:
         raise UsageError("--jpeg-quality is for --format webdataset: LeRobot's pictures are videos")
     return WRITERS[format_name]
 
@@ -177,7 +177,7 @@ class _Job:
 
     format_name: str
     data: str
-    wanted: ExportOptions
+    options: ExportOptions
     part: Part
     unfinished: Path
 
@@ -188,21 +188,21 @@ class _Job:
 
 def _write(job: _Job) -> int:
     with whole_part(job.unfinished, job.part.number) as folder:
-        WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.wanted, folder)
+        WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.options, folder)
     return job.part.frames
 
 
-def _request(format_name: str, root: DataRoot, wanted: ExportOptions, parts: list[Part]) -> dict[str, Any]:
+def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: list[Part]) -> dict[str, Any]:
     """Collect what decides every byte: parts of another request are not gone on with."""
     scenes = sorted({part.scene for part in parts})
-    read, shown = wanted.source != "render", "image" in wanted.goal
+    read, shown = options.source != "render", "image" in options.goal
     return {
         "format": format_name,
         "version": __version__,
         "code": code_of(f"aerialdojo_gen.exchange.{format_name}_writer").digest,
-        "wanted": _plain(dataclasses.asdict(wanted)),
+        "wanted": _plain(dataclasses.asdict(options)),
         "trajectories": [part.index.digest for part in parts],
-        "meshes": {} if wanted.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
+        "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
         "recordings": {name: _recordings(root, name) for name in scenes} if read else {},
     }
@@ -221,7 +221,7 @@ def _recordings(root: DataRoot, scene: str) -> list[str]:
 
 
 def _marker(
-    format_name: str, wanted: ExportOptions, parts: list[Part], counts: dict[str, int], writer: ModuleType
+    format_name: str, options: ExportOptions, parts: list[Part], counts: dict[str, int], writer: ModuleType
 ) -> dict[str, Any]:  # fmt: skip
     from aerialdojo_gen.store.schemas import ACTION_NAMES
 
@@ -231,7 +231,7 @@ def _marker(
         "frame": FRAME,
         "scenes": sorted({part.scene for part in parts}),
         "counts": counts,
-        "wanted": _plain(dataclasses.asdict(wanted)),
+        "wanted": _plain(dataclasses.asdict(options)),
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
         "lost": {table: list(columns) for table, columns in writer.LOST.items()},
     }

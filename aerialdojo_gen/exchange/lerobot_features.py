@@ -47,15 +47,15 @@ def depth_key(view: str) -> str:
     return f"observation.depth.{view}"
 
 
-def video_kinds(wanted: ExportOptions) -> dict[str, str]:
+def video_kinds(options: ExportOptions) -> dict[str, str]:
     """Return the features that are videos, and of which kind each is: ``rgb`` or ``depth``."""
-    s = wanted.sensors
+    s = options.sensors
     pictures = {view_key(view): "rgb" for view in s.views} if s.rgb else {}
     depths = {depth_key(view): "depth" for view in s.views} if s.depth else {}
-    return pictures | ({GOAL: "rgb"} if "image" in wanted.goal else {}) | depths
+    return pictures | ({GOAL: "rgb"} if "image" in options.goal else {}) | depths
 
 
-def features(wanted: ExportOptions) -> dict[str, dict[str, Any]]:
+def features(options: ExportOptions) -> dict[str, dict[str, Any]]:
     """Return the features of frames: their types, shapes, names, and how videos are to be read."""
     numbers = {
         "observation.state": _feature("float32", len(STATE), list(STATE)),
@@ -65,7 +65,7 @@ def features(wanted: ExportOptions) -> dict[str, dict[str, Any]]:
         "timestamp": _feature("float32", 1, None),
         **{name: _feature("int64", 1, None) for name in ("frame_index", "episode_index", "index", "task_index")},
     }
-    return {**{key: _video(wanted, kind) for key, kind in video_kinds(wanted).items()}, **numbers}
+    return {**{key: _video(options, kind) for key, kind in video_kinds(options).items()}, **numbers}
 
 
 def frame_schema() -> pa.Schema:
@@ -90,8 +90,8 @@ def _feature(dtype: str, n: int, names: list[str] | None) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [n], "names": names}
 
 
-def _video(wanted: ExportOptions, kind: str) -> dict[str, Any]:
-    s = wanted.sensors
+def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
+    s = options.sensors
     depth = kind == "depth"
     told: dict[str, Any] = {
         "video.height": s.height,

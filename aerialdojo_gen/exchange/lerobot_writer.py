@@ -28,7 +28,7 @@ from aerialdojo_gen.exchange.lerobot_features import (
     video_kinds,
     view_key,
 )
-from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
+from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
 from aerialdojo_gen.exchange.video_clips import DEPTH_CODES, Clip, depth_codes, depths_of_codes_m
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.store.parquet_files import read_file, write_file
@@ -87,13 +87,13 @@ _FACTS = "part.json"
 Counts = dict[str, NDArray[np.int64]]
 
 
-def frames_a_part(wanted: ExportOptions) -> int:
+def frames_a_part(options: ExportOptions) -> int:
     """Return how many steps a part has at least, unless its scene has fewer."""
-    del wanted
+    del options
     return FRAMES_A_PART
 
 
-def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) -> None:
+def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
     labels = Labels(root, part.index, ())
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
@@ -102,16 +102,16 @@ def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) 
     with ExitStack() as stack:
         clips = {
             key: stack.enter_context(
-                Clip(folder / f"{key}.mp4", kind, wanted.sensors.width, wanted.sensors.height, FPS)
+                Clip(folder / f"{key}.mp4", kind, options.sensors.width, options.sensors.height, FPS)
             )
-            for key, kind in video_kinds(wanted).items()
+            for key, kind in video_kinds(options).items()
         }
-        eyes = Eyes(root, part, wanted)
+        sample_frames = SampleFrames(root, part, options)
         for k in range(len(part.index)):
             own = _columns(labels, part, k)
-            counts = _seen(eyes, k, wanted, clips, part)
+            counts = _write_videos(sample_frames, k, options, clips, part)
             stats = {name: row_stats(values) for name, values in own.items()}
-            stats |= {key: _described(key, found, wanted, len(own["index"])) for key, found in counts.items()}
+            stats |= {key: _describe_counts(key, found, options, len(own["index"])) for key, found in counts.items()}
             episodes.append(stats)
             for name, values in own.items():
                 columns[name].append(values)
@@ -150,11 +150,13 @@ def _columns(labels: Labels, part: Part, k: int) -> dict[str, NDArray[Any]]:
     }
 
 
-def _seen(eyes: Eyes, k: int, wanted: ExportOptions, clips: dict[str, Clip], part: Part) -> Counts:
+def _write_videos(
+    sample_frames: SampleFrames, k: int, options: ExportOptions, clips: dict[str, Clip], part: Part
+) -> Counts:
     """Write what a trajectory sees into the videos, and count its values."""
-    s = wanted.sensors
+    s = options.sensors
     counts: Counts = {}
-    for _, frames in eyes.frames(k):
+    for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
             if frames.rgb is not None:
                 _add(counts, view_key(view), _rgb_counts(frames.rgb[:, v]))
@@ -166,7 +168,7 @@ def _seen(eyes: Eyes, k: int, wanted: ExportOptions, clips: dict[str, Clip], par
                 for code in codes:
                     clips[depth_key(view)].write(code)
     if GOAL in clips:
-        picture = eyes.goal(k)
+        picture = sample_frames.goal(k)
         n = int(part.index.steps[k])
         _add(counts, GOAL, _rgb_counts(picture[None]) * n)
         for _ in range(n):
@@ -188,15 +190,15 @@ def _counted(values: NDArray[Any], n: int) -> NDArray[np.int64]:
     return found.ravel().astype(np.int64)
 
 
-def _described(key: str, counts: NDArray[np.int64], wanted: ExportOptions, frames: int) -> Stats:
-    if video_kinds(wanted)[key] == "depth":
-        return count_stats(counts, depths_of_codes_m(wanted.sensors.max_depth_m), frames)
+def _describe_counts(key: str, counts: NDArray[np.int64], options: ExportOptions, frames: int) -> Stats:
+    if video_kinds(options)[key] == "depth":
+        return count_stats(counts, depths_of_codes_m(options.sensors.max_depth_m), frames)
     return count_stats(counts, np.arange(256) / 255.0, frames)
 
 
-def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
+def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
     """Put the files of all parts in their places, and write ``meta/``."""
-    keys = list(video_kinds(wanted))
+    keys = list(video_kinds(options))
     tables: list[pa.Table] = []
     sums: Counts = {}
     for part, source in zip(parts, made, strict=True):
@@ -217,13 +219,13 @@ def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: P
     write_file(folder / "meta" / "tasks.parquet", _tasks(list(texts.values())))
     every = pa.concat_tables(tables)
     stats = {name: row_stats(_values(every[name])) for name in frame_schema().names}
-    stats |= {key: _described(key, found, wanted, frames) for key, found in sums.items()}
+    stats |= {key: _describe_counts(key, found, options, frames) for key, found in sums.items()}
     write_json(folder / "meta" / "stats.json", stats)
     info = {
         "codebase_version": VERSION, "robot_type": "aerialdojo", "total_episodes": episodes, "total_frames": frames,
         "total_tasks": len(texts), "chunks_size": FILES_A_CHUNK, "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200, "fps": FPS, "splits": {"train": f"0:{episodes}"}, "data_path": DATA_PATH,
-        "video_path": VIDEO_PATH, "features": features(wanted),
+        "video_path": VIDEO_PATH, "features": features(options),
     }  # fmt: skip
     write_json(folder / "meta" / "info.json", info)
     return {"episodes": episodes, "frames": frames, "tasks": len(texts), "videos": len(parts) * len(keys)}

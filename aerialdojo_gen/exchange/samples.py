@@ -15,7 +15,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
+from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
 from aerialdojo_gen.learning.trajectories import SOURCES
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.rendering.sample import choose_trajectories
@@ -94,19 +94,19 @@ class Part:
         return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
 
 
-def planned(root: DataRoot, wanted: ExportOptions, frames_a_part: int) -> list[Part]:
+def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> list[Part]:
     """Choose the trajectories, and cut them into parts."""
-    modalities = ("image",) if wanted.goal == ("image",) else ()
-    selection = Selection(wanted.splits, wanted.settings, modalities, wanted.scenes)
+    modalities = ("image",) if options.goal == ("image",) else ()
+    selection = Selection(options.splits, options.settings, modalities, options.scenes)
     index = read_index(root, selection)
     facts = select(root, selection).select(["nav_id", "scene", "setting", "partition", "subset"]).to_pylist()
     known = {row["nav_id"]: row for row in facts}
-    chosen = index.take(_chosen(index, known, wanted))
-    if wanted.source != "recordings":
+    chosen = index.take(_chosen(index, known, options))
+    if options.source != "recordings":
         for scene in chosen.scenes:
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
     else:
-        chosen = _recorded(root, chosen, wanted)
+        chosen = _recorded(root, chosen, options)
     texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
         *(chosen.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
     )]  # fmt: skip
@@ -129,18 +129,22 @@ def planned(root: DataRoot, wanted: ExportOptions, frames_a_part: int) -> list[P
     return parts
 
 
-def _chosen(index: Index, known: dict[str, dict[str, str]], wanted: ExportOptions) -> NDArray[np.int64]:
-    if not wanted.limit:
+def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptions) -> NDArray[np.int64]:
+    if not options.limit:
         return np.arange(len(index))
     by_scene: dict[str, list[dict[str, str]]] = {}
     for nav_id in index.nav_id:
         by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
-    taken = {nav_id for rows in by_scene.values() for nav_id in choose_trajectories(rows, wanted.limit, wanted.seed)}
+    taken = {
+        nav_id for rows in by_scene.values() for nav_id in choose_trajectories(rows, options.limit, options.seed)
+    }
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
 
-def _recorded(root: DataRoot, index: Index, wanted: ExportOptions) -> Index:
-    recorded = Recorded(root, index, wanted.sensors, Drawn(root, index, wanted.sensors, wanted.renderer))
+def _recorded(root: DataRoot, index: Index, options: ExportOptions) -> Index:
+    recorded = RecordedFrames(
+        root, index, options.sensors, RenderedFrames(root, index, options.sensors, options.renderer)
+    )
     has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
     if not len(has):
         raise UsageError(
@@ -163,14 +167,14 @@ def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
         yield np.array(begun, np.int64)
 
 
-class Eyes:
+class SampleFrames:
     """What the trajectories of a part see, and what their goals look like."""
 
-    def __init__(self, root: DataRoot, part: Part, wanted: ExportOptions) -> None:
-        self._root, self._part, self._sensors = root, part, wanted.sensors
-        drawn: Source = Drawn(root, part.index, wanted.sensors, wanted.renderer)
+    def __init__(self, root: DataRoot, part: Part, options: ExportOptions) -> None:
+        self._root, self._part, self._sensors = root, part, options.sensors
+        drawn: Source = RenderedFrames(root, part.index, options.sensors, options.renderer)
         self._source: Source = (
-            drawn if wanted.source == "render" else Recorded(root, part.index, wanted.sensors, drawn)
+            drawn if options.source == "render" else RecordedFrames(root, part.index, options.sensors, drawn)
         )
 
     def frames(self, k: int) -> Iterator[tuple[int, Frames]]:
@@ -197,6 +201,6 @@ class Eyes:
         return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)
 
 
-def named_splits(given: Sequence[str]) -> tuple[str, ...]:
+def expand_splits(given: Sequence[str]) -> tuple[str, ...]:
     """Return the names of splits, ``train``, ``test`` and ``all`` written out; UsageError for others."""
     return Selection(tuple(given)).splits

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import RenderError, StoreError, brief
 from aerialdojo_gen.base.pictures import FRAME_PNG, encode_png
 from aerialdojo_gen.exchange.folder import link_or_copy, write_json
-from aerialdojo_gen.exchange.samples import ExportOptions, Eyes, Part
+from aerialdojo_gen.exchange.samples import ExportOptions, Part, SampleFrames
 from aerialdojo_gen.learning.labels import Labels
 from aerialdojo_gen.rendering.codecs import to_stored
 from aerialdojo_gen.store.layout import is_plain
@@ -27,15 +27,15 @@ _PIXELS, _STEPS = 1 << 27, 4096
 _FILE = "shard.tar"
 
 
-def frames_a_part(wanted: ExportOptions) -> int:
+def frames_a_part(options: ExportOptions) -> int:
     """Return how many steps a shard has at least, unless its scene has fewer."""
-    s = wanted.sensors
+    s = options.sensors
     return min(_STEPS, max(64, _PIXELS // (len(s.views) * s.width * s.height)))
 
 
-def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) -> None:
+def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
-    labels, eyes = Labels(root, part.index, ()), Eyes(root, part, wanted)
+    labels, sample_frames = Labels(root, part.index, ()), SampleFrames(root, part, options)
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
@@ -44,28 +44,28 @@ def write_part(root: DataRoot, part: Part, wanted: ExportOptions, folder: Path) 
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            told = _to_json(labels, part, k, wanted)
-            goal = _picture(eyes.goal(k), wanted) if "image" in wanted.goal else None
-            for begin, frames in eyes.frames(k):
+            told = _to_json(labels, part, k, options)
+            goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
+            for begin, frames in sample_frames.frames(k):
                 seen = frames.rgb if frames.rgb is not None else frames.depth_m
                 assert seen is not None
                 for i in range(len(seen)):
                     step = told[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
-                    for v, view in enumerate(wanted.sensors.views):
+                    for v, view in enumerate(options.sensors.views):
                         if frames.rgb is not None:
-                            _add(tar, f"{key}.{view}.{_kind(wanted)}", _picture(frames.rgb[i, v], wanted))
+                            _add(tar, f"{key}.{view}.{_kind(options)}", _picture(frames.rgb[i, v], options))
                     if frames.depth_m is not None:
                         stored = {
-                            view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(wanted.sensors.views)
+                            view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(options.sensors.views)
                         }
                         _add(tar, f"{key}.depth.npz", _arrays(stored))
                     if goal is not None:
-                        _add(tar, f"{key}.goal.{_kind(wanted)}", goal)
+                        _add(tar, f"{key}.goal.{_kind(options)}", goal)
                     _add(tar, f"{key}.json", json.dumps(step, ensure_ascii=False).encode())
 
 
-def _to_json(labels: Labels, part: Part, k: int, wanted: ExportOptions) -> list[dict[str, Any]]:
+def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list[dict[str, Any]]:
     """Return the JSON of every step of a trajectory."""
     index = part.index
     n = int(index.steps[k])
@@ -78,9 +78,9 @@ def _to_json(labels: Labels, part: Part, k: int, wanted: ExportOptions) -> list[
         "n_steps": n,
         "task": part.texts[k],
     }
-    if "text" in wanted.goal:
+    if "text" in options.goal:
         whole |= {name: index.told[name][k] for name in ("target_name", "landmark", "direction", "description")}
-    if "image" in wanted.goal:
+    if "image" in options.goal:
         whole["reference_image_id"] = index.told["reference_image_id"][k]
     return [
         {
@@ -95,14 +95,14 @@ def _to_json(labels: Labels, part: Part, k: int, wanted: ExportOptions) -> list[
     ]
 
 
-def _kind(wanted: ExportOptions) -> str:
-    return "jpg" if wanted.jpeg_quality else "png"
+def _kind(options: ExportOptions) -> str:
+    return "jpg" if options.jpeg_quality else "png"
 
 
-def _picture(rgb: NDArray[np.uint8], wanted: ExportOptions) -> bytes:
-    if not wanted.jpeg_quality:
+def _picture(rgb: NDArray[np.uint8], options: ExportOptions) -> bytes:
+    if not options.jpeg_quality:
         return encode_png(rgb, FRAME_PNG)
-    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, wanted.jpeg_quality])
+    done, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, options.jpeg_quality])
     if not done:
         raise RenderError(f"OpenCV could not compress a picture of {rgb.shape[1]} x {rgb.shape[0]} pixels")
     return bytes(data)
@@ -120,9 +120,9 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
     tar.addfile(member, io.BytesIO(content))
 
 
-def finish(parts: list[Part], wanted: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
+def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: Path) -> dict[str, int]:
     """Put the shards in their places, and list them; see `aerialdojo_gen.exchange.lerobot_writer.finish`."""
-    del wanted
+    del options
     shards = []
     for part, source in zip(parts, made, strict=True):
         name = SHARD.format(part.number)

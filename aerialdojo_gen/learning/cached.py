@@ -37,7 +37,7 @@ _RECOUNT = 256 << 20
 
 
 @dataclass(frozen=True)
-class Store:
+class CacheOptions:
     """Where pictures are kept."""
 
     base: Path  # Pictures that are made in another way have another folder in it
@@ -46,11 +46,11 @@ class Store:
     renderer: str
 
 
-class Cached:
+class CachedFrames:
     """Pictures of a source, kept in a folder."""
 
     def __init__(
-        self, source: Source, index: Index, sensors: Sensors, store: Store, meshes: dict[str, str]
+        self, source: Source, index: Index, sensors: Sensors, store: CacheOptions, meshes: dict[str, str]
     ) -> None:  # fmt: skip
         self._source, self._index, self._sensors = source, index, sensors
         self._store, self._meshes = store, meshes
@@ -169,7 +169,7 @@ class Cached:
         return self._used < self._store.most_bytes
 
 
-def pictures_folder(store: Store, sensors: Sensors) -> Path:
+def pictures_folder(store: CacheOptions, sensors: Sensors) -> Path:
     """Return the folder of pictures that are made in one way, made where it is not there."""
     s = sensors
     facts = {

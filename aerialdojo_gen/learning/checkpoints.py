@@ -22,7 +22,7 @@ _FORMAT = "aerialdojo-gen policy 1"
 
 
 @dataclass(frozen=True)
-class About:
+class PolicyInfo:
     """What a policy is made for: it stands in the file beside the weights."""
 
     shape: dict[str, Any]  # `aerialdojo_gen.learning.network.Shape`
@@ -32,7 +32,7 @@ class About:
     actions: str  # Fingerprint of the action set
     named: tuple[str, ...] = ()  # Words that pictures are searched for
 
-    def as_text(self) -> str:
+    def to_json(self) -> str:
         """Return it as JSON."""
         s, v = self.sensors, self.vocabulary
         return json.dumps({
@@ -42,16 +42,16 @@ class About:
         })  # fmt: skip
 
 
-def write(path: Path, tensors: Mapping[str, Any], about: About, state: Mapping[str, Any] | None = None) -> None:
+def write(path: Path, tensors: Mapping[str, Any], about: PolicyInfo, state: Mapping[str, Any] | None = None) -> None:
     """Write tensors with what they belong to."""
     make_folder(path.parent)
     named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    text = {"format": _FORMAT, "about": about.as_text(), "state": json.dumps(dict(state or {}))}
+    text = {"format": _FORMAT, "about": about.to_json(), "state": json.dumps(dict(state or {}))}
     with atomic_file(path.parent, path.name) as temporary:
         _safetensors()[1].save_file(named, str(temporary), metadata=text)
 
 
-def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
+def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
     """Read what `write` wrote."""
     torch_package()
     if not Path(path).is_file():
@@ -68,7 +68,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], About, dict[str, Any]]:
         words = Vocabulary(given["words"], given["length"])
         # Weights of an earlier version search for nothing.
         named = tuple(map(str, given.get("named", ())))
-        about = About(given["shape"], words, sensors, given["release"], given["actions"], named)
+        about = PolicyInfo(given["shape"], words, sensors, given["release"], given["actions"], named)
     except AerialDojoError as error:
         raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
     except Exception as error:  # safetensors has an error of its own, and a header may say anything

@@ -1,4 +1,4 @@
-"""Makes what is learned from, in processes: references, flights of a policy, looks about in a scene."""
+"""Collects training data in worker processes: references, flights of a policy, extra views of a scene."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.learning.index import Index
-from aerialdojo_gen.learning.parts import Flying, Part, Survey, references
+from aerialdojo_gen.learning.parts import DaggerRound, Exploration, Part, references
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps
-from aerialdojo_gen.learning.trajectories import draw_rank
+from aerialdojo_gen.learning.trajectories import sampling_key
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import Executor
 from aerialdojo_gen.pipeline.executors.link import WorkerChannel
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import DataRoot
 
-# Trajectories of a part: seconds of work, so that no process is left with a long one while the others wait.
+# Trajectories per part: seconds of work, so that parts finish at about the same time.
 _PART = 64
 _LOOKS = 2000
 _MEMORY_MB = 1500
@@ -33,26 +33,26 @@ _MEMORY_MB = 1500
 
 def parts_of(
     data: DataRoot, index: Index, folder: Path, selection: tuple[tuple[str, ...], tuple[str, ...]], sensors: Sensors,
-    size_px: int, seed: int, renderer: str, flying: Flying | None = None,
+    size_px: int, seed: int, renderer: str, dagger_round: DaggerRound | None = None,
 ) -> list[Part]:  # fmt: skip
-    """Share trajectories out; a part's folder is named by all that shapes what will be in it."""
-    # References are what they are whatever network flies later.
-    modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if flying is not None else [])]
+    """Split trajectories into parts; a part's folder is named by a digest of all that its content depends on."""
+    # References do not depend on the network that flies later.
+    modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if dagger_round is not None else [])]
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
     facts = [sensors.views, sensors.width, sensors.height, sensors.fov_deg, sensors.max_depth_m, size_px,
-             renderer, code, None if flying is None else
-             [flying.sha256, flying.seed, flying.round, flying.teacher_share]]  # fmt: skip
+             renderer, code, None if dagger_round is None else
+             [dagger_round.sha256, dagger_round.seed, dagger_round.round, dagger_round.teacher_share]]  # fmt: skip
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
-        # The goals' pictures are drawn by a stage of their own: the same trajectories may have others.
+        # Goal images come from another stage: the same trajectories may have others.
         shown = data.digest(part_name("release/objects", scene))
-        if flying is None:
-            # As they were drawn: of more trajectories, or of fewer, all parts but the last are the same.
-            rows = rows[np.argsort([draw_rank(seed, index.nav_id[k]) for k in rows], kind="stable")]
+        if dagger_round is None:
+            # In sampling order: with another limit all parts but the last stay the same.
+            rows = rows[np.argsort([sampling_key(seed, index.nav_id[k]) for k in rows], kind="stable")]
             shares = [rows[k : k + _PART] for k in range(0, len(rows), _PART)]
         else:
-            # Those to one goal together: its cost-to-go is made once.
+            # Sorted by goal: its cost-to-go is computed once.
             rows = rows[np.lexsort((rows, *index.goal[rows].T))]
             shares = np.array_split(rows, -(-len(rows) // _PART))
         for own in shares:
@@ -60,36 +60,36 @@ def parts_of(
             text = json.dumps([facts, piece.digest, mesh_of(data, scene)[1], shown], sort_keys=True)
             name = f"{scene}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
             parts.append(Part(
-                data, *selection, scene, tuple(piece.nav_id), sensors, size_px, renderer, folder / name, flying,
+                data, *selection, scene, tuple(piece.nav_id), sensors, size_px, renderer, folder / name, dagger_round,
             ))  # fmt: skip
     return parts
 
 
-def survey_parts(
+def view_parts(
     data: DataRoot, scenes: Sequence[str], folder: Path, split: str, target_split: str | None, looks: int, seed: int,
     like: Part,
 ) -> list[Part]:  # fmt: skip
-    """Share looks about out; cameras and renderer are those of another part."""
+    """Make parts of extra views; cameras and renderer are those of another part."""
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.exploration_views")]
     s, parts, release = like.sensors, [], release_fingerprint(data)
     for scene in scenes:
         for number, begin in enumerate(range(0, looks, _LOOKS)):
-            own = Survey(min(_LOOKS, looks - begin), seed, number, target_split)
+            own = Exploration(min(_LOOKS, looks - begin), seed, number, target_split)
             facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
                      mesh_of(data, scene)[1], asdict(own)]  # fmt: skip
             name = f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
             parts.append(replace(
-                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / name, flying=None,
-                survey=own,
+                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / name, dagger_round=None,
+                exploration=own,
             ))  # fmt: skip
     return parts
 
 
 def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what: str) -> list[Steps]:
-    """Make the parts that are not there, and read them all."""
+    """Compute the missing parts, and read all of them."""
     todo = [part for part in parts if not is_written(part.folder)]
     if todo:
-        unit = "trajectories" if todo[0].survey is None else "looks"
+        unit = "trajectories" if todo[0].exploration is None else "looks"
         with reporter.bar(what, sum(map(len, todo)), unit) as bar:
             for done in executor.map(make_part, todo, lambda part: part.scene, memory_mb=_MEMORY_MB):
                 if isinstance(done, AerialDojoError):
@@ -101,15 +101,15 @@ def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what:
 def make_part(part: Part, link: WorkerChannel | None = None) -> int:
     """Make one part and write it; return how many trajectories it has."""
     del link
-    if part.survey is not None:
-        from aerialdojo_gen.learning.exploration_views import surveyed
+    if part.exploration is not None:
+        from aerialdojo_gen.learning.exploration_views import collect_views
 
-        steps = surveyed(part, part.survey)
-    elif part.flying is None:
+        steps = collect_views(part, part.exploration)
+    elif part.dagger_round is None:
         steps = references(part)
     else:
         from aerialdojo_gen.learning.flights import flights
 
-        steps = flights(part, part.flying)
+        steps = flights(part, part.dagger_round)
     steps.write(part.folder)
     return len(part)

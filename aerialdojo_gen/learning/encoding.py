@@ -45,7 +45,7 @@ def goal_picture(image: NDArray[np.uint8] | None, size_px: int) -> NDArray[np.ui
     return out
 
 
-class Reckoning:
+class DeadReckoning:
     """Where a body is that adds up its own actions, in the frame of its start."""
 
     def __init__(self) -> None:

@@ -16,10 +16,10 @@ from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.encoding import Reckoning
+from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.parts import Flying, Part, goal_poses, goals_of, offsets, pictures
+from aerialdojo_gen.learning.parts import DaggerRound, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import Vocabulary
@@ -65,7 +65,7 @@ class Teacher:
                     out[k] = agent_actions(route.actions)
         return out
 
-    def keeping(self) -> AbstractContextManager[None]:
+    def keep_fields(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
         return self._planner.keeping_fields(*_FIELDS_MB)
 
@@ -76,12 +76,12 @@ def teacher_of(context: SceneContext, config: PlanConfig, radius_m: float) -> Te
 
 
 # Episodes that are flown side by side.
-_TOGETHER = 32
+_PARALLEL_EPISODES = 32
 # An episode is over after so many times the reference's actions, and some more: who is lost learns little more.
 _TIMES, _MORE = 1.5, 12
 
 
-class Flown:
+class FlownEpisode:
     """One episode under way, and what was written down of it."""
 
     def __init__(
@@ -90,7 +90,7 @@ class Flown:
         x, y, z, yaw = start.tolist()
         self.space, self.goal = space, goal
         self.episode = Episode(space, (x, y, z, yaw), (goal[0], goal[1], goal[2]), budget)
-        self.reckoning = Reckoning()
+        self.reckoning = DeadReckoning()
         # What the teacher would do from here on; empty where that is not known.
         self.way = np.zeros(0, np.int8)
         self.labels: list[int] = []
@@ -133,7 +133,7 @@ class Flown:
         return self.episode.distance_m <= SUCCESS_RADIUS_M
 
 
-def flights(part: Part, flying: Flying) -> Steps:
+def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     """Fly a part's tasks.
 
     The policy's actions are flown, now and then the teacher's; where the policy would stop too early, collide or
@@ -147,20 +147,20 @@ def flights(part: Part, flying: Flying) -> Steps:
     mesh = mesh_of(part.data, part.scene)
     space = flight_space(*mesh, body.radius_m)
     teacher = teacher_of(open_scene(*mesh, SEVERAL), PlanConfig(), body.radius_m)
-    tensors, about, _ = checkpoints.read(flying.weights)
-    network = network_of(about, tensors, str(flying.weights)).eval()
+    tensors, about, _ = checkpoints.read(dagger_round.weights)
+    network = network_of(about, tensors, str(dagger_round.weights)).eval()
     goals, told = goal_poses(part, index), goals_of(part, index)
     order = np.lexsort((np.arange(len(index)), *index.goal.T))
-    flown: dict[int, Flown] = {}
-    with torch.inference_mode(), teacher.keeping():
-        for k in range(0, len(order), _TOGETHER):
-            rows = order[k : k + _TOGETHER]
-            own = [Flown(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
+    flown: dict[int, FlownEpisode] = {}
+    with torch.inference_mode(), teacher.keep_fields():
+        for k in range(0, len(order), _PARALLEL_EPISODES):
+            rows = order[k : k + _PARALLEL_EPISODES]
+            own = [FlownEpisode(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
             most = [int(_TIMES * index.steps[r]) + _MORE for r in rows]
-            draws = [rng.generator(flying.seed, "dagger", flying.round, index.nav_id[r]) for r in rows]
+            draws = [rng.generator(dagger_round.seed, "dagger", dagger_round.round, index.nav_id[r]) for r in rows]
             shown = np.array([bool(d.random() < 0.5) for d in draws]) & (told["image"][rows] >= 0)
             goal = _understood(torch, network, about.vocabulary, told, rows, shown)
-            _fly(torch, network, part, teacher, own, most, draws, flying.teacher_share, goal)
+            _fly(torch, network, part, teacher, own, most, draws, dagger_round.teacher_share, goal)
             flown |= dict(zip(rows.tolist(), own, strict=True))
     return _steps([flown[r] for r in range(len(index))], told, part)
 
@@ -177,7 +177,7 @@ def _understood(
 
 
 def _fly(
-    torch: Any, network: Any, part: Part, teacher: Teacher, flown: list[Flown], most: list[int],
+    torch: Any, network: Any, part: Part, teacher: Teacher, flown: list[FlownEpisode], most: list[int],
     draws: list[np.random.Generator], teacher_share: float, goal: Any,
 ) -> None:  # fmt: skip
     going = list(range(len(flown)))
@@ -211,7 +211,7 @@ def _fly(
         going = left
 
 
-def _steps(flown: list[Flown], told: dict[str, Any], part: Part) -> Steps:
+def _steps(flown: list[FlownEpisode], told: dict[str, Any], part: Part) -> Steps:
     counts = [len(f.labels) for f in flown]
     poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
     goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)

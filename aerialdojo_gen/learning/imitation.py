@@ -36,7 +36,7 @@ class Progress:
     batch: int = 0
     sums: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it as plain values."""
         return {"phase": self.phase, "epoch": self.epoch, "batch": self.batch, "sums": self.sums}
 
@@ -52,12 +52,12 @@ class Epoch:
     number: int
     loss: float
     accuracy: float
-    kept_back: Assessed | None
+    kept_back: Assessment | None
     left_s: float
 
 
 @dataclass(frozen=True)
-class Assessed:
+class Assessment:
     """How well a network does on steps that it was not trained on."""
 
     accuracy: float
@@ -88,7 +88,7 @@ def epoch_batches(
     return [batches[k] for k in draw.permutation(len(batches))]
 
 
-def touched(logits: Any, blocked: Any) -> Any:
+def blocked_loss(logits: Any, blocked: Any) -> Any:
     """Return the loss of chances that actions are blocked: logits (m, 16) and bool (m, 16) to ()."""
     functional = torch_package().nn.functional
     return _WARNING * functional.binary_cross_entropy_with_logits(logits.float(), blocked.float())
@@ -151,7 +151,7 @@ class Learner:
     def learn(
         self,
         pool: Pool,
-        survey: Pool | None,
+        exploration: Pool | None,
         kept_back: NDArray[np.bool_],
         epochs: int,
         learning_rate: float,
@@ -171,8 +171,8 @@ class Learner:
         total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         frames = self._frames(pool)
         self._about = [(pool, frames, anywhere)]
-        if survey is not None:
-            self._about.append((survey, self._frames(survey), np.arange(survey.n_steps)))
+        if exploration is not None:
+            self._about.append((exploration, self._frames(exploration), np.arange(exploration.n_steps)))
         started, first = time.monotonic(), done
         while p.epoch < epochs:
             self.network.train()
@@ -191,28 +191,28 @@ class Learner:
             kept = self.assess(pool, frames, kept_back)
             after(Epoch(p.phase, number, sums[0] / steps, sums[1] / steps, kept, left_s))
 
-    def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessed | None:
+    def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessment | None:
         """See how well the network does on some episodes; None without any."""
         lengths = np.where(chosen, pool.lengths, 0)
         if not lengths.any():
             return None
         self.network.eval()
-        right, off, first, hindered, free = [], [], [], [], []
+        right, off, first, blocked_at, free = [], [], [], [], []
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
                 (thought, guess), mask = self._forward(batch, told=False), batch["mask"]
                 right.append((thought.logits.argmax(-1) == batch["label"])[mask])
                 said, is_so = thought.blocked[mask] > 0.0, batch["blocked"][mask]
-                hindered.append(said[is_so])
+                blocked_at.append(said[is_so])
                 free.append(~said[~is_so])
                 away = self.torch.linalg.vector_norm(guess.offset * UNIT_M - batch["offset"], dim=-1)
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
-        told = [self.torch.cat(one).float() for one in (hindered, free)]
+        told = [self.torch.cat(one).float() for one in (blocked_at, free)]
         shares = [float(one.mean()) if len(one) else None for one in told]
-        return Assessed(float(self.torch.cat(right).float().mean()), *median, *shares)
+        return Assessment(float(self.torch.cat(right).float().mean()), *median, *shares)
 
     def _optimiser(self) -> Any:
         train = self.recipe.train
@@ -267,7 +267,7 @@ class Learner:
             guess, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
             return network.choose(seen, guess.with_goal_offset(batch["offset"]) if told else guess), guess
 
-    def _looked_about(self, draw: np.random.Generator) -> Any:
+    def _views_loss(self, draw: np.random.Generator) -> Any:
         """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
         n = self.recipe.train.looks
         about = [(pool, frames, rows) for pool, frames, rows in self._about if len(rows)]
@@ -282,8 +282,8 @@ class Learner:
         with self.autocast():
             seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
             place, heading, scene, _ = self.network.whereabouts.found(seen)
-            hindered = self.network.blocked(seen)
-        return pose_loss(place, heading, scene, pose, number) + touched(hindered, blocked)
+            blocked_at = self.network.blocked(seen)
+        return pose_loss(place, heading, scene, pose, number) + blocked_loss(blocked_at, blocked)
 
     def _pictures(self, pool: Pool, frames: Any, rows: NDArray[np.int64]) -> Any:
         if frames is None:
@@ -301,8 +301,8 @@ class Learner:
         (thought, guess), mask = self._forward(batch, told=True), batch["mask"]
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
-        touches = touched(thought.blocked[mask], batch["blocked"][mask])
-        where = offset_loss(guess, batch) + touches + self._looked_about(draw)
+        touches = blocked_loss(thought.blocked[mask], batch["blocked"][mask])
+        where = offset_loss(guess, batch) + touches + self._views_loss(draw)
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())

@@ -88,7 +88,7 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         place, weight = place / UNIT_M, trust / ((spread / UNIT_M).square() + _FLOOR**2)
         moved, yaw = odometry[..., :3] / UNIT_M, odometry[..., 3]
         turn = torch.stack([yaw.cos(), yaw.sin()], dim=-1)
-        begun = _seen_from(directions(facing.detach()), turn) * trust
+        begun = _rotate_back(directions(facing.detach()), turn) * trust
         moves = torch.cat(
             [weight[..., :1] * moved[..., :2], weight[..., 1:2] * moved[..., :2], weight[..., 2:] * moved[..., 2:]],
             dim=-1,
@@ -107,12 +107,12 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
             [c * moves[..., 0] - s * moves[..., 1], s * moves[..., 2] + c * moves[..., 3], moves[..., 4]], dim=-1
         )
         away = goal_at / UNIT_M - (been - led) / weights
-        ahead = torch.cat([_seen_from(away[..., :2], start), away[..., 2:]], dim=-1) - moved
-        offset = torch.cat([_seen_from(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
+        ahead = torch.cat([_rotate_back(away[..., :2], start), away[..., 2:]], dim=-1) - moved
+        offset = torch.cat([_rotate_back(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
         return LocalizationOutput(offset, seen_at, facing, scene, target), total[:, -1]
 
 
-def _seen_from(vector: Any, by: Any) -> Any:
+def _rotate_back(vector: Any, by: Any) -> Any:
     """Turn plane vectors back by a heading's cosine and sine: what they are, seen from there."""
     x, y = vector.unbind(-1)
     c, s = by.unbind(-1)
@@ -154,11 +154,13 @@ def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     offset, pose = batch["offset"][mask] / UNIT_M, batch["pose"][mask]
     # Turned by the yaw: seen from a heading of as much to the other side.
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
-    away_m = torch.cat([_seen_from(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
+    away_m = torch.cat([_rotate_back(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
     scene = batch["scene"][:, None].expand(mask.shape)[mask]
     own = pose_loss(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
     return (
-        functional.smooth_l1_loss(guess.offset[mask], offset) + own + _unlike(guess.goal[mask], pose[:, :3] + away_m)
+        functional.smooth_l1_loss(guess.offset[mask], offset)
+        + own
+        + _interval_loss(guess.goal[mask], pose[:, :3] + away_m)
     )
 
 
@@ -168,10 +170,10 @@ def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> A
     sectors = torch.arange(_HEADINGS, device=pose.device)
     apart = torch.remainder(sectors - sector + _HEADINGS / 2, _HEADINGS) - _HEADINGS / 2
     turned = functional.cross_entropy(heading, (1.0 - apart.abs()).clamp(min=0.0))
-    return turned + _unlike(place, pose[:, :3]) + functional.cross_entropy(scene, number)
+    return turned + _interval_loss(place, pose[:, :3]) + functional.cross_entropy(scene, number)
 
 
-def _unlike(logits: Any, place_m: Any) -> Any:
+def _interval_loss(logits: Any, place_m: Any) -> Any:
     """Cross-entropy of intervals: of each axis the two whose middles the place lies between, by how near it is."""
     total = 0.0
     split = logits.split([n for _, n, _ in _AXES], dim=-1)

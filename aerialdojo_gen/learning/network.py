@@ -27,7 +27,7 @@ def as_patches(pictures: Any) -> Any:
     return cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0)
 
 
-class Sight(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class PatchClassifier(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
     """Chances that the words of objects' names name what a patch of a picture shows.
 
     Objects of a kind look alike in every scene: what is learned here holds in scenes that were never seen. It shares
@@ -90,7 +90,7 @@ class Shape:
     hidden: int
     named: int = 0  # Words that pictures are searched for; without any there is nothing that searches
 
-    def as_json(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return it as plain values."""
         return asdict(self)
 
@@ -165,7 +165,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
             nn.Linear(pictured, shape.hidden), nn.ReLU(inplace=True), nn.Linear(shape.hidden, N_ACTIONS)
         )
         # The last, so that the others begin as they do without it.
-        self.sight = Sight(shape.named, shape.channels) if shape.named else None
+        self.sight = PatchClassifier(shape.named, shape.channels) if shape.named else None
 
     def look(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""

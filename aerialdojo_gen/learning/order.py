@@ -69,7 +69,7 @@ class Order:
             shortest = lengths.index(min(lengths))
             streams[shortest].append(blocks[k])
             lengths[shortest] += len(blocks[k])
-        return self._dealt([np.concatenate([*stream, np.empty(0, np.int64)]) for stream in streams])
+        return self._interleave([np.concatenate([*stream, np.empty(0, np.int64)]) for stream in streams])
 
     def _blocks(self, scene: int, draw: np.random.Generator) -> list[NDArray[np.int64]]:
         own = draw.permutation(np.flatnonzero(self._scene == scene))
@@ -80,7 +80,7 @@ class Order:
             for part in np.split(own, cuts)
         ]
 
-    def _dealt(self, streams: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    def _interleave(self, streams: list[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Take a batch from every stream in turn; what is left of them at the end fills the last batches."""
         size = self._batch_size
         full = min(len(stream) // size for stream in streams)

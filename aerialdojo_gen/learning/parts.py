@@ -1,4 +1,4 @@
-"""A part of what is learned from: trajectories of one scene, or looks about in it, and how they are drawn."""
+"""A part of the training data: trajectories of one scene, or extra views of it, and their rendering."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import Labels
-from aerialdojo_gen.learning.pictures import within
+from aerialdojo_gen.learning.pictures import clip_depth
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.planning.flight_space import flight_space
@@ -28,7 +28,7 @@ from aerialdojo_gen.store.root import DataRoot
 
 
 @dataclass(frozen=True)
-class Flying:
+class DaggerRound:
     """A round of DAgger."""
 
     weights: Path  # Of the policy that flies
@@ -39,11 +39,11 @@ class Flying:
 
 
 @dataclass(frozen=True)
-class Survey:
-    """Looks about in a scene."""
+class Exploration:
+    """Extra views of a scene."""
 
     looks: int  # How many
-    seed: int  # Of the draws; of this part among those of its scene
+    seed: int  # Of the random generator
     number: int
     target_split: str | None  # Side of the split by objects whose references are followed
 
@@ -61,18 +61,18 @@ class Part:
     size_px: int  # Edge of the goals' pictures
     renderer: str
     folder: Path  # Where to; named by what is in it
-    flying: Flying | None = None  # None for the references
-    survey: Survey | None = None  # Looks about instead of trajectories
+    dagger_round: DaggerRound | None = None  # None for the references
+    exploration: Exploration | None = None  # Extra views instead of trajectories
 
     @property
     def label(self) -> str:
-        """In words."""
-        what = "looks" if self.survey is not None else "references" if self.flying is None else "flights"
+        """Name it in progress lines."""
+        what = "looks" if self.exploration is not None else "references" if self.dagger_round is None else "flights"
         return f"{what} of {self.scene}"
 
     def __len__(self) -> int:
-        """Return the number of trajectories, or of looks."""
-        return len(self.nav_ids) if self.survey is None else self.survey.looks
+        """Return the number of trajectories, or of views."""
+        return len(self.nav_ids) if self.exploration is None else self.exploration.looks
 
     def index(self) -> Index:
         """Read the trajectories."""
@@ -82,7 +82,7 @@ class Part:
 
 
 def references(part: Part) -> Steps:
-    """Fly the references, and look at every step."""
+    """Replay the references and render every step."""
     index = part.index()
     labels = Labels(part.data, index, ())
     poses = np.concatenate([index.poses_of(k) for k in range(len(index))])
@@ -94,28 +94,28 @@ def references(part: Part) -> Steps:
     return Steps(
         frames=pictures(part, poses), first=index.first, label=joined["action"],
         odometry=joined["odometry"],
-        offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=hindered(part, poses),
+        offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=blocked_at(part, poses),
         **goals_of(part, index),
     )  # fmt: skip
 
 
 def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Draw what is seen at poses: (n, views, H, W, 4) uint8."""
+    """Render poses: (n, views, H, W, 4) uint8."""
     s = part.sensors
     out = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
     if s.blind:
         return out
     context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
     renderer = drawing(context.scene, part.renderer)
-    # In pieces: floats take as much again.
+    # In chunks, to bound memory.
     for k in range(0, len(poses), 512):
         rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views)
-        out[k : k + 512] = packed(rgb, within(depth_m, s), s)
+        out[k : k + 512] = packed(rgb, clip_depth(depth_m, s), s)
     return out
 
 
-def hindered(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Say which actions lead nowhere at poses (n, 4): (n, 16) bool."""
+def blocked_at(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Blocked actions at poses (n, 4): (n, 16) bool."""
     collides, refused, _ = blocked_actions(
         flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses
     )
@@ -123,7 +123,7 @@ def hindered(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Where goals (n, 3) are, seen from bodies (n, 4): ahead, left, up, metres."""
+    """Goals (n, 3) in the frames of bodies (n, 4): ahead, left, up, metres."""
     away = goals - poses[:, :3]
     c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
     found = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2]])
@@ -131,7 +131,7 @@ def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[n
 
 
 def goals_of(part: Part, index: Index) -> dict[str, Any]:
-    """Read what each trajectory's goal is told by: fields of `Steps`."""
+    """Read each trajectory's goal as text and image: fields of `Steps`."""
     names = [index.told[name] for name in ("target_name", "landmark", "direction", "description")]
     text = [
         [goal_text(str(n), str(m), str(d), more) for more in (None, said)]

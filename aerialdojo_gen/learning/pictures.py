@@ -48,7 +48,7 @@ class Source(Protocol):
         ...
 
 
-class Drawn:
+class RenderedFrames:
     """Pictures drawn when they are asked for, as the environment and `render` draw them."""
 
     def __init__(self, root: DataRoot, index: Index, sensors: Sensors, renderer: str) -> None:
@@ -62,10 +62,10 @@ class Drawn:
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(drawing(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        return Frames(rgb if sensors.rgb else None, within(depth_m, sensors) if sensors.depth else None)
+        return Frames(rgb if sensors.rgb else None, clip_depth(depth_m, sensors) if sensors.depth else None)
 
 
-class Recorded:
+class RecordedFrames:
     """Pictures read from recordings, made smaller; what has none is drawn."""
 
     def __init__(self, root: DataRoot, index: Index, sensors: Sensors, drawn: Source) -> None:
@@ -112,10 +112,10 @@ class Recorded:
                 if depth_m is not None:
                     # The nearest value, not a mean: between two surfaces there is none.
                     depth_m[row, v] = _smaller(recording.depth_m[view][step], s, cv2.INTER_NEAREST_EXACT)
-        return Frames(rgb, None if depth_m is None else within(depth_m, s))
+        return Frames(rgb, None if depth_m is None else clip_depth(depth_m, s))
 
 
-def within(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
+def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
     """Set depth to 0 where nothing is in the sensors' range; in place."""
     np.putmask(depth_m, ~(depth_m <= np.float32(sensors.max_depth_m)), np.float32(0.0))
     return depth_m

@@ -12,10 +12,10 @@ from aerialdojo_gen.base.errors import StoreError, UsageError, first_line
 from aerialdojo_gen.benchmark.agents.base import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.encoding import Reckoning, goal_picture, packed
+from aerialdojo_gen.learning.encoding import DeadReckoning, goal_picture, packed
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.search import LOST_NATS, Search
-from aerialdojo_gen.learning.words import goal_text, named_by
+from aerialdojo_gen.learning.words import goal_text, word_targets
 from aerialdojo_gen.store.files import file_digest
 
 # Tokens of a text: what is longer is no description.
@@ -66,11 +66,11 @@ class Policy(AgentBase):
         shown = torch.tensor([goal.image is not None], device=self._device)
         with torch.inference_mode():
             self._goal = self.network.understand(tokens, image, shown)
-        self._reckoning, self._previous, self._memory = Reckoning(), N_ACTIONS, None
+        self._reckoning, self._previous, self._memory = DeadReckoning(), N_ACTIONS, None
         self._doubt: list[float] = []
         # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
         self._unsearched: list[tuple[Any, NDArray[np.float32]]] = []
-        wanted = named_by([goal.target_name], about.named)[0] if about.named else None
+        wanted = word_targets([goal.target_name], about.named)[0] if about.named else None
         self._search = None if wanted is None else Search(wanted, self.sensors)
 
     def act(self, observation: Observation) -> int:
@@ -109,7 +109,7 @@ class Policy(AgentBase):
         self._unsearched.clear()
 
 
-def _agree(about: checkpoints.About, shape: Any) -> None:
+def _check_shapes(about: checkpoints.PolicyInfo, shape: Any) -> None:
     """Refuse what the weights cannot take; that shape holds for them has been seen. ValueError says what."""
     sensors, vocabulary = about.sensors, about.vocabulary
     if len(sensors.views) != shape.views or len(vocabulary) != shape.words:
@@ -126,7 +126,7 @@ def _agree(about: checkpoints.About, shape: Any) -> None:
         raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
 
 
-def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) -> Any:
+def network_of(about: checkpoints.PolicyInfo, tensors: dict[str, Any], where: str) -> Any:
     """Make the network that weights are of; StoreError where they do not fit it."""
     from aerialdojo_gen.learning.network import Network, Shape
 
@@ -137,7 +137,7 @@ def network_of(about: checkpoints.About, tensors: dict[str, Any], where: str) ->
             network = Network(shape)
         network.load_state_dict({name.removeprefix("network."): t for name, t in tensors.items()}, assign=True)
         network.float()
-        _agree(about, shape)
+        _check_shapes(about, shape)
     except (RuntimeError, TypeError, ValueError, KeyError) as error:
         raise StoreError(f"{where} holds no policy of this version: {first_line(error)}") from None
     return network

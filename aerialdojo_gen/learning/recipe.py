@@ -36,7 +36,7 @@ class DataConfig(Section):
     )
 
     @model_validator(mode="after")
-    def _pictures_halve(self) -> DataConfig:
+    def _check_images(self) -> DataConfig:
         if self.size_px % 16:
             raise ValueError("size_px is halved four times: a multiple of 16")
         if len(set(self.views)) != len(self.views):
@@ -117,7 +117,7 @@ class Recipe(Section):
     dagger: DaggerConfig = Field(default_factory=DaggerConfig)
     small: SmallConfig = Field(default_factory=SmallConfig)
 
-    def made_small(self) -> Recipe:
+    def reduced(self) -> Recipe:
         """Return the recipe that `--small` trains by."""
         s = self.small
         return self.model_copy(

@@ -12,7 +12,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.learning.exploration_views import NOTHING
 from aerialdojo_gen.learning.imitation import Epoch, Learner
 from aerialdojo_gen.learning.steps import Pool
-from aerialdojo_gen.learning.words import named_by
+from aerialdojo_gen.learning.words import word_targets
 
 # The phase before the references'.
 PHASE = -1
@@ -20,9 +20,9 @@ PHASE = -1
 _EMPTY = 0.08
 
 
-def recognise(
+def train_patch_classifier(
     learner: Learner,
-    survey: Pool,
+    exploration: Pool,
     words: tuple[str, ...],
     *,
     after: Callable[[Epoch], None],
@@ -31,21 +31,21 @@ def recognise(
     """Go through the epochs of a network's sight, from where the progress is."""
     torch, recipe, progress = learner.torch, learner.recipe, learner.progress
     learner.share_cores()
-    chances = _chances(survey.names, words)
+    chances = _word_targets(exploration.names, words)
     size, epochs = recipe.sight.batch_looks, recipe.sight.epochs
-    count = -(-survey.n_steps // size)
+    count = -(-exploration.n_steps // size)
     total, done = epochs * count, progress.epoch * count + progress.batch
     started, first = time.monotonic(), done
     while progress.epoch < epochs:
         learner.network.train()
-        order = rng.generator(recipe.seed, "sight looks", progress.epoch).permutation(survey.n_steps)
+        order = rng.generator(recipe.seed, "sight looks", progress.epoch).permutation(exploration.n_steps)
         for number in range(progress.batch, count):
             draw = rng.generator(recipe.seed, "sight patches", progress.epoch, number)
             rows = np.sort(order[number * size : (number + 1) * size])
-            keep, wanted = _asked_for(survey.shown(rows), chances, draw)
+            keep, wanted = _select_patches(exploration.shown(rows), chances, draw)
             loss, right = 0.0, 0.0
             if len(keep):
-                pictures = torch.from_numpy(survey.frames(rows)).to(learner.device)
+                pictures = torch.from_numpy(exploration.frames(rows)).to(learner.device)
                 target = torch.from_numpy(wanted).to(learner.device)
                 with learner.autocast():
                     kept = torch.from_numpy(keep).to(learner.device)
@@ -64,15 +64,15 @@ def recognise(
         after(Epoch(PHASE, epoch, sums[0] / n, sums[1] / n, None, left_s))
 
 
-def _chances(names: list[str], words: tuple[str, ...]) -> NDArray[np.float32]:
+def _word_targets(names: list[str], words: tuple[str, ...]) -> NDArray[np.float32]:
     """Chances of words by object, (objects + 1, words + 1); the last row and the last word are of no object."""
     out = np.zeros((len(names) + 1, len(words) + 1), np.float32)
-    out[:-1, :-1] = named_by(names, words)
+    out[:-1, :-1] = word_targets(names, words)
     out[-1, -1] = 1.0
     return out
 
 
-def _asked_for(
+def _select_patches(
     shown: NDArray[np.int64], chances: NDArray[np.float32], draw: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Choose patches to learn from: their numbers, and the chances of their words."""

@@ -21,7 +21,7 @@ _RING_M, _CORNERS = 12.0, 6
 # trajectories of ID test 1 to 3 % lie above it, of OOD test 60 % at the first step, 69 % after four, 80 % in the end.
 LOST_NATS = 0.1
 # A corner or a sighting is given up after so many actions, and a corner counts as reached at this distance, metres.
-_PATIENCE, _REACHED_M = 14, 3.5
+_MAX_TRIES, _REACHED_M = 14, 3.5
 # Sightings within a cube of this edge are of one thing, metres, and none is believed from farther than the next.
 _THING_M, _FARTHEST_M = 2.5, 14.0
 # The goal viewpoint stands before its object: so far on the way to who sees it, metres.
@@ -39,7 +39,7 @@ _LAST_WAY, _A_METRE = 12, 2.0
 
 
 @dataclass
-class _Thing:
+class _Candidate:
     weight: float = 0.0
     score: float = 0.0
     place: Floats = field(default_factory=lambda: np.zeros(3))
@@ -47,12 +47,12 @@ class _Thing:
     tried: int = 0
 
     @property
-    def likeness(self) -> float:
+    def mean_score(self) -> float:
         return (self.score + _PRIOR * _PRIOR_SCORE) / (self.weight + _PRIOR)
 
     @property
-    def looked_at(self) -> bool:
-        return self.nearest_m <= _LOOKED_AT_M or self.tried >= _PATIENCE
+    def inspected(self) -> bool:
+        return self.nearest_m <= _LOOKED_AT_M or self.tried >= _MAX_TRIES
 
 
 class Search:
@@ -62,12 +62,12 @@ class Search:
         self._wanted = wanted.astype(np.float64)
         self._rays = patch_rays(sensors)
         self._range_m = sensors.max_depth_m
-        self._things: dict[tuple[int, int, int], _Thing] = {}
+        self._candidates: dict[tuple[int, int, int], _Candidate] = {}
         # The first corner is ahead to one side, the last to the other.
         angles = [(k + 0.5) * 2.0 * math.pi / _CORNERS for k in range(_CORNERS)]
         self._ring = [np.array([_RING_M * math.cos(a), _RING_M * math.sin(a), 0.0]) for a in angles]
         self._corner = self._since = 0
-        self._last: _Thing | None = None
+        self._last: _Candidate | None = None
 
     def look(
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
@@ -89,7 +89,7 @@ class Search:
         cells = np.floor(_from_start(away_m, odometry) / _THING_M).astype(int)
         places = _from_start(before, odometry)
         for k, cell in enumerate(map(tuple, cells.tolist())):
-            thing = self._things.setdefault(cell, _Thing())
+            thing = self._candidates.setdefault(cell, _Candidate())
             thing.weight += weight[k]
             thing.score += weight[k] * score[k]
             thing.place += weight[k] * places[k]
@@ -100,24 +100,24 @@ class Search:
 
         To the best match until seen from nearby, else round the start.
         """
-        best = self._last or max(self._things.values(), key=lambda thing: thing.likeness, default=None)
+        best = self._last or max(self._candidates.values(), key=lambda thing: thing.mean_score, default=None)
         if best is None:
             return self._onward(odometry)
-        place = _seen_from(best.place / best.weight, odometry)
+        place = _rotate_back(best.place / best.weight, odometry)
         away_m = float(np.linalg.norm(place))
         if self._last or remaining <= _LAST_WAY + _A_METRE * away_m:
             # For good: who changes his mind on the way arrives nowhere.
             self._last = best
             return place
         # Who stands before it and has not seen it from nearby sees something else there.
-        best.tried = _PATIENCE if away_m <= _REACHED_M else best.tried + 1
-        return self._onward(odometry) if best.looked_at else place
+        best.tried = _MAX_TRIES if away_m <= _REACHED_M else best.tried + 1
+        return self._onward(odometry) if best.inspected else place
 
     def _onward(self, odometry: NDArray[np.float32]) -> NDArray[np.float32]:
         self._since += 1
         for _ in range(_CORNERS):
-            way = _seen_from(self._ring[self._corner % _CORNERS], odometry)
-            if math.hypot(way[0], way[1]) > _REACHED_M and self._since <= _PATIENCE:
+            way = _rotate_back(self._ring[self._corner % _CORNERS], odometry)
+            if math.hypot(way[0], way[1]) > _REACHED_M and self._since <= _MAX_TRIES:
                 break
             self._corner, self._since = self._corner + 1, 0
         return way
@@ -146,7 +146,7 @@ def _from_start(away_m: Floats, odometry: NDArray[np.float32]) -> Floats:
     return np.column_stack([c * x - s * y, s * x + c * y, z]) + odometry[:3]
 
 
-def _seen_from(place: Floats, odometry: NDArray[np.float32]) -> NDArray[np.float32]:
+def _rotate_back(place: Floats, odometry: NDArray[np.float32]) -> NDArray[np.float32]:
     """A place in the frame of the start, (3,), seen from the body."""
     x, y, z = (place - odometry[:3]).tolist()
     c, s = math.cos(odometry[3]), math.sin(odometry[3])

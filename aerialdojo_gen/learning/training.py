@@ -22,15 +22,15 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.fingerprint import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
+from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
-from aerialdojo_gen.learning.parts import Flying, Part
+from aerialdojo_gen.learning.parts import DaggerRound, Part
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
-from aerialdojo_gen.learning.trajectories import drawn_evenly
-from aerialdojo_gen.learning.words import Vocabulary, goal_text, naming_words
+from aerialdojo_gen.learning.trajectories import sample_evenly
+from aerialdojo_gen.learning.words import Vocabulary, goal_text, name_vocabulary
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
@@ -38,13 +38,13 @@ from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
-# Seconds between lines about what is under way.
-_SAY_EVERY_S = 15.0
+# Seconds between progress lines.
+_REPORT_EVERY_S = 15.0
 
 
 @dataclass(frozen=True)
-class Trained:
-    """What a training left: the weights after the references alone, and the last ones."""
+class TrainingResult:
+    """Weight files of a training: after the references alone, and the last."""
 
     imitation: Path
     policy: Path
@@ -61,7 +61,7 @@ def train(
     renderer: str = "auto",
     restart: bool = False,
     reporter: Reporter | None = None,
-) -> Trained:
+) -> TrainingResult:
     """Train a policy; `aerialdojo-gen train` in the library.
 
     On a CPU the weights depend on the release, the recipe, the renderer, the version of PyTorch and the number of
@@ -88,7 +88,7 @@ def train(
 
     Returns
     -------
-    Trained
+    TrainingResult
 
     Raises
     ------
@@ -102,7 +102,7 @@ def train(
     if device not in ("auto", "cpu", "cuda"):
         raise UsageError(unknown("no device", device, ("auto", "cpu", "cuda")))
     root = open_root(data)
-    # What is missing there is said before what is missing here.
+    # A missing release is reported before a missing package.
     release_fingerprint(root)
     torch = torch_package("train")
     if device == "auto":
@@ -137,7 +137,7 @@ class _Training:
         self._selection = (Selection((d.split,)).splits, d.settings)
         self._index, named = self._read_index()
         told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
-        self._vocabulary = Vocabulary.of(goal_text(*said) for said in zip(*told, strict=True))
+        self._vocabulary = Vocabulary.of(goal_text(*words) for words in zip(*told, strict=True))
         shape = Shape(
             len(self._vocabulary),
             len(d.views),
@@ -149,33 +149,33 @@ class _Training:
             m.hidden,
             len(named),
         )
-        self._about = checkpoints.About(
-            shape.as_json(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
+        self._about = checkpoints.PolicyInfo(
+            shape.to_dict(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
             named,
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
         if device == "cpu":
             torch.use_deterministic_algorithms(True)
-            # Every tensor filled before it is written: a tenth of the time, and none is read before.
+            # Not needed, as no tensor is read before it is written, and costs a tenth of the time.
             torch.utils.deterministic.fill_uninitialized_memory = False
         self._learner = Learner(Network(shape), recipe, device)
-        # What objects look like comes before the references, where it is learned.
+        # The patch classifier is trained before the references.
         self._first = -1 if named else 0
         self._learner.begin(self._first)
-        self._said = self._kept = time.monotonic()
-        self._board: Any = None
-        self._survey: Pool | None = None
+        self._reported = self._kept = time.monotonic()
+        self._tensorboard: Any = None
+        self._exploration: Pool | None = None
 
-    def run(self, restart: bool) -> Trained:
+    def run(self, restart: bool) -> TrainingResult:
         recipe, learner, report = self._recipe, self._learner, self._reporter
         if restart:
-            # The weights too: a phase that has some counts as done. The settings last, in case of a kill between.
+            # The weights too: a phase that has some counts as done. The settings last, for a kill in between.
             ended = [self._folder / f"{name}.safetensors" for name in ("sight", "imitation", "policy")]
             for path in (*ended, *self._folder.glob("dagger-*.safetensors")):
                 path.unlink(missing_ok=True)
             for name in (_CHECKPOINT, _HISTORY, _SETTINGS):
                 (self._folder / name).unlink(missing_ok=True)
-        self._claim()
+        self._check_settings()
         self._resume()
         index = self._index
         report.line(
@@ -183,9 +183,9 @@ class _Training:
             f"{int(index.steps.sum()):,} steps; {self._about.shape['words']:,} words; "
             f"{sum(p.numel() for p in learner.network.parameters()):,} weights on {learner.device}"
         )
-        self._board = _board(self._folder / "tensorboard")
+        self._tensorboard = _tensorboard(self._folder / "tensorboard")
         parts = self._collect(index, None, "drawing references")
-        self._survey = self._look_about()
+        self._exploration = self._explore()
         for phase in range(self._first, recipe.dagger.rounds + 1):
             if phase > 0:
                 parts += self._collect(self._drawn(phase), self._flying(phase), f"round {phase}: flying")
@@ -195,61 +195,59 @@ class _Training:
                 learner.begin(phase)
             self._learn(parts, phase)
             weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
-            checkpoints.write(self._weights(phase), weights, self._about, learner.progress.as_json())
+            checkpoints.write(self._weights(phase), weights, self._about, learner.progress.to_dict())
             self._keep()
         last = self._folder / "policy.safetensors"
         tensors, about, state = checkpoints.read(self._weights(recipe.dagger.rounds))
         checkpoints.write(last, tensors, about, state)
         report.line(f"train {recipe.name}: weights in {last}")
-        return Trained(self._weights(0), last)
+        return TrainingResult(self._weights(0), last)
 
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
-        """Read the trajectories that are learned from, and the words that pictures will be searched for."""
+        """Read the training trajectories, and the words that images will be searched for."""
         d = self._recipe.data
         index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split)
         named: tuple[str, ...] = ()
         if d.looks and d.views and self._recipe.sight.epochs:
-            # Of all targets, however few of the trajectories to them are learned from.
+            # Of all targets, independent of the limit on trajectories.
             targets = set(zip(index.scene.tolist(), index.told["target_name"], strict=True))
-            named = naming_words(str(name) for _, name in sorted(targets, key=str))
-        return (index if d.limit is None else index.take(drawn_evenly(index, d.limit, self._recipe.seed))), named
+            named = name_vocabulary(str(name) for _, name in sorted(targets, key=str))
+        return (index if d.limit is None else index.take(sample_evenly(index, d.limit, self._recipe.seed))), named
 
     def _weights(self, phase: int) -> Path:
         names = {-1: "sight", 0: "imitation"}
         return self._folder / f"{names.get(phase, f'dagger-{phase}')}.safetensors"
 
     def _drawn(self, phase: int) -> Index:
-        """Draw a round's tasks: as many as fit, none of those kept back, others than the round before's first."""
+        """Draw a round's tasks, without those kept for validation."""
         index, want = self._index, self._recipe.dagger.episodes
         rank = [rng.rank(self._recipe.seed, "dagger tasks", phase, nav_id) for nav_id in index.nav_id]
         free = np.flatnonzero(~self._kept_back(np.array(index.nav_id)))
         return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
 
-    def _flying(self, phase: int) -> Flying:
+    def _flying(self, phase: int) -> DaggerRound:
         weights = self._weights(phase - 1)
-        return Flying(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
+        return DaggerRound(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
 
-    def _parts(self, index: Index, flying: Flying | None) -> list[Part]:
+    def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
         return parts_of(
             self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
-            self._recipe.seed, self._renderer, flying,
+            self._recipe.seed, self._renderer, dagger_round,
         )  # fmt: skip
 
-    def _collect(self, index: Index, flying: Flying | None, what: str) -> list[Steps]:
-        parts = self._parts(index, flying)
+    def _collect(self, index: Index, dagger_round: DaggerRound | None, what: str) -> list[Steps]:
+        parts = self._parts(index, dagger_round)
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
 
-    def _look_about(self) -> Pool | None:
+    def _explore(self) -> Pool | None:
         d, scenes = self._recipe.data, self._index.scenes
         if not (d.looks and d.views):
             return None
         like = self._parts(self._index, None)[0]
-        parts = survey_parts(
-            self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like
-        )
+        parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
         with make_executor("local", self._workers) as executor:
-            return Pool(collect(parts, executor, self._reporter, "looking about"), scenes, self._vocabulary)
+            return Pool(collect(parts, executor, self._reporter, "rendering extra views"), scenes, self._vocabulary)
 
     def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
@@ -257,12 +255,12 @@ class _Training:
 
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
-        if phase < 0 and self._survey is not None:
-            from aerialdojo_gen.learning.recognition import recognise
+        if phase < 0 and self._exploration is not None:
+            from aerialdojo_gen.learning.recognition import train_patch_classifier
 
-            recognise(
-                self._learner, self._survey, self._about.named, after=self._after("sight", self._recipe.sight.epochs),
-                tick=self._tick("sight"),
+            train_patch_classifier(
+                self._learner, self._exploration, self._about.named,
+                after=self._after("sight", self._recipe.sight.epochs), tick=self._tick("sight"),
             )  # fmt: skip
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
@@ -270,7 +268,7 @@ class _Training:
         what = f"round {phase}" if phase else "imitation"
         after = self._after(what, epochs)
         self._learner.learn(
-            pool, self._survey, self._kept_back(pool.nav_id), epochs, rate, after=after,
+            pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, after=after,
             tick=self._tick(what),
         )  # fmt: skip
 
@@ -280,11 +278,11 @@ class _Training:
         def tick(done: int, total: int, loss: float, accuracy: float) -> None:
             per_s = rate.per_s(done)
             now = time.monotonic()
-            if self._board is not None:
-                self._board.add_scalar(f"{what}/loss", loss, done)
-                self._board.add_scalar(f"{what}/accuracy", accuracy, done)
-            if now - self._said >= _SAY_EVERY_S:
-                self._said = now
+            if self._tensorboard is not None:
+                self._tensorboard.add_scalar(f"{what}/loss", loss, done)
+                self._tensorboard.add_scalar(f"{what}/accuracy", accuracy, done)
+            if now - self._reported >= _REPORT_EVERY_S:
+                self._reported = now
                 left = f", {duration((total - done) / per_s)} left" if per_s else ""
                 self._reporter.line(
                     f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
@@ -318,7 +316,7 @@ class _Training:
         return after
 
     def _keep(self) -> None:
-        progress = self._learner.progress.as_json()
+        progress = self._learner.progress.to_dict()
         checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
         self._kept = time.monotonic()
 
@@ -327,15 +325,15 @@ class _Training:
         if path.is_file():
             tensors, _, state = checkpoints.read(path)
             self._learner.restore(tensors, state)
-        # An epoch that was written down and not yet kept is gone through again.
+        # An epoch in the history but not in the checkpoint is repeated.
         p, file = self._learner.progress, self._folder / _HISTORY
         if file.is_file():
             known = [row for row in _rows(file) if (row["phase"], row["epoch"]) < (p.phase, p.epoch)]
             with atomic_file(self._folder, _HISTORY) as temporary:
                 temporary.write_text("".join(json.dumps(row) + "\n" for row in known), encoding="utf-8")
 
-    def _claim(self) -> None:
-        """Take the folder for this training; UsageError where it was begun with another."""
+    def _check_settings(self) -> None:
+        """Write the training's settings; UsageError if the folder was begun with others."""
         recipe = self._recipe.model_dump(mode="json", exclude={"small", "name"})
         recipe["train"].pop("checkpoint_s")
         own = {"recipe": hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest(),
@@ -356,7 +354,7 @@ class _Training:
 
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
-    """Read a history as far as it was written: the last line may be cut short."""
+    """Read a history; the last line may be cut short."""
     for line in file.read_text(encoding="utf-8", errors="replace").splitlines():
         try:
             yield loads_json(line)
@@ -365,14 +363,14 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
 
 
 def _describe(kept: Any) -> str:
-    """What is known of blocked and free actions, in words; `Assessed` to a clause."""
+    """Describe the accuracy on blocked and free actions."""
     shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
     return f"; {' and '.join(known)} actions told" if known else ""
 
 
-def _board(folder: Path) -> Any:
-    """TensorBoard's writer, where it is installed."""
+def _tensorboard(folder: Path) -> Any:
+    """TensorBoard's writer; None if it is not installed."""
     try:
         return importlib.import_module("torch.utils.tensorboard").SummaryWriter(str(folder))
     except ImportError:

@@ -18,11 +18,11 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
-from aerialdojo_gen.learning.cached import Cached, Store
+from aerialdojo_gen.learning.cached import CachedFrames, CacheOptions
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
-from aerialdojo_gen.learning.pictures import Drawn, Frames, Recorded, Source
+from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
 from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import Where, open_root
@@ -151,12 +151,12 @@ class Trajectories:
         chosen = Selection(_names(split), _names(setting), modalities, _names(scene), None, seed)
         index = read_index(self._root, chosen, target_split)
         if limit is not None:
-            index = index.take(drawn_evenly(index, limit, seed))
+            index = index.take(sample_evenly(index, limit, seed))
         # A scene without a mesh is named before the first epoch, not within it.
         meshes = {name: mesh_of(self._root, name)[1] for name in index.scenes} if not self.sensors.blind else {}
         self._source: Source | None = None
         if not self.sensors.blind:
-            self._source = Drawn(self._root, index, self.sensors, renderer)
+            self._source = RenderedFrames(self._root, index, self.sensors, renderer)
         if source != "render" and not self.sensors.blind:
             index = self._with_recordings(index, source, renderer)
         self.index, self.past, self.stride = index, past, stride
@@ -171,8 +171,8 @@ class Trajectories:
         if cache_gb and not self.sensors.blind:
             base = Path(cache_dir) if cache_dir is not None else cache_folder() / "learning"
             assert self._source is not None
-            self._source = Cached(
-                self._source, index, self.sensors, Store(base, int(cache_gb * 1e9), source, renderer), meshes
+            self._source = CachedFrames(
+                self._source, index, self.sensors, CacheOptions(base, int(cache_gb * 1e9), source, renderer), meshes
             )
 
     def __len__(self) -> int:
@@ -278,8 +278,8 @@ class Trajectories:
         return joined.take(np.asarray(back, np.int64).ravel())
 
     def _with_recordings(self, index: Index, source: str, renderer: str) -> Index:
-        drawn: Source = Drawn(self._root, index, self.sensors, renderer)
-        recorded = Recorded(self._root, index, self.sensors, drawn)
+        drawn: Source = RenderedFrames(self._root, index, self.sensors, renderer)
+        recorded = RecordedFrames(self._root, index, self.sensors, drawn)
         if source == "recordings":
             has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
             if not len(has):
@@ -288,8 +288,8 @@ class Trajectories:
                     f"{command('render')}, or choose source='render'"
                 )
             index = index.take(has)
-            drawn = Drawn(self._root, index, self.sensors, renderer)
-            recorded = Recorded(self._root, index, self.sensors, drawn)
+            drawn = RenderedFrames(self._root, index, self.sensors, renderer)
+            recorded = RecordedFrames(self._root, index, self.sensors, drawn)
         self._source = recorded
         return index
 
@@ -303,7 +303,7 @@ class Trajectories:
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 
-def drawn_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
+def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     """Draw trajectories, spread over the scenes as evenly as they go; a larger limit only adds to them.
 
     Returns
@@ -316,13 +316,13 @@ def drawn_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     lots: list[tuple[int, int, int]] = []
     for number, scene in enumerate(index.scenes):
         own = np.flatnonzero(index.scene == number).tolist()
-        ranked = sorted((draw_rank(seed, index.nav_id[k]), k) for k in own)[:limit]
+        ranked = sorted((sampling_key(seed, index.nav_id[k]), k) for k in own)[:limit]
         lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
     return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
 
 
-def draw_rank(seed: int, nav_id: str) -> int:
-    """Return by what `drawn_evenly` orders the trajectories of a scene."""
+def sampling_key(seed: int, nav_id: str) -> int:
+    """Return by what `sample_evenly` orders the trajectories of a scene."""
     return rng.rank(seed, "learning", nav_id)
 
 

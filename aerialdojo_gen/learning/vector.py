@@ -162,13 +162,13 @@ def make_vec(
     scenes = make_env(data, scene=scene, **{**options, "views": (), "sensors": None}).scenes
     shares = [tuple(scenes[k % len(scenes) :: num_envs]) if spread_scenes else () for k in range(num_envs)]
     shaping = {} if progress is True else progress or None
-    makers = [partial(_made, root.url, scene, share, shaping, tuple(wrappers), options) for share in shares]
+    makers = [partial(_make_one, root.url, scene, share, shaping, tuple(wrappers), options) for share in shares]
     if vectorization_mode == "sync":
         return SyncVectorEnv(makers)
     return AsyncVectorEnv(makers, context=context or "spawn")
 
 
-def _made(
+def _make_one(
     data: str,
     scene: str | Sequence[str],
     own: tuple[str, ...],

@@ -69,13 +69,13 @@ class Vocabulary:
 _STOP_WORDS = frozenset({"a", "an", "and", "at", "by", "for", "from", "in", "of", "on", "the", "to", "with"})
 
 
-def naming_words(names: Iterable[str], at_least: int = 2) -> tuple[str, ...]:
+def name_vocabulary(names: Iterable[str], at_least: int = 2) -> tuple[str, ...]:
     """Collect the words of objects' names that occur in enough of them, by the alphabet."""
     counted = Counter(word for name in names for word in set(words_of(name)))
     return tuple(sorted(w for w, n in counted.items() if n >= at_least and w.isalpha() and w not in _STOP_WORDS))
 
 
-def named_by(names: Sequence[str], words: Sequence[str]) -> NDArray[np.float32]:
+def word_targets(names: Sequence[str], words: Sequence[str]) -> NDArray[np.float32]:
     """Which words name objects: (n, words) float32, rows sum to 1 or are 0 where no word is known."""
     place = {word: k for k, word in enumerate(words)}
     out = np.zeros((len(names), len(words)), np.float32)

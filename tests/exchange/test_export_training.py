@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange.folder import PartialExport
-from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
+from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.rendering.codecs import to_stored
@@ -32,9 +32,10 @@ LEROBOT = os.environ.get("LEROBOT_PYTHON", "")
 @pytest.fixture(scope="module")
 def made(smoke, tmp_path_factory):
     folder = tmp_path_factory.mktemp("exports")
-    wanted = wanted_from(**OPTIONS)
+    options = export_options(**OPTIONS)
     counts = {
-        form: export_for_learning(form, smoke, folder / form, wanted, workers=1) for form in ("lerobot", "webdataset")
+        form: export_for_learning(form, smoke, folder / form, options, workers=1)
+        for form in ("lerobot", "webdataset")
     }
     return folder, counts
 
@@ -194,13 +195,13 @@ def test_the_same_bytes_by_any_number_of_workers(form, made, smoke, tmp_path, mo
     # Several parts a scene, so that there is something to share out.
     from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 
-    again = export_for_learning(form, smoke, tmp_path / "again", wanted_from(**OPTIONS), workers=2)
+    again = export_for_learning(form, smoke, tmp_path / "again", export_options(**OPTIONS), workers=2)
     assert again == made[1][form]
     assert files(tmp_path / "again") == files(made[0] / form)
     assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
     for writer in (lerobot_writer, webdataset_writer):
-        monkeypatch.setattr(writer, "frames_a_part", lambda wanted: 20)
-    cut = export_for_learning(form, smoke, tmp_path / "cut", wanted_from(**OPTIONS), workers=1)
+        monkeypatch.setattr(writer, "frames_a_part", lambda options: 20)
+    cut = export_for_learning(form, smoke, tmp_path / "cut", export_options(**OPTIONS), workers=1)
     assert cut.parts > again.parts
     if form == "lerobot":
         one, many = lerobot_reader.load(made[0] / form), lerobot_reader.load(tmp_path / "cut")
@@ -220,7 +221,7 @@ def test_what_is_killed_goes_on_with_finished_parts(made, smoke, tmp_path):
     script = f"""
 import os, pathlib, signal, sys
 from aerialdojo_gen.exchange import webdataset_writer
-from aerialdojo_gen.exchange.learning_export import export_for_learning, wanted_from
+from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
 whole, done = webdataset_writer.write_part, []
 def write(root, part, wanted, folder):
     whole(root, part, wanted, folder)
@@ -228,7 +229,7 @@ def write(root, part, wanted, folder):
     if len(done) == 2:
         os.kill(os.getpid(), signal.SIGKILL)
 webdataset_writer.write_part = write
-export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), wanted_from(**{OPTIONS!r}), workers=1)
+export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), export_options(**{OPTIONS!r}), workers=1)
 """
     done = subprocess.run([sys.executable, "-c", script, str(smoke), str(out)], capture_output=True, text=True)
     assert done.returncode == -signal.SIGKILL, done.stderr
@@ -236,7 +237,7 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), wanted
     (unfinished,) = tmp_path.glob(".*.unfinished")
     assert [path.name for path in (unfinished / "parts").iterdir()] == ["000000"]
     first = (unfinished / "parts" / "000000" / "shard.tar").stat().st_ino
-    resumed = export_for_learning("webdataset", smoke, out, wanted_from(**OPTIONS), workers=1)
+    resumed = export_for_learning("webdataset", smoke, out, export_options(**OPTIONS), workers=1)
     assert (resumed.parts_kept, resumed.parts) == (1, 2)
     assert (out / "shard-000000.tar").stat().st_ino == first, "it is the file of the killed run"
     assert files(out) == files(made[0] / "webdataset")
@@ -260,8 +261,8 @@ def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
 
 def test_recordings_are_read_where_there_are_some(smoke, tmp_path):
     """What is not recorded is left out by recordings, and drawn by auto."""
-    wanted = wanted_from(split=("all",), source="recordings", size=64, depth=False)
-    made = export_for_learning("webdataset", smoke, tmp_path / "recorded", wanted, workers=1)
+    options = export_options(split=("all",), source="recordings", size=64, depth=False)
+    made = export_for_learning("webdataset", smoke, tmp_path / "recorded", options, workers=1)
     assert 0 < made.counts["trajectories"] < 10
 
 
@@ -321,10 +322,10 @@ def test_what_makes_no_sense_is_one_line(smoke, tmp_path, options, message):
 
 def test_a_release_without_meshes_and_one_without_recordings_are_named(planted, tmp_path):
     with pytest.raises(UsageError, match=r"has a recording of the views asked for: run .*render.*--source render"):
-        export_for_learning("lerobot", planted.data, tmp_path / "x", wanted_from(source="recordings"))
+        export_for_learning("lerobot", planted.data, tmp_path / "x", export_options(source="recordings"))
     shutil.rmtree(planted.data / "meshes")
     with pytest.raises(StoreError, match=r"the mesh .* is missing: run aerialdojo-gen build-scenes"):
-        export_for_learning("lerobot", planted.data, tmp_path / "x", wanted_from())
+        export_for_learning("lerobot", planted.data, tmp_path / "x", export_options())
     assert not list(tmp_path.glob("x*"))
     assert not list(tmp_path.glob(".x*"))
 
@@ -335,5 +336,7 @@ def test_a_name_that_leads_out_of_the_folder_comes_into_no_tar(planted, tmp_path
         rows = [row | {"nav_id": "../../outside"} if row["nav_id"] == old else row for row in planted.rows(table)]
         planted.write(table, rows, schema=store.LAYOUT[table].spec.schema)
     with pytest.raises(StoreError, match=r"nav_id '../../outside' cannot name a file"):
-        export_for_learning("webdataset", planted.data, tmp_path / "x", wanted_from(split=("train",), size=(32, 32)))
+        export_for_learning(
+            "webdataset", planted.data, tmp_path / "x", export_options(split=("train",), size=(32, 32))
+        )
     assert not (tmp_path / "x").exists()

@@ -6,7 +6,7 @@ import pytest
 from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.learning.encoding import Reckoning
+from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import offsets, pictures
 from aerialdojo_gen.learning.recipe import Recipe
@@ -37,7 +37,7 @@ def flown(root, network, sensors, index, k, led):
         tuple(index.goal[k].tolist()), int(index.budget[k]),
     )  # fmt: skip
     (part,) = parts_of(root, index.take(np.array([k])), root.path, (("id_test",), ()), sensors, 32, 0, "gl")
-    reckoning, goal, memory = Reckoning(), torch.zeros(1, network.shape.features), network.blank(1)
+    reckoning, goal, memory = DeadReckoning(), torch.zeros(1, network.shape.features), network.blank(1)
     step = torch.ones((1, 1), dtype=torch.bool)
     while episode.termination is None:
         pose = np.array([[*episode.position, episode.yaw_rad]])

@@ -10,11 +10,11 @@ from aerialdojo_gen.benchmark.observations import drawing
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.geometry.cameras import view_pose
-from aerialdojo_gen.learning.exploration_views import NOTHING, UNTOLD, patches_of, surveyed
+from aerialdojo_gen.learning.exploration_views import NOTHING, UNNAMED, collect_views, patch_labels
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.parts import Part, Survey
+from aerialdojo_gen.learning.parts import Exploration, Part
 from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
-from aerialdojo_gen.learning.words import named_by, naming_words
+from aerialdojo_gen.learning.words import name_vocabulary, word_targets
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
@@ -33,7 +33,7 @@ def looks(smoke, tmp_path_factory):
     root = open_root(smoke)
     (scene, *_) = read_index(root, Selection(("id_train",))).scenes
     part = Part(root, ("id_train",), (), scene, (), SENSORS, 32, "gl", tmp_path_factory.mktemp("looks"))
-    return root, scene, surveyed(part, Survey(60, 3, 0, "train"))
+    return root, scene, collect_views(part, Exploration(60, 3, 0, "train"))
 
 
 def seeing(shown, number):
@@ -45,9 +45,9 @@ def seeing(shown, number):
 
 
 def test_words_that_name_several_objects_are_searched_for():
-    words = naming_words(["the red van", "a red car, with a roof", "van of the baker", "roof"])
+    words = name_vocabulary(["the red van", "a red car, with a roof", "van of the baker", "roof"])
     assert words == ("red", "roof", "van")
-    wanted = named_by(["red van in red", "blue bus"], words)
+    wanted = word_targets(["red van in red", "blue bus"], words)
     assert np.allclose(wanted, [[0.5, 0.0, 0.5], [0.0, 0.0, 0.0]])
 
 
@@ -57,14 +57,14 @@ def test_a_patch_shows_what_most_of_its_pixels_do(seed, blocky):
     # Blocks of any size: patches of one object, of several, and of few pixels of one.
     small = rng.integers(-2, 4, (2, 16 // blocky + 1, 16 // blocky + 1)).astype(np.int16)
     number = small.repeat(blocky, axis=1).repeat(blocky, axis=2)[:, :16, :16]
-    for k, found in enumerate(patches_of(number).tolist()):
+    for k, found in enumerate(patch_labels(number).tolist()):
         view, row, column = np.unravel_index(k, (2, 4, 4))
         own = number[view, 4 * row : 4 * row + 4, 4 * column : 4 * column + 4].ravel().tolist()
         count = {one: own.count(one) for one in set(own) - {NOTHING}}
         if not count:
             assert found == NOTHING
         elif max(count.values()) < 4:
-            assert found == UNTOLD
+            assert found == UNNAMED
         else:
             assert count[found] == max(count.values())
 
@@ -105,7 +105,7 @@ def test_who_sees_the_goal_is_led_to_it(looks):
     ).to_pylist()
     known = {row["name"]: row for row in rows if [r["name"] for r in rows].count(row["name"]) == 1}
     off = []
-    wanted = named_by(["red van"], WORDS)[0]
+    wanted = word_targets(["red van"], WORDS)[0]
     for k, pose in enumerate(found.pose):
         distance_m = np.linalg.norm(
             patch_rays(SENSORS) * patch_depths_m(found.frames[k], SENSORS.max_depth_m)[:, None], axis=1
@@ -134,7 +134,7 @@ def test_who_sees_the_goal_is_led_to_it(looks):
 
 
 def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby():
-    wanted = named_by(["red van"], WORDS)[0]
+    wanted = word_targets(["red van"], WORDS)[0]
     search, start = Search(wanted, SENSORS), np.zeros(4, np.float32)
     rays = patch_rays(SENSORS)
     # One patch ahead and one to the left, 9 m away; what is ahead is red, what is to the left is a red van.
@@ -162,7 +162,7 @@ def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby(
 
 @given(st.lists(poses, min_size=1, max_size=40), st.integers(20, 90))
 def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
-    search = Search(named_by(["red van"], WORDS)[0], SENSORS)
+    search = Search(word_targets(["red van"], WORDS)[0], SENSORS)
     nothing = np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997]))
     for odometry in places:
         search.look(nothing, np.zeros((4, 32, 32, 4), np.uint8), odometry)
@@ -176,7 +176,7 @@ def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
 
 
 def test_the_ring_is_flown_round_once_in_its_order():
-    search = Search(named_by(["red van"], WORDS)[0], SENSORS)
+    search = Search(word_targets(["red van"], WORDS)[0], SENSORS)
     odometry, bearings = np.zeros(4, np.float32), []
     for _ in range(60):
         away = search.towards(odometry, 90)
@@ -191,7 +191,7 @@ def test_the_ring_is_flown_round_once_in_its_order():
 
 def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
     """Whatever is seen on it: who changes his mind arrives nowhere."""
-    search, odometry = Search(named_by(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
+    search, odometry = Search(word_targets(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
     left = int(np.linalg.norm(patch_rays(SENSORS) - [0.0, 1.0, 0.0], axis=1).argmin())
     ahead = int(np.linalg.norm(patch_rays(SENSORS) - [1.0, 0.0, 0.0], axis=1).argmin())
     pictures = np.zeros((4, 32, 32, 4), np.uint8)

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from support.flying import town
+from support.dagger_round import town
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
@@ -21,13 +21,13 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.learning.collect import collect, parts_of, survey_parts
+from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.flights import NO_LABEL, Teacher
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import pictures
 from aerialdojo_gen.learning.recipe import Recipe, load_recipe
 from aerialdojo_gen.learning.steps import read_steps
-from aerialdojo_gen.learning.trajectories import drawn_evenly
+from aerialdojo_gen.learning.trajectories import sample_evenly
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -88,7 +88,7 @@ def history(folder):
 def the_eight(smoke):
     """The navigation tasks that were learned from."""
     index = read_index(open_root(smoke), Selection(("id_train",)))
-    return set(index.take(drawn_evenly(index, 8, 0)).nav_id)
+    return set(index.take(sample_evenly(index, 8, 0)).nav_id)
 
 
 def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_path):
@@ -209,7 +209,7 @@ def test_of_more_trajectories_or_other_scenes_what_was_drawn_stays_drawn(smoke, 
         return {part.folder.name for part in parts if len(part) == 5}
 
     all_of_them = names(index)
-    fewer = names(index.take(drawn_evenly(index, 10 * len(index.scenes), 3)))
+    fewer = names(index.take(sample_evenly(index, 10 * len(index.scenes), 3)))
     assert len(fewer) == 2 * len(index.scenes)
     assert fewer < all_of_them
     last = names(index.take(np.flatnonzero(index.scene == len(index.scenes) - 1)))
@@ -222,7 +222,7 @@ def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(s
     index = read_index(root, Selection(("id_train",)))
     sensors = Sensors(("front", "down"), width=32, height=32)
     (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), sensors, 32, 0, "gl")
-    parts = survey_parts(root, index.scenes, tmp_path, "id_train", "train", 40, 7, like)
+    parts = view_parts(root, index.scenes, tmp_path, "id_train", "train", 40, 7, like)
     assert [part.scene for part in parts] == list(index.scenes)
     with make_executor("local", 1) as executor:
         surveys = collect(parts, executor, Reporter(False), "looking")
@@ -233,13 +233,13 @@ def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(s
         apart = np.linalg.norm(looks.pose[:, None, :3] - places[None], axis=2).min(axis=1)
         assert 0.2 < np.median(apart) < apart.max() <= 3.0
         space = flight_space(*mesh_of(root, part.scene), 0.25)
-        for pose, hindered in zip(looks.pose.astype(np.float64), looks.blocked, strict=True):
+        for pose, blocked_at in zip(looks.pose.astype(np.float64), looks.blocked, strict=True):
             # A look may be at a contact: single precision moves it by some micrometres.
             assert space.grid.distance_m(pose[:3]) > 0.25 - 0.01
             for action in range(16):
                 episode = Episode(space, tuple(pose), (0.0, 0.0, 0.0), 9)
                 episode.step(action)
-                assert hindered[action] == (episode.refused or episode.termination == "collision"), (pose, action)
+                assert blocked_at[action] == (episode.refused or episode.termination == "collision"), (pose, action)
         assert set(looks.scene) == {part.scene}
         assert (looks.first == np.arange(41)).all()
         # All four quarters, each by more than a tenth.
@@ -267,7 +267,7 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
         tensors, about, _ = checkpoints.read(done.policy)
         network = network_of(about, tensors, str(done.policy)).eval()
         (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), about.sensors, 32, 0, "gl")
-        unseen = survey_parts(root, index.scenes, tmp_path, "id_train", None, 200, 7, like)
+        unseen = view_parts(root, index.scenes, tmp_path, "id_train", None, 200, 7, like)
         with make_executor("local", 1) as executor, torch.no_grad():
             (found,) = collect(unseen, executor, Reporter(False), "looking")
             seen = network.look(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
@@ -325,7 +325,7 @@ def test_shipped_recipes_are_named_after_their_files_and_small_ones_have_no_more
     for file in files:
         shipped = load_recipe(file)
         assert shipped.name == file.stem  # else two of them would train into one folder
-        assert shipped.made_small().dagger.rounds <= shipped.dagger.rounds, f"{file} --small is another method"
+        assert shipped.reduced().dagger.rounds <= shipped.dagger.rounds, f"{file} --small is another method"
 
 
 def test_the_teachers_labels_are_the_planners_own_plan():
@@ -340,7 +340,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
         if planner.grid.distance_m(p) > 0.4 and planner.grid.reachable(p):
             free.append(np.array([*p, draw.uniform(-np.pi, np.pi)]))
     goal, starts = free[0], free[1:]
-    with teacher.keeping():
+    with teacher.keep_fields():
         labels = teacher.labels([goal] * len(starts), starts)
         for start, label in zip(starts, labels, strict=True):
             route = planner.plan_one(goal, start)

@@ -16,7 +16,7 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
-from aerialdojo_gen.learning.cached import Cached
+from aerialdojo_gen.learning.cached import CachedFrames
 from aerialdojo_gen.learning.labels import NO_ACTION
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
@@ -90,7 +90,7 @@ def test_labels_fly_every_trajectory_to_its_goal(smoke, blind):
 def test_privileged_columns_are_what_the_environment_does(smoke, blind):
     root = open_root(smoke)
     draw = np.random.default_rng(0)
-    touched = 0
+    blocked_loss = 0
     for number in draw.choice(len(blind), 60, replace=False):
         sample = blind[int(number)]
         k, _ = blind.place(int(number))
@@ -99,12 +99,12 @@ def test_privileged_columns_are_what_the_environment_does(smoke, blind):
             episode = Episode(space, tuple(sample["pose"][0]), tuple(blind.index.goal[k]), 5)
             episode.step(action)
             collision = episode.termination == "collision"
-            touched += collision
+            blocked_loss += collision
             assert sample["action_collides"][0, action] == collision
             assert sample["action_refused"][0, action] == episode.refused
             cost = sample["action_cost_to_go_m"][0, action]
             assert np.isinf(cost) if collision else cost >= episode.distance_m - 1e-3
-    assert touched > 20
+    assert blocked_loss > 20
 
 
 def test_the_cheapest_action_leads_towards_the_goal(blind):
@@ -245,7 +245,7 @@ def test_the_cache_stays_within_its_bound(smoke, seen, tmp_path):
     kept = Trajectories(
         smoke, split="all", views=VIEWS, size=(40, 24), limit=6, cache_gb=size / 1e9, cache_dir=tmp_path
     )
-    assert isinstance(kept._source, Cached)
+    assert isinstance(kept._source, CachedFrames)
     for _ in range(2):
         assert (kept.batch(range(len(kept)))["rgb"] == seen.batch(range(len(seen)))["rgb"]).all()
     files = list(tmp_path.glob("*/*/*.pix"))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.motion import replay
-from aerialdojo_gen.learning.encoding import Reckoning
+from aerialdojo_gen.learning.encoding import DeadReckoning
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
@@ -29,7 +29,7 @@ def flight():
     """Poses of an episode, its own motion, and where the goal is seen from each."""
     actions = np.random.default_rng(3).integers(1, 16, T - 1)
     poses = replay(START, actions.tolist())
-    reckoning, moved = Reckoning(), []
+    reckoning, moved = DeadReckoning(), []
     for action in [*actions, 0]:
         moved.append(reckoning.odometry)
         reckoning.add(int(action))
@@ -223,7 +223,7 @@ def test_who_would_come_back_goes_on(episode):
 
 
 def test_what_leads_back_is_told_by_own_motion_alone():
-    reckoning = Reckoning()
+    reckoning = DeadReckoning()
     assert not reckoning.back.any()
     reckoning.add(14)
     assert reckoning.back.nonzero()[0].tolist() == [15], "the turn undone"
@@ -235,7 +235,7 @@ def test_what_leads_back_is_told_by_own_motion_alone():
     reckoning.add(10)
     assert reckoning.back.nonzero()[0].tolist() == [12], "down again"
     # Once about a square, each corner turned in the other direction: the last side leads to where it began.
-    square = Reckoning()
+    square = DeadReckoning()
     for _ in range(4):
         assert not square.back[2]
         square.add(2)
@@ -245,7 +245,7 @@ def test_what_leads_back_is_told_by_own_motion_alone():
 
 
 def test_what_was_refused_is_not_tried_again_from_there():
-    reckoning = Reckoning()
+    reckoning = DeadReckoning()
     reckoning.add(2, refused=True)
     assert not reckoning.odometry.any()
     assert reckoning.back.nonzero()[0].tolist() == [2]
@@ -257,7 +257,7 @@ def test_what_was_refused_is_not_tried_again_from_there():
 @given(st.lists(st.integers(1, 15), max_size=40), st.integers(1, 15))
 def test_only_what_leads_back_is_said_to(actions, last):
     """By poses that are replayed: the same place and heading as before, or turns beyond half a circle."""
-    reckoning = Reckoning()
+    reckoning = DeadReckoning()
     for action in actions:
         reckoning.add(action)
     poses = replay(np.zeros(4), [*actions, last])
