@@ -18,12 +18,12 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.observations import GoalText, look, mosaic
+from aerialdojo_gen.benchmark.observations import GoalText, mosaic, render_views
 from aerialdojo_gen.benchmark.tasks import (
     MODALITIES,
     Selection,
     Task,
-    TaskDraw,
+    TaskSampler,
     check_tell,
     read_tasks,
     reference_image,
@@ -142,7 +142,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self._rows = select(
             self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
         )
-        self._draw = TaskDraw(self._rows["scene"].to_pylist(), episodes_per_scene)
+        self._draw = TaskSampler(self._rows["scene"].to_pylist(), episodes_per_scene)
         self._prefetch = prefetch
         self._index: dict[str, int] | None = None
         self._image_shape = self._find_image_shape()
@@ -204,7 +204,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             raise RuntimeError("the environment is closed: make another one")
         super().reset(seed=seed)
         if seed is not None:
-            self._draw.begin_anew()
+            self._draw.restart()
         unknown = set(options or {}) - {"task_id"}
         if unknown:
             raise UsageError(f"reset has no option {sorted(unknown)[0]!r}: there is 'task_id'")
@@ -255,7 +255,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             return None
         episode = self.episode
         flight = self._flight
-        return mosaic(look(flight.space.scene, _RENDERED, episode.position, episode.yaw_rad, flight.renderer)[0])
+        return mosaic(
+            render_views(flight.space.scene, _RENDERED, episode.position, episode.yaw_rad, flight.renderer)[0]
+        )
 
     def close(self) -> None:
         """Let go of the scenes, their pictures and what reads ahead; a second call does nothing."""
@@ -305,7 +307,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def _observations(self) -> spaces.Dict:
         longest = {name: pc.max(pc.utf8_length(self._rows[name])).as_py() or 1 for name in _TEXT}
-        # Of all texts of the tasks at once: what a text may be made of tells nothing of the one at hand.
+        # Over all tasks, so that the space reveals nothing about the current one.
         texts = {text for name in _TEXT for text in pc.unique(self._rows[name]).to_pylist() if text}
         characters = "".join(sorted(set(string.printable).union(*texts)))
         goal: dict[str, spaces.Space[Any]] = {
@@ -341,7 +343,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         return reference_image(self._data, row["scene"], row["reference_image_id"]).shape
 
     def _observed_goal(self) -> dict[str, Any]:
-        # Made anew each time: who keeps or changes an observation must not change the next.
+        # A new copy each time, as callers may change it.
         goal = self._flight.goal
         seen: dict[str, Any] = {
             "modality": np.int64(MODALITIES.index(goal.modality)),

@@ -44,7 +44,7 @@ def read_run(data: Where, run: str, table: str = "episodes", columns: Sequence[s
 
 
 def has_table(data: Where, run: str, table: str) -> bool:
-    """Tell whether a run has a table for every scene that it has episodes of."""
+    """Whether a run has a table for every scene with episodes."""
     return all(store.shards(data, table, scene, run) for scene in run_scenes(data, run))
 
 
@@ -69,7 +69,7 @@ def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, A
     for table in reversed(TABLES):
         rows = new[table]
         if store.shards(data, table, scene, run):
-            # A failure counts for nothing once its episode is there, and neither does an older failure.
+            # An episode or a newer failure replaces an older failure.
             gone = replaced if table != "failures" else pa.array(list(by_task), pa.string())
             kept = store.read_scene(data, table, scene, run=run)
             kept = kept.filter(pc.invert(pc.is_in(kept["task_id"], gone)))

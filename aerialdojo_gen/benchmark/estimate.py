@@ -1,4 +1,4 @@
-"""What an evaluation by a language model will take: requests, tokens, hours, dollars."""
+"""Estimate an evaluation of a language model: requests, tokens, hours, dollars."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
-# Where nobody listens: an agent is made for its prompt alone.
+# An address without a service: the agent is made for its prompt alone.
 _NOBODY = "http://127.0.0.1:9/v1"
 _TASKS, _STEPS = 3, 3
-# Without a service: what an answer of a thought and an action has, and what a request takes.
+# Assumed without a service: tokens of an answer, seconds of a request.
 _ASSUMED_OUT, _ASSUMED_S = 60.0, 2.0
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an evaluation will take."""
+    """Estimated requests, tokens, time and cost of an evaluation."""
 
     episodes: int
     requests: tuple[int, int]
-    tokens_in: float  # Of a request; the last is what drawing its pictures takes
+    tokens_in: float  # Per request, as the following three
     tokens_out: float
     request_s: float
     render_s: float
-    measured: int  # On so many requests; 0 where nobody answered and figures are reckoned or assumed
+    measured: int  # Number of requests measured; 0 if figures are assumed
     why_not: str  # Why nothing was measured
     cost_usd: tuple[float, float] | None  # For the two numbers of requests
 
@@ -51,7 +51,7 @@ class Estimate:
             if self.measured
             else f"not measured ({self.why_not}); reckoned from prompt and pictures, answer and time assumed: {each}"
         )
-        # Requests wait side by side; pictures are drawn by as many cores as there are.
+        # Requests run in parallel; rendering is bound by the cores.
         cores = max(1, min(workers, len(os.sched_getaffinity(0))))
         a_step_s = max((self.request_s + self.render_s) / workers, self.render_s / cores)
         hours = [n * a_step_s / 3600.0 for n in self.requests]
@@ -67,21 +67,21 @@ class Estimate:
 
 
 def estimate(data: Where, evaluation: Evaluation) -> Estimate:
-    """Estimate an evaluation: by a few real requests where the service answers, else by reckoning."""
+    """Estimate an evaluation: from a few real requests if the service answers, else from assumptions."""
     cls = agent_class(evaluation.agent)
     if not (isinstance(cls, type) and issubclass(cls, LanguageModelAgent)):
         raise UsageError(f"--estimate is for agents that ask a language model, not {evaluation.agent!r}")
     root = open_root(data)
     rows = select(root, evaluation.selection)
-    agent, why_not = _made(evaluation)
+    agent, why_not = _make_agent(evaluation)
     try:
         if not why_not:
             try:
                 agent.check()
             except AerialDojoError as error:
                 why_not = str(error).removeprefix("checked before the run, nothing flown: ")
-        figures = _sampled(root, evaluation, rows, agent, asks=not why_not)
-        requests = _references(root, rows), int(pc.sum(rows["action_budget"]).as_py())
+        figures = _measure_steps(root, evaluation, rows, agent, asks=not why_not)
+        requests = _reference_actions(root, rows), int(pc.sum(rows["action_budget"]).as_py())
         tokens_in, tokens_out, request_s, render_s, n = figures
         costs = [agent.options.cost_usd(k * tokens_in, k * tokens_out) for k in requests]
         cost = None if costs[0] is None or costs[1] is None else (costs[0], costs[1])
@@ -90,7 +90,7 @@ def estimate(data: Where, evaluation: Evaluation) -> Estimate:
     return Estimate(rows.num_rows, requests, tokens_in, tokens_out, request_s, render_s, n, why_not, cost)
 
 
-def _made(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
+def _make_agent(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
     try:
         agent, why_not = load_agent(evaluation.agent, **evaluation.options), ""
     except UsageError as error:
@@ -102,14 +102,14 @@ def _made(evaluation: Evaluation) -> tuple[LanguageModelAgent, str]:
     return agent, why_not
 
 
-def _sampled(
+def _measure_steps(
     root: DataRoot, evaluation: Evaluation, rows: pa.Table, agent: LanguageModelAgent, asks: bool
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
     body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
     flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, tell=tell)
-    # Of one scene: making another ready takes longer than all the requests.
+    # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]
     requests = looks = 0
@@ -119,12 +119,12 @@ def _sampled(
         for _ in range(_STEPS):
             began = time.perf_counter()
             observation = flight.observe()
-            # The first picture of a scene takes what making it ready takes.
+            # The first image of a scene includes the time to open it.
             if looks:
                 sums[3] += time.perf_counter() - began
             looks += 1
             if not asks:
-                sums[0] += agent.reckoned_tokens(observation)
+                sums[0] += agent.estimate_tokens(observation)
                 continue
             try:
                 action: int | None = agent.act(observation)
@@ -145,8 +145,8 @@ def _sampled(
     return sums[0] / requests, sums[1] / requests, sums[2] / requests, render_s, requests
 
 
-def _references(root: DataRoot, rows: pa.Table) -> int:
-    """Sum the actions of the references of all instances."""
+def _reference_actions(root: DataRoot, rows: pa.Table) -> int:
+    """Total actions of the references of all task instances."""
     total = 0
     for scene in rows["scene"].unique().to_pylist():
         mine = rows.filter(pc.equal(rows["scene"], scene))

@@ -13,41 +13,41 @@ from typing import Any
 from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.agents.load import BUILT_IN, look_here
+from aerialdojo_gen.benchmark.agents.load import BUILT_IN, add_working_directory
 from aerialdojo_gen.benchmark.tasks import Selection, check_tell
-from aerialdojo_gen.benchmark.worker import Conditions, Failed, Finished
+from aerialdojo_gen.benchmark.worker import Failed, Finished, RetryPolicy
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.files import file_digest
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What is evaluated: all that the log depends on, beside the data."""
+    """The settings of an evaluation: all that the log depends on, except the data."""
 
     run: str = "default"  # Name of the run
     agent: str = "random"  # Name of the agent, or ``package.module:Class``
     options: Mapping[str, Any] = field(default_factory=dict)
     selection: Selection = field(default_factory=Selection)  # Which tasks
-    sensors: Sensors | None = None  # In place of those that the agent asks for
+    sensors: Sensors | None = None  # Override the agent's own
     embodiment: Embodiment = field(default_factory=Embodiment)  # The body
     renderer: str = "auto"
-    conditions: Conditions = field(default_factory=Conditions)  # What a worker bears
-    requests_per_minute: float | None = None  # Of an agent that asks a service, all workers together
-    used: Mapping[str, Any] | None = None  # The options as the agent says that it uses them, for the log
+    retry_policy: RetryPolicy = field(default_factory=RetryPolicy)  # Retries and tolerance of agent errors
+    requests_per_minute: float | None = None  # Of an agent that uses a service, over all workers
+    used: Mapping[str, Any] | None = None  # The options that the agent reports, for the log
     tell: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what nobody tells."""
+        """Check the names of hints."""
         check_tell(self.tell)
 
     def identity(self) -> dict[str, str]:
-        """Columns of `episodes` that name the run, its agent, and what that is told."""
+        """Columns of `episodes` that identify the run, its agent and its hints."""
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
-        told = ",".join(check_tell(self.tell))
-        return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": told}
+        hints = ",".join(check_tell(self.tell))
+        return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": hints}
 
     def settings(self) -> dict[str, Any]:
-        """What must not change within a run, as JSON without secrets; attempts, pauses and the pace may."""
+        """Settings that must not change within a run, as JSON without secrets; retries and rate limit may."""
         return {
             "agent": self.agent,
             "options": self._logged(self.options),
@@ -65,24 +65,24 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an evaluation."""
+    """The result of an evaluation."""
 
-    episodes: int  # That the evaluation has
-    finished: int  # In the tables now: flown, and given up because something outside failed
+    episodes: int  # Selected
+    finished: int  # In the tables: flown, and failed for external reasons
     failed: int
-    flown: int  # Episodes and actions of this call, failed ones too
+    flown: int  # Episodes and actions of this call, including failed ones
     actions: int
     cost_usd: float  # Of all calls for this run
     tokens: int  # Both ways, of all calls for this run
     seconds: float  # Of this call
-    stopped: str = ""  # Why it ended early: too many failures in a row; empty otherwise
+    stopped: str = ""  # Why it ended early; empty otherwise
     failures: tuple[str, ...] = ()
-    finished_now: int = 0  # Of the flown those that did not fail
+    finished_now: int = 0  # Of this call, without failed ones
     successes: int = 0  # Of the finished
 
     @property
-    def fruitless(self) -> bool:
-        """Whether episodes failed and none was finished: in this call, or ever where this call flew none."""
+    def all_failed(self) -> bool:
+        """Whether episodes failed and none was finished, in this call or, if it flew none, ever."""
         return self.failed > 0 and not (self.finished_now if self.flown else self.finished)
 
     def __str__(self) -> str:
@@ -97,27 +97,27 @@ class Outcome:
             f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
         )
 
-    def last_line(self, again: str = "--rerun-failed") -> str:
-        """Say what to know and do about failures; empty where there are none."""
+    def failure_message(self, rerun_command: str = "--rerun-failed") -> str:
+        """Describe the failures and how to repeat them; empty if there are none."""
         if not self.failures:
             return self.stopped
         left = self.episodes - self.finished - self.failed
         rest = f" {left:,} not begun: the same command goes on with them." if left else ""
         what = f"{self.failed:,} failed, which count as no episodes: {', '.join(self.failures)}."
-        return " ".join(filter(None, (self.stopped, f"{what}{rest} To fly the failed again: {again}")))
+        return " ".join(filter(None, (self.stopped, f"{what}{rest} To fly the failed again: {rerun_command}")))
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may spend and bear, over all calls for it."""
+    """Limits of a run, over all calls for it."""
 
-    cost_usd: float | None = None  # Begin no episode once so much is spent
-    tokens: int | None = None  # Begin no episode once so many are spent, both ways
+    cost_usd: float | None = None  # No episode is begun once this is spent
+    tokens: int | None = None  # The same, of input and output together
     failures_in_row: int = 5
 
 
 class BudgetTracker:
-    """Counts what is finished, and says when it is enough."""
+    """Counts episodes and spending against the limits."""
 
     def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
         self._limits = limits
@@ -126,7 +126,7 @@ class BudgetTracker:
         self.streak: tuple[Failed, ...] = ()
 
     def add(self, finished: Finished) -> None:
-        """Count what was finished."""
+        """Add finished episodes."""
         self.cost_usd += finished.cost_usd
         self.tokens += finished.tokens
         self.episodes += finished.episodes
@@ -136,14 +136,14 @@ class BudgetTracker:
 
     @property
     def failing(self) -> Failed | None:
-        """What has failed too often in a row; None where nothing has."""
+        """The failure that has occurred too often in a row; None if there is none."""
         n = self._limits.failures_in_row
         last = self.streak[-n:]
         return last[-1] if len(last) == n and len({failed.kind for failed in last}) == 1 else None
 
     @property
     def spent(self) -> str:
-        """The limit that is reached, as its option; empty where none is."""
+        """The limit that is reached, as its option; empty if none is."""
         limits = self._limits
         if limits.cost_usd is not None and self.cost_usd >= limits.cost_usd:
             return f"--max-cost {limits.cost_usd:g}"
@@ -152,11 +152,10 @@ class BudgetTracker:
         return ""
 
 
-def flying_code(agent: str) -> str:
+def agent_code_digest(agent: str) -> str:
     """Digest the code that flies an agent.
 
-    Libraries do not count, as they do for stages: an episode may have cost money, and a library's next patch should
-    not end a run of a thousand of them.
+    Unlike stages, libraries do not count: an update must not end a run whose episodes have cost money.
     """
     module = BUILT_IN.get(agent, agent).partition(":")[0]
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
@@ -168,7 +167,7 @@ def flying_code(agent: str) -> str:
 
 
 def _file_of(module: str) -> Path | None:
-    look_here()
+    add_working_directory()
     try:
         spec = importlib.util.find_spec(module)
     except (ImportError, ValueError):

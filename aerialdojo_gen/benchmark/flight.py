@@ -1,4 +1,4 @@
-"""Tasks flown one after the other: the scene, the episode, what the cameras see."""
+"""Tasks flown one after the other: scene, episode, observations."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
 from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
-from aerialdojo_gen.benchmark.observations import look
+from aerialdojo_gen.benchmark.observations import render_views
 from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
-from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, viewed, viewpoints_of
+from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, view_of, viewpoints_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space, prefetch_flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, hold_scenes, release_scene
@@ -30,7 +30,7 @@ class Flight:
     An agent never gets this object, only the `goal` and what `observe` returns.
     """
 
-    task: Task  # Under way, from `begin` on; so are the following
+    task: Task  # Current, from `begin` on; so are the following
     goal: Goal
     episode: Episode
     space: FlightSpace
@@ -73,13 +73,13 @@ class Flight:
         return self.episode
 
     def look_ahead(self, scene: str) -> None:
-        """Read a scene in a thread, while another one is flown in; nothing happens where one is being read."""
+        """Read a scene in a thread while flying in another; does nothing while one is being read."""
         mesh, sha256 = mesh_of(self._data, scene)
         if self._reader is not None and self._reader.is_alive():
             return
 
         def read() -> None:
-            # What is wrong with it is told when it is opened.
+            # Errors are raised when it is opened.
             with contextlib.suppress(Exception):
                 prefetch_flight_space(mesh, sha256, self._body.radius_m)
 
@@ -88,7 +88,7 @@ class Flight:
         self._reader.start()
 
     def close(self) -> None:
-        """Let go of the scenes that were opened; a second call does nothing."""
+        """Release the scenes that were opened; a second call does nothing."""
         if self._reader is not None:
             self._reader.join()
             self._reader = None
@@ -98,7 +98,7 @@ class Flight:
         self.__dict__.pop("space", None)
 
     def view(self) -> View | None:
-        """Say where the body is with regard to the target; None where the release has no viewpoints."""
+        """Return the body's distance to viewpoints and the target's visibility; None without viewpoints."""
         task, scene = self.task, self.task.row["scene"]
         viewpoints = viewpoints_of(self._data, scene)
         if viewpoints is None:
@@ -110,10 +110,10 @@ class Flight:
                 f"run {command('split', scene=scene)}"
             )
         own = viewpoints.get(task.target_id, _NONE)
-        return viewed(self.space.scene, node, own, task.goal, self.episode.position)
+        return view_of(self.space.scene, node, own, task.goal, self.episode.position)
 
     def observe(self) -> Observation:
-        """Return what the agent has before its next action."""
+        """Return the agent's observation before its next action."""
         episode = self.episode
-        rgb, depth_m = look(self.space.scene, self.sensors, episode.position, episode.yaw_rad, self.renderer)
+        rgb, depth_m = render_views(self.space.scene, self.sensors, episode.position, episode.yaw_rad, self.renderer)
         return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb, depth_m)

@@ -149,7 +149,7 @@ def _view_distance_m(table: pa.Table) -> Floats:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What every episode earns under a profile."""
+    """Outcomes of every episode under a profile."""
 
     success: Bools  # (n,) bool; σ; ever within the radius, whatever happens later; ended by a collision
     success_view: Floats  # (n,) float64
@@ -169,7 +169,7 @@ def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
     success = may & (final <= profile.radius_m)
     shortest = episodes.euclidean_m if profile.straight_reference else episodes.reference_length_m
     longer = np.maximum(shortest, episodes.path_length_m)
-    # Nothing to fly and nothing flown is the shortest way there is.
+    # Zero over zero: nothing to fly and nothing flown.
     efficiency = np.divide(shortest, longer, out=np.ones_like(shortest), where=longer > 0.0)
     spl = np.where(success, efficiency, 0.0)
     view = np.where(may & (episodes.view_distance_m <= profile.radius_m), 1.0, 0.0)
@@ -179,7 +179,7 @@ def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
 
 
 def knows_views(episodes: Episodes, profile: Profile) -> bool:
-    """Whether a log says of any episode if it is a success at any viewpoint, by a profile."""
+    """Whether SR-view is known for any episode, by a profile."""
     return not profile.planar and not bool(np.isnan(episodes.view_distance_m).all())
 
 
@@ -193,7 +193,7 @@ def distances(episodes: Episodes, profile: Profile) -> tuple[Floats, Floats]:
 
 
 def may_succeed(episodes: Episodes, profile: Profile) -> Bools:
-    """Tell which episodes succeed if only they are near enough."""
+    """Which episodes succeed if they end near enough to the goal."""
     may = episodes.n_actions <= episodes.action_budget
     if profile.needs_stop:
         may &= episodes.stop_called
@@ -206,7 +206,7 @@ def may_succeed(episodes: Episodes, profile: Profile) -> Bools:
 class Score:
     """Means over some episodes, or means of such means."""
 
-    episodes: int  # How many stand behind it
+    episodes: int  # Number of episodes
     sr: float
     sr_view: float
     osr: float
@@ -262,7 +262,7 @@ class Summary:
 
     @property
     def missing_families(self) -> list[str]:
-        """Families without episodes, which the overall score does not speak of."""
+        """Families without episodes, not part of the overall score."""
         return [family for family in FAMILIES.values() if family not in self.families]
 
 

@@ -22,40 +22,40 @@ Pictures = dict[str, NDArray[np.uint8]]
 Depths = dict[str, NDArray[np.float32]]
 
 
-# The process that has drawn by OpenGL. A fork of it would wait for ever for threads that it does not have.
-_drawn_by_gl: list[int] = []
+# The process that has used OpenGL. A fork of it would wait for ever for threads that it does not have.
+_opengl_process: list[int] = []
 
 
-def drawing(scene: Scene, name: str) -> Renderer:
-    """Return what draws a scene in this process; RenderError in a fork of one that has drawn."""
-    if _drawn_by_gl and os.getpid() not in _drawn_by_gl:
+def renderer_for(scene: Scene, name: str) -> Renderer:
+    """Return the renderer of a scene; RenderError in a fork of a process that has used OpenGL."""
+    if _opengl_process and os.getpid() not in _opengl_process:
         raise RenderError(
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
             "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
         )
     renderer = scene_renderer(scene, name)
     if renderer.name == "gl":
-        _drawn_by_gl[:] = [os.getpid()]
+        _opengl_process[:] = [os.getpid()]
     return renderer
 
 
 def renderer_name(name: str) -> str:
-    """Return the name of what draws in this process; ``"auto"`` is the fastest that works here."""
+    """Resolve a renderer's name; ``"auto"`` is the fastest that works here."""
     if name != "auto":
         return name
     chosen = choose_renderer().name
-    # To choose it a scene was drawn.
-    if not _drawn_by_gl:
-        _drawn_by_gl[:] = [os.getpid()]
+    # Choosing it has rendered a scene.
+    if not _opengl_process:
+        _opengl_process[:] = [os.getpid()]
     return chosen
 
 
-def has_drawn() -> bool:
-    """Whether this process has drawn by OpenGL, so that a fork of it could not."""
-    return bool(_drawn_by_gl)
+def used_opengl() -> bool:
+    """Whether this process has used OpenGL, so that a fork of it cannot."""
+    return bool(_opengl_process)
 
 
-def look(
+def render_views(
     scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto"
 ) -> tuple[Pictures, Depths]:
     """Render the views of a body (world metres, radians).
@@ -67,7 +67,7 @@ def look(
     if sensors.blind:
         return rgb, depth_m
     pose = np.array([[*position, yaw_rad]])
-    pictures, depths = draw_bodies(drawing(scene, renderer), sensors.camera, pose, sensors.views)
+    pictures, depths = draw_bodies(renderer_for(scene, renderer), sensors.camera, pose, sensors.views)
     for v, view in enumerate(sensors.views):
         if sensors.rgb:
             rgb[view] = pictures[0, v]
@@ -78,7 +78,7 @@ def look(
 
 
 def mosaic(pictures: Pictures) -> NDArray[np.uint8]:
-    """Lay pictures out in rows of two: (rows · H, 2 · W, 3) uint8, or the picture itself where there is one."""
+    """Arrange images in rows of two: (rows · H, 2 · W, 3) uint8; a single image is returned as it is."""
     tiles = list(pictures.values())
     if len(tiles) == 1:
         return tiles[0]
@@ -100,7 +100,7 @@ class GoalText(Text):
 
 
 class _LiveTexts(Sequence[str]):
-    """Strings of shared memory, read when they are looked at; a deep copy is a tuple of what they are now."""
+    """Strings in shared memory, read on access; a deep copy is a tuple of the current ones."""
 
     def __init__(self, space: GoalText, memory: Any, n: int) -> None:
         self._space, self._memory, self._n = space, memory, n

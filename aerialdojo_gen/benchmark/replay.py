@@ -20,7 +20,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.pictures import MAP_JPEG, REPLAY_JPEG, data_url, encode_jpeg
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.observations import look
+from aerialdojo_gen.benchmark.observations import render_views
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.orthographic import orthographic_pictures
@@ -158,7 +158,7 @@ def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any,
         last = len(lists["said"]) - (2 if episode["collision"] else 1)
         for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MOST_FRAMES, last + 1))}):
             position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
-            views, *_ = look(scene.model, _FRAME, position, lists["yaw_rad"][k])
+            views, *_ = render_views(scene.model, _FRAME, position, lists["yaw_rad"][k])
             pictures[k] = data_url(encode_jpeg(views["front"], REPLAY_JPEG))
     rounded = {name: [round(v, 3) for v in lists[name]] for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m")}
     return Flight(

@@ -24,10 +24,10 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
-from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, flying_code
+from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
 from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import select
-from aerialdojo_gen.benchmark.viewpoints import viewpoints_content, without_viewpoints
+from aerialdojo_gen.benchmark.viewpoints import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
@@ -76,44 +76,43 @@ def evaluate(
     with folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
-        run.claim()
-        run.bring_in()
+        run.check_settings()
+        run.flush_journals()
         todo = run.todo(rerun_failed)
         if todo.num_rows:
             evaluation = preflight(evaluation, limits, reporter)
-            if run.without_viewpoints:
-                reporter.line(without_viewpoints(run.without_viewpoints, len(rows["scene"].unique())))
-        tally = BudgetTracker(limits, *run.spent())
+            if run.no_viewpoints_message:
+                reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
+        budget = BudgetTracker(limits, *run.spent())
         with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
 
             def tell(finished: Finished) -> None:
-                tally.add(finished)
+                budget.add(finished)
                 bar.advance(finished.episodes)
 
             def stopped() -> bool:
                 interrupts.check()
                 run.checkpoint(reporter)
-                return bool(tally.spent or tally.failing)
+                return bool(budget.spent or budget.failing)
 
             try:
-                # The processes are gone when their journals are brought in.
-                with run.kept(), made as pool:
+                # The processes have ended when their journals are flushed.
+                with run.flushing(), made as pool:
                     units = run.units(todo, pool.workers if todo.num_rows else 1)
                     for scene in fly_units(root, evaluation, units, pool, tell, stopped):
-                        run.bring_in(scene)
+                        run.flush_journals(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command continues") from None
-        if tally.spent and len(run.todo(False)):
-            reporter.line(f"stopped at {tally.spent}: the same command with a higher limit continues")
+        if budget.spent and len(run.todo(False)):
+            reporter.line(f"stopped at {budget.spent}: the same command with a higher limit continues")
         finished, failed, successes = run.counts()
     why = ""
-    if tally.failing is not None:
-        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({tally.failing.kind})."
-    flown, seconds = tally.episodes, time.monotonic() - started
-    told, now = run.failures(), tally.finished
+    if budget.failing is not None:
+        why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({budget.failing.kind})."
+    flown, seconds = budget.episodes, time.monotonic() - started
     return Outcome(
-        rows.num_rows, finished, failed, flown, tally.actions, tally.cost_usd, tally.tokens, seconds, why, told, now,
-        successes,
+        rows.num_rows, finished, failed, flown, budget.actions, budget.cost_usd, budget.tokens, seconds, why,
+        run.failures(), budget.finished, successes,
     )  # fmt: skip
 
 
@@ -135,49 +134,49 @@ class _Run:
             for table in ("release/scenes", *(f"{kind}/{s}" for kind in ("tasks", "routes") for s in subsets))
         }
         seen_from = {scene: viewpoints_content(data, scene) for scene in self._scenes}
-        self.without_viewpoints = [scene for scene, found in seen_from.items() if not found]
+        self.no_viewpoints_message = [scene for scene, found in seen_from.items() if not found]
         content |= {f"release/viewpoints/{scene}": found for scene, found in seen_from.items() if found}
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-        own = {"data": digest, "code": flying_code(evaluation.agent)}
+        own = {"data": digest, "code": agent_code_digest(evaluation.agent)}
         self._settings = json.loads(json.dumps(evaluation.settings() | own))
         self._fingerprint = hashlib.sha256(json.dumps(self._settings, sort_keys=True).encode()).hexdigest()
 
-    def claim(self) -> None:
-        """Take the folder for these settings; UsageError where it was begun with others."""
+    def check_settings(self) -> None:
+        """Write the run's settings; UsageError if it was begun with others."""
         begun = self._begun()
-        mend = "give another --run, or --restart"
-        # One that has finished nothing may yet become another: an agent's options may have been wrong.
+        advice = "give another --run, or --restart"
+        # A run without finished episodes may change: an agent's options may have been wrong.
         if begun and self._folder.exists(_SETTINGS):
             before, own = read_json(self._folder.local_copy(_SETTINGS), UsageError), ("data", "code")
             if not isinstance(before, dict):
-                raise UsageError(f"{self._folder.at(_SETTINGS)} holds no settings of a run: {mend}")
+                raise UsageError(f"{self._folder.at(_SETTINGS)} holds no settings of a run: {advice}")
             for key, value in self._settings.items():
                 if before.get(key) != value:
                     what = f"{key} = {before.get(key)!r}, not {value!r}"
                     what = f"other {key}" if key in own else what
-                    raise UsageError(f"run {self._name!r} was begun with {what}: {mend}")
+                    raise UsageError(f"run {self._name!r} was begun with {what}: {advice}")
         for scene in episodes.run_scenes(self._out, self._name):
             if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
-                raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {mend}")
+                raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {advice}")
         with self._folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
     @property
     def journal_folder(self) -> Path:
-        """Where workers write what they have finished."""
+        """Folder that workers write finished episodes to."""
         return self._journals.folder
 
     def _begun(self) -> bool:
         return bool(episodes.run_scenes(self._out, self._name) or self._journals)
 
     def drop(self) -> None:
-        """Remove what was written under the name."""
+        """Remove the run."""
         episodes.remove_run(self._out, self._name)
         self._journals.drop()
         self._folder.delete(_SETTINGS)
 
-    def bring_in(self, scene: str = "*") -> None:
-        """Bring journals into the tables: of one scene, or all that there are."""
+    def flush_journals(self, scene: str = "*") -> None:
+        """Move the journals of a scene, or of all, into the tables."""
         for name in self._journals.scenes(scene):
             records = self._journals.records(name)
             if records:
@@ -185,7 +184,7 @@ class _Run:
             self._journals.remove(name)
 
     def checkpoint(self, reporter: Reporter) -> None:
-        """Commit what was finished to an object store now and then; a store that does not answer is told of once."""
+        """Commit finished episodes to an object store from time to time; report an unreachable store once."""
         try:
             self._journals.checkpoint()
             self._uncommitted = ""
@@ -195,15 +194,15 @@ class _Run:
             self._uncommitted = str(error)
 
     @contextmanager
-    def kept(self) -> Iterator[None]:
-        """Bring in what was finished, however the block ends."""
+    def flushing(self) -> Iterator[None]:
+        """Flush the journals, however the block ends."""
         try:
             yield
         finally:
-            self.bring_in()
+            self.flush_journals()
 
     def todo(self, rerun_failed: bool) -> pa.Table:
-        """Rows that are still to be flown, or exactly those that failed."""
+        """Rows still to be flown, or exactly those that failed."""
         ids = self._rows["task_id"]
         if rerun_failed:
             return self._rows.filter(pc.is_in(ids, pa.array(self._ids("failures"), pa.string())))
@@ -216,7 +215,7 @@ class _Run:
         return len(flown), len(self._ids("failures")), sum(flown)
 
     def failures(self) -> tuple[str, ...]:
-        """Say what failed, the most frequent kind first, with the reason of its first."""
+        """Describe the failures, the most frequent kind first, with the reason of its first."""
         rows = [row for scene in self._scenes_written() for row in self._read("failures", scene, ["kind", "reason"])]
         first: dict[str, str] = {}
         for row in rows:
@@ -225,7 +224,7 @@ class _Run:
         return tuple(f"{n} × {kind}{'' if i else f' ({first[kind]})'}" for i, (kind, n) in enumerate(counted))
 
     def spent(self) -> tuple[float, int]:
-        """US dollars and tokens, so far."""
+        """US dollars and tokens spent so far."""
         columns = ["cost_usd", "input_tokens", "output_tokens"]
         rows = [
             row
@@ -251,11 +250,11 @@ class _Run:
         ]
 
     def units(self, todo: pa.Table, workers: int) -> list[WorkUnit]:
-        """Share the work: whole scenes where there are many, for a scene takes seconds to make ready."""
+        """Split the work: by whole scenes where there are many, as opening a scene takes seconds."""
         by_scene = {s: todo.filter(pc.equal(todo["scene"], s)) for s in todo["scene"].unique().to_pylist()}
         share = -(-todo.num_rows // (4 * workers)) if workers > 1 else todo.num_rows
         units = []
-        # The largest first, so that the last to finish is a small one.
+        # The largest first, so that the last one is small.
         for scene, rows in sorted(by_scene.items(), key=lambda item: -item[1].num_rows):
             parts = 1 if len(by_scene) >= 4 * workers else -(-rows.num_rows // share)
             size = -(-rows.num_rows // parts)
@@ -265,8 +264,8 @@ class _Run:
 
 
 def preflight(evaluation: Evaluation, limits: Limits, reporter: Reporter) -> Evaluation:
-    """Check an agent that asks a service, by one request; other agents are left alone."""
-    # By the class: an agent without a check may take long to make, and is made by the workers.
+    """Check an agent's service by one request; agents without `check` are returned as they are."""
+    # By its class: an agent without a check may take long to construct.
     if not hasattr(agent_class(evaluation.agent), "check"):
         return evaluation
     agent: Any = load_agent(evaluation.agent, **evaluation.options)

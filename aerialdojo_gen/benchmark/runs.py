@@ -58,7 +58,7 @@ def _nearest_on_segment(way: Floats, begin_m: Floats, end_m: Floats) -> Floats:
     return np.where((along > 0.0) & (along < length), height, np.minimum(begin_m, end_m))
 
 
-# What is no contender: the one that knows the way, and those that look at nothing.
+# Agents that are not compared: the oracle, and the baselines that ignore observations.
 UPPER_BOUND, BASELINES = "upper bound", "floors"
 GROUP_OF = {"oracle": UPPER_BOUND, "stop": BASELINES, "constant": BASELINES, "random": BASELINES}
 
@@ -68,15 +68,15 @@ class Run:
     """A run and its episodes."""
 
     name: str  # The run's id
-    label: str  # What tables call it: its agent, with the run's id where two runs have one agent
+    label: str  # Its agent, with the run's id where two runs share it
     agent: str  # The agent, and its options as JSON
     options: str
     table: pa.Table  # The log, all columns
-    episodes: Episodes  # What the metrics take from it
-    failed: int = 0  # Episodes that are not in it, given up for reasons outside the agent
+    episodes: Episodes  # The columns that metrics use
+    failed: int = 0  # Episodes that failed for external reasons, not in the table
     log: DataRoot | None = None  # The root that `evaluate` wrote to, where its steps are
-    group: str = ""  # Heading that tables set it under; empty for an agent like any other
-    told: str = ""  # What the agent was told beside the goal; empty for nothing
+    group: str = ""  # Heading of its section in tables; empty for none
+    told: str = ""  # Hints given to the agent; empty for none
 
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
         """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
@@ -107,7 +107,7 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
             raise StoreError(f"run {name!r} has no finished episode{said} {again}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
     told = [table["told"][0].as_py() or "" for table in tables.values()]
-    # Who was told more is another contender.
+    # With hints it is another contender.
     called = [f"{agent} + {more}" if more else agent for agent, more in zip(agents, told, strict=True)]
     return [
         Run(
@@ -127,9 +127,9 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
 
 @dataclass(frozen=True)
 class EpisodeOutcomes:
-    """How a run's episodes went, whatever they earned."""
+    """Endings, actions and service usage of a run's episodes."""
 
-    episodes: int  # How many
+    episodes: int  # Their number
     ended: dict[str, float]  # Share of the episodes by how they ended: stop, collision, budget
     actions: float  # Mean number of actions
     refused: int  # Moves out of the flight volume; answers that named no action
@@ -141,12 +141,12 @@ class EpisodeOutcomes:
 
 
 def episode_outcomes(run: Run) -> EpisodeOutcomes:
-    """Count how a run's episodes went."""
+    """Count endings, actions and service usage of a run's episodes."""
     n = len(run.episodes)
     ends = run.table["termination"].to_pylist()
 
     def total(name: str) -> int | None:
-        # A sum with a hole in it is not known.
+        # Unknown if any episode's is.
         return None if run.table[name].null_count else int(pc.sum(run.table[name]).as_py() or 0)
 
     costs = run.table["cost_usd"]
@@ -167,7 +167,7 @@ _BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == 
 
 
 def with_baselines(log: DataRoot, runs: Sequence[Run]) -> list[Run]:
-    """Add the floors that were flown on the same tasks and are not among the runs."""
+    """Add baseline runs that flew the same tasks and are not among the runs."""
     there = {run.agent for run in runs}
     wanted = {task for run in runs for task in run.table["task_id"].to_pylist()}
     added: dict[str, Run] = {}
@@ -187,13 +187,13 @@ def _is_baseline(log: DataRoot, name: str) -> bool:
     try:
         agents = read_run(log, name, columns=["agent"])["agent"]
     except StoreError:
-        # Nobody asked for this run: it may be as broken as it likes.
+        # Not requested: a damaged run is skipped.
         return False
     return len(agents) > 0 and agents[0].as_py() in _BASELINE_AGENTS
 
 
 def group_runs(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None = None) -> list[Run]:
-    """Put runs in order by their groups: the user's own, the others, then the upper bound and the floors."""
+    """Group and order runs: the user's groups, the others, the upper bound, the baselines."""
     chosen = dict(groups or {})
     for heading, names in chosen.items():
         for name in names:
@@ -212,7 +212,7 @@ def group_runs(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None =
         )
         for run in runs
     ]
-    # One group needs no heading.
+    # A single group needs no heading.
     if len({run.group for run in grouped}) == 1:
         return [replace(run, group="") for run in grouped]
     return sorted(grouped, key=lambda run: order.index(run.group))

@@ -146,20 +146,20 @@ def select(data: Where, selection: Selection) -> pa.Table:
     if found is None or not found.num_rows:
         raise UsageError("no task of the release fits: widen --split, --setting, --modality or --scene")
     found = found.sort_by([(key, "ascending") for key in TASKS.key])
-    return found if selection.limit is None else _drawn(found, selection.limit, selection.seed)
+    return found if selection.limit is None else _sample(found, selection.limit, selection.seed)
 
 
-def _drawn(found: pa.Table, limit: int, seed: int) -> pa.Table:
-    """Take every scene's first by lot, then every scene's second, and so on, up to the limit."""
+def _sample(found: pa.Table, limit: int, seed: int) -> pa.Table:
+    """Take the first of every scene in random order, then the second, and so on, up to the limit."""
     by_scene: dict[str, list[tuple[int, int]]] = {}
     for i, (scene, task_id) in enumerate(zip(*(found[c].to_pylist() for c in ("scene", "task_id")), strict=True)):
         by_scene.setdefault(scene, []).append((rng.rank(seed, "evaluate", task_id), i))
-    lots = [
+    keys = [
         (turn, rng.rank(seed, "evaluate", scene), i)
         for scene, ranked in by_scene.items()
         for turn, (_, i) in enumerate(sorted(ranked)[:limit])
     ]
-    return found.take(pa.array(sorted(i for _, _, i in sorted(lots)[:limit])))
+    return found.take(pa.array(sorted(i for _, _, i in sorted(keys)[:limit])))
 
 
 def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
@@ -232,7 +232,7 @@ def reference_actions(
 
 
 def check_tell(tell: Sequence[str]) -> tuple[str, ...]:
-    """Return what is to be told beside the goal, in its one order; UsageError for what nobody tells."""
+    """Return the names of hints in their fixed order; UsageError for an unknown one."""
     for name in tell:
         if name not in HINTS:
             raise UsageError(unknown("nothing to tell called", name, HINTS))
@@ -240,7 +240,7 @@ def check_tell(tell: Sequence[str]) -> tuple[str, ...]:
 
 
 def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) -> Goal:
-    """Make what the agent is told of a task; `tell` names what is told beside the goal."""
+    """Make an agent's goal; `tell` names the hints."""
     row = task.row
     image_id = row["reference_image_id"]
     image = None if image_id is None else reference_image(root, row["scene"], image_id)
@@ -293,33 +293,33 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
         raise StoreError(f"the mesh {told} is missing: run {command('build-scenes', scene=scene)}") from None
 
 
-class TaskDraw:
-    """Draws tasks with replacement, every one equally often, in blocks of one scene.
+class TaskSampler:
+    """Samples tasks uniformly with replacement, in blocks of one scene.
 
-    The first of a block is drawn from all tasks, and with it its scene; the others from that scene's.
+    The first of a block is drawn from all tasks, the others from its scene.
     """
 
-    def __init__(self, scenes: Sequence[str], in_a_row: int = 1) -> None:
+    def __init__(self, scenes: Sequence[str], run_length: int = 1) -> None:
         self._scenes = scenes
-        self._in_a_row = in_a_row
+        self._in_a_row = run_length
         self._by_scene: dict[str, NDArray[np.int64]] = {
             scene: np.array([i for i, own in enumerate(scenes) if own == scene]) for scene in sorted(set(scenes))
         }
         self._all: NDArray[np.int64] = np.arange(len(scenes))
-        self.begin_anew()
+        self.restart()
 
-    def begin_anew(self) -> None:
-        """Forget what was drawn ahead: what comes depends on the generator alone."""
+    def restart(self) -> None:
+        """Drop the task drawn ahead: what follows depends on the generator alone."""
         self._scene, self._left = "", 0
         self._ahead: int | None = None
 
     def restrict(self, scenes: Sequence[str]) -> None:
-        """Draw from some scenes alone; UsageError where they have no task."""
+        """Draw only from some scenes; UsageError if they have no task."""
         own = [self._by_scene[scene] for scene in sorted(set(scenes)) if scene in self._by_scene]
         if not own:
             raise UsageError(f"no task of the selection is in {', '.join(scenes)}")
         self._all = np.sort(np.concatenate(own))
-        self.begin_anew()
+        self.restart()
 
     @property
     def coming(self) -> str | None:
@@ -334,7 +334,7 @@ class TaskDraw:
             return int(own[draw.integers(len(own))])
         at = self._any(draw) if self._ahead is None else self._ahead
         self._scene, self._left = self._scenes[at], self._in_a_row - 1
-        # Always, so that reading ahead changes no draw.
+        # Always drawn, so that prefetching changes no draw.
         self._ahead = self._any(draw)
         return at
 

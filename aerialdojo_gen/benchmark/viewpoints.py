@@ -36,19 +36,19 @@ _COLUMNS = ("object_id", "x_m", "y_m", "z_m")
 
 @dataclass(frozen=True)
 class View:
-    """Where a body is with regard to a target."""
+    """A body's distance to a target's viewpoints, and the target's visibility."""
 
     viewpoint_distance_m: float  # To the nearest valid viewpoint of the target, its goal included, metres
     target_in_sight: bool  # A straight line reaches the target unobstructed
 
 
 def viewpoints_content(root: DataRoot, scene: str) -> list[str]:
-    """Digest a scene's viewpoints, for what depends on them; empty where the release has none, as older ones."""
+    """Content digests of a scene's viewpoints; empty if an older release has none."""
     return store.content(root, _TABLE, scene) if store.shards(root, _TABLE, scene) else []
 
 
-def without_viewpoints(scenes: Sequence[str], of: int) -> str:
-    """Say in one line which of so many scenes' episodes get no SR-view."""
+def no_viewpoints_message(scenes: Sequence[str], of: int) -> str:
+    """Name the scenes whose episodes get no SR-view."""
     which = "the release has" if len(scenes) == of else f"{', '.join(scenes)}: the release has"
     return f"{which} no viewpoints/, which an older version did not write: SR-view stays empty"
 
@@ -69,12 +69,12 @@ def viewpoints_of(root: DataRoot, scene: str) -> dict[int, Floats] | None:
 
 @lru_cache(maxsize=64)
 def nodes_of(root: DataRoot, scene: str) -> dict[int, str]:
-    """Read which node of a scene's mesh is which object: by ``object_id``."""
+    """Mesh nodes of a scene's objects, by ``object_id``."""
     table = store.read_scene(root, "release/objects", scene, ("object_id", "mesh_node"))
     return dict(zip(table["object_id"].to_pylist(), table["mesh_node"].to_pylist(), strict=True))
 
 
-def viewed(scene: Scene, node: str, viewpoints: Floats, goal: Point, position: Point) -> View:
+def view_of(scene: Scene, node: str, viewpoints: Floats, goal: Point, position: Point) -> View:
     """Distance to the nearest viewpoint, world metres, and whether the target is in sight from a position."""
     nearest = math.dist(position, goal)
     if len(viewpoints):

@@ -15,10 +15,10 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.benchmark.agents.goal import Observation
-from aerialdojo_gen.benchmark.agents.load import place
+from aerialdojo_gen.benchmark.agents.load import error_location
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent
-from aerialdojo_gen.benchmark.asking import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.flight import Flight
+from aerialdojo_gen.benchmark.guarded_agent import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.journal import Journal
 from aerialdojo_gen.benchmark.tasks import Task, read_tasks, reference_actions
 from aerialdojo_gen.rendering.backend import close_renderers
@@ -27,7 +27,7 @@ from aerialdojo_gen.store.schemas import STEPS
 
 
 def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
-    """Add what two attempts used; what neither knows stays unknown."""
+    """Add the usage of two attempts; unknown counts stay unknown."""
     if a is None or b is None:
         return a or b
     both = {}
@@ -39,7 +39,7 @@ def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
 
 
 def _usage_columns(used: Usage | None) -> dict[str, Any]:
-    """Return the columns of `episodes` and `failures` that tell what was used."""
+    """Usage columns of `episodes` and `failures`."""
     if used is None:
         return dict.fromkeys(("n_requests", "input_tokens", "output_tokens", "cost_usd"))
     return {
@@ -51,19 +51,19 @@ def _usage_columns(used: Usage | None) -> dict[str, Any]:
 
 
 def _request_times(used: Usage | None) -> dict[str, Any]:
-    """Return the columns of `timings` that tell how long requests took."""
+    """Request times, columns of `timings`."""
     if used is None:
         return {"request_s": None, "longest_request_s": None}
     return {"request_s": used.request_s, "longest_request_s": used.longest_request_s}
 
 
 def _cost_usd(used: Usage | None) -> float:
-    """Return the cost, US dollars; 0 where it is not known."""
+    """US dollars; 0 if unknown."""
     return (used.cost_usd or 0.0) if used is not None else 0.0
 
 
 def _tokens(used: Usage | None) -> int:
-    """Return the tokens, both ways; 0 where they are not known."""
+    """Input and output tokens; 0 if unknown."""
     return (used.input_tokens or 0) + (used.output_tokens or 0) if used is not None else 0
 
 
@@ -76,8 +76,8 @@ class WorkUnit:
     """Episodes of one scene that a worker flies."""
 
     scene: str
-    rows: pa.Table  # Of `aerialdojo_gen.benchmark.tasks.select`
-    journal: Path  # Where finished episodes go
+    rows: pa.Table  # Rows of `aerialdojo_gen.benchmark.tasks.select`
+    journal: Path  # File for finished episodes
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ class Failed:
 
 @dataclass(frozen=True)
 class Finished:
-    """What was finished, for progress and for the bill; sums add up."""
+    """Counts of finished episodes, for progress and budget."""
 
-    episodes: int = 0  # Failed ones too
+    episodes: int = 0  # Including failed ones
     actions: int = 0
     cost_usd: float = 0.0
     tokens: int = 0
@@ -100,7 +100,7 @@ class Finished:
     streak: tuple[Failed, ...] = ()  # Failures since the last episode that did not fail
 
     def __add__(self, other: Finished) -> Finished:
-        """Add what was finished later."""
+        """Add later episodes."""
         return Finished(
             self.episodes + other.episodes,
             self.actions + other.actions,
@@ -112,12 +112,12 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Conditions:
-    """What a worker bears."""
+class RetryPolicy:
+    """How a worker handles failures."""
 
-    attempts: int = 5  # How often an episode is begun before it is logged as failed
-    pause_s: float = 1.0  # Before the second attempt; doubled each time, unless the service says how long to wait
-    tolerate: bool = False  # Log an episode in which the agent failed in a way of its own, instead of ending the run
+    attempts: int = 5  # Attempts before an episode is logged as failed
+    pause_s: float = 1.0  # Before the second attempt; doubled each time unless the service names a time
+    tolerate: bool = False  # Log an episode with an agent error as failed, instead of ending the run
 
 
 class Worker:
@@ -129,17 +129,17 @@ class Worker:
         flight: Flight,
         data: DataRoot,
         identity: dict[str, str],
-        conditions: Conditions,
+        retry_policy: RetryPolicy,
         secrets: Secrets,
     ) -> None:
         self._agent, self._flight, self._data = agent, flight, data
-        self._identity, self._conditions, self._secrets = identity, conditions, secrets
-        self._asked = GuardedAgent(agent, identity["agent"], secrets, conditions.tolerate)
+        self._identity, self._retry_policy, self._secrets = identity, retry_policy, secrets
+        self._guarded = GuardedAgent(agent, identity["agent"], secrets, retry_policy.tolerate)
 
     def fly(self, unit: WorkUnit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
-        """Fly a unit's episodes, each into the journal when it is finished."""
+        """Fly a unit's episodes, and write each to the journal."""
         actions: dict[str, list[int]] = {}
-        # The oracle alone, by its very class: no agent of another name can ask for it.
+        # By its exact class: no other agent can get the reference.
         if type(self._agent) is OracleAgent:
             subsets = unit.rows["subset"].unique().to_pylist()
             actions = reference_actions(self._data, unit.scene, subsets, self._agent.column)
@@ -157,27 +157,27 @@ class Worker:
                 tell(done[1])
 
     def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
-        """Fly one episode, again where something outside failed; None if the run is stopped meanwhile."""
+        """Fly one episode, with retries after external failures; None if the run is stopped meanwhile."""
         used: Usage | None = None
         attempt, failed = 0, Failed("", "")
-        while attempt < self._conditions.attempts:
+        while attempt < self._retry_policy.attempts:
             attempt += 1
             try:
                 record = self._episode(task)
             except AgentUnavailable as error:
-                used = _add_usage(used, self._asked.usage())
+                used = _add_usage(used, self._guarded.usage())
                 failed = Failed(error.kind, self._line(error))
                 if not error.again:
                     break
-                if attempt < self._conditions.attempts and not self._pause(attempt, error.retry_after_s, stopped):
+                if attempt < self._retry_policy.attempts and not self._pause(attempt, error.retry_after_s, stopped):
                     return None
                 continue
             except AgentError as error:
-                if not self._conditions.tolerate:
+                if not self._retry_policy.tolerate:
                     raise
                 failed = Failed("agent error", self._line(error))
                 break
-            used = _add_usage(used, self._asked.usage())
+            used = _add_usage(used, self._guarded.usage())
             record["episode"] |= _usage_columns(used)
             record["timing"] |= {"attempts": attempt} | _request_times(used)
             actions = record["episode"]["n_actions"]
@@ -186,9 +186,9 @@ class Worker:
         record = {"task_id": task.row["task_id"], "failure": self._key(task) | row}
         return record, Finished(1, 0, _cost_usd(used), _tokens(used), 0, (failed,))
 
-    def _pause(self, attempt: int, asked_s: float | None, stopped: Callable[[], bool]) -> bool:
+    def _pause(self, attempt: int, requested_s: float | None, stopped: Callable[[], bool]) -> bool:
         """Wait before the next attempt; False if the run is stopped meanwhile."""
-        seconds = asked_s if asked_s is not None else self._conditions.pause_s * 2 ** (attempt - 1)
+        seconds = requested_s if requested_s is not None else self._retry_policy.pause_s * 2 ** (attempt - 1)
         until = time.monotonic() + min(max(seconds, 0.0), _LONGEST_PAUSE_S)
         while (left := until - time.monotonic()) > 0.0:
             if stopped():
@@ -207,16 +207,16 @@ class Worker:
         started = time.perf_counter()
         thinking = 0.0
         episode = self._flight.begin(task)
-        asked = self._asked
+        guarded = self._guarded
         before = time.perf_counter()
-        asked.reset(task.row["task_id"], self._flight.goal)
+        guarded.reset(task.row["task_id"], self._flight.goal)
         thinking += time.perf_counter() - before
         columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         while episode.termination is None:
             observation = self._look()
             before = time.perf_counter()
-            action = asked.act(observation)
-            answer = asked.answer()
+            action = guarded.act(observation)
+            answer = guarded.answer()
             thinking += time.perf_counter() - before
             episode.step(action)
             values = (action, episode.refused, *episode.position, episode.yaw_rad, episode.distance_m, answer)
@@ -234,21 +234,21 @@ class Worker:
         try:
             return self._flight.observe()
         except Exception as error:
-            # A context that is lost stays lost: the next attempt opens another.
+            # A lost context stays lost: the next attempt opens another.
             close_renderers()
-            said = str(error) if isinstance(error, RenderError) else place(error)
-            raise AgentUnavailable(f"the renderer failed: {said}", kind="renderer") from error
+            reason = str(error) if isinstance(error, RenderError) else error_location(error)
+            raise AgentUnavailable(f"the renderer failed: {reason}", kind="renderer") from error
 
     def _row(self, task: Task) -> dict[str, Any]:
         row, episode = task.row, self._flight.episode
         radius_m = self._flight.success_radius_m
         view = self._flight.view()
         near = view is not None and view.viewpoint_distance_m <= radius_m and view.target_in_sight
-        told = ("task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "split", "setting",
+        copied = ("task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "split", "setting",
                 "modality", "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")  # fmt: skip
         return {
             **self._identity,
-            **{name: row[name] for name in told},
+            **{name: row[name] for name in copied},
             "success": episode.success(radius_m),
             "oracle_success": episode.min_distance_m <= radius_m,
             "collision": episode.termination == "collision",

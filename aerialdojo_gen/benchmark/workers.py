@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.runner import Evaluation
 
 
-class Pace:
-    """Lets requests go at even intervals."""
+class RateLimiter:
+    """Spaces requests evenly over all workers."""
 
     def __init__(self, per_minute: float, link: WorkerChannel) -> None:
         self._interval_s, self._link = 60.0 / per_minute, link
@@ -35,18 +35,18 @@ class Pace:
         time.sleep(self._link.turn(self._interval_s))
 
 
-# What a process is taken to need, megabytes, not measured; a model of its own comes on top.
+# Assumed memory per process, megabytes, without an agent's model.
 MEMORY_MB = 1000
 
 
 @contextlib.contextmanager
 def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Iterator[Worker]:
-    """Make an agent and what it flies in; the agent is closed at the end."""
+    """Make a worker with its agent, which is closed at the end."""
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
             raise UsageError(f"agent {evaluation.agent!r} has no pace to be set: leave --requests-per-minute out")
-        agent.pace = Pace(evaluation.requests_per_minute, link).wait
+        agent.pace = RateLimiter(evaluation.requests_per_minute, link).wait
     suits: Any = getattr(agent, "suits", None)
     if suits is not None:
         suits(release_fingerprint(data))
@@ -56,11 +56,11 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
     flight = Flight(data, sensors, embodiment=body, renderer=renderer, tell=tell)
     secrets = Secrets(evaluation.options)
     try:
-        yield Worker(agent, flight, data, evaluation.identity(), evaluation.conditions, secrets)
+        yield Worker(agent, flight, data, evaluation.identity(), evaluation.retry_policy, secrets)
     finally:
         close: Any = getattr(agent, "close", None)
         if close is not None:
-            # What it raises now is of no episode: all of them are in the log.
+            # All episodes are in the log: errors here do not matter.
             with contextlib.suppress(Exception):
                 close()
 
@@ -88,7 +88,7 @@ def fly_units(
     tell: Callable[[Finished], None],
     stopped: Callable[[], bool],
 ) -> Iterator[str]:
-    """Fly units, and yield a scene when all of its units are through."""
+    """Fly units, and yield a scene when all of its units are finished."""
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
     for outcome in executor.map(
@@ -101,23 +101,23 @@ def fly_units(
             yield outcome
 
 
-# What this process flies with, from its first unit on: an agent may hold a model, and the flight holds scenes.
-_ours: dict[str, Worker] = {}
+# This process's worker, made at its first unit: an agent may hold a model, and the flight holds scenes.
+_worker_of_process: dict[str, Worker] = {}
 
 
 def _fly(work: _Work, link: WorkerChannel) -> str:
-    if "worker" not in _ours:
+    if "worker" not in _worker_of_process:
         stack = contextlib.ExitStack()
-        at_end(_ours.clear)
+        at_end(_worker_of_process.clear)
         at_end(stack.close)
-        _ours["worker"] = stack.enter_context(worker(work.data, work.evaluation, link))
-    with _Teller(link) as teller:
-        _ours["worker"].fly(work.unit, teller.tell, link.stopped)
+        _worker_of_process["worker"] = stack.enter_context(worker(work.data, work.evaluation, link))
+    with _ProgressSender(link) as progress:
+        _worker_of_process["worker"].fly(work.unit, progress.tell, link.stopped)
     return work.scene
 
 
-class _Teller:
-    """Tells the parent what was finished, no more often than its link bears, and what is left at its end."""
+class _ProgressSender:
+    """Sends progress to the parent, at most once per `every_s` seconds, and the rest at the end."""
 
     def __init__(self, link: WorkerChannel) -> None:
         self._link, self._sum, self._last = link, Finished(), time.monotonic()
@@ -132,7 +132,7 @@ class _Teller:
             self._link.send(self._sum)
         self._sum, self._last = Finished(), time.monotonic()
 
-    def __enter__(self) -> _Teller:
+    def __enter__(self) -> _ProgressSender:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -164,7 +164,7 @@ def evaluate(
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
     from aerialdojo_gen.benchmark.tasks import Selection
-    from aerialdojo_gen.benchmark.worker import Conditions
+    from aerialdojo_gen.benchmark.worker import RetryPolicy
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
@@ -181,7 +181,7 @@ def evaluate(
             _sensors(agent, options, view, width, height),
             config.embodiment,
             renderer,
-            Conditions(attempts, tolerate=tolerate),
+            RetryPolicy(attempts, tolerate=tolerate),
             requests_per_minute,
             tell=tuple(tell or ()),
         )
@@ -203,8 +203,8 @@ def evaluate(
         raise SystemExit(130) from None
     scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
     reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")
-    last = outcome.last_line(rerun_command(["--rerun-failed"], without=["--restart"], data=data))
-    if outcome.stopped or outcome.fruitless:
+    last = outcome.failure_message(rerun_command(["--rerun-failed"], without=["--restart"], data=data))
+    if outcome.stopped or outcome.all_failed:
         raise AerialDojoError(last)
     if last:
         # Not the reporter's: a failure is told under --quiet too.

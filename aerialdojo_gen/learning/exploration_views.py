@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.sections import Embodiment
-from aerialdojo_gen.benchmark.observations import drawing
+from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches, packed
@@ -94,7 +94,7 @@ def _render_patches(
 ) -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
     """Render poses, (n, views, H, W, 4), and label each patch with its object, (n, patches)."""
     s = part.sensors
-    renderer = drawing(scene, part.renderer)
+    renderer = renderer_for(scene, part.renderer)
     frames = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
     shown = np.empty((len(poses), len(s.views) * (part.size_px // PATCH_PX) ** 2), np.int16)
     # In chunks, to bound memory.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
-from aerialdojo_gen.benchmark.observations import has_drawn
+from aerialdojo_gen.benchmark.observations import used_opengl
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
 
@@ -138,7 +138,7 @@ class Loader:
                 sampler=self._sampler,
                 batch_size=None,
                 num_workers=self._workers,
-                multiprocessing_context=self._context or ("spawn" if has_drawn() else "fork"),
+                multiprocessing_context=self._context or ("spawn" if used_opengl() else "fork"),
                 worker_init_fn=_one_thread,
                 persistent_workers=True,
             )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import Embodiment
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import drawing
+from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.geodesic import blocked_actions
@@ -106,7 +106,7 @@ def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
     if s.blind:
         return out
     context = open_scene(*mesh_of(part.data, part.scene), SEVERAL)
-    renderer = drawing(context.scene, part.renderer)
+    renderer = renderer_for(context.scene, part.renderer)
     # In chunks, to bound memory.
     for k in range(0, len(poses), 512):
         rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views)

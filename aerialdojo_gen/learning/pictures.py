@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import RenderError, StoreError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import drawing
+from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.rendering.bodies import draw_bodies
@@ -61,7 +61,7 @@ class RenderedFrames:
         context = open_scene(*mesh_of(self._root, scene), SEVERAL)
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
-        rgb, depth_m = draw_bodies(drawing(context.scene, self._renderer), sensors.camera, at, sensors.views)
+        rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
         return Frames(rgb if sensors.rgb else None, clip_depth(depth_m, sensors) if sensors.depth else None)
 
 

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from aerialdojo_gen import GlRenderer, make_env
-from aerialdojo_gen.benchmark.observations import drawing
+from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories
@@ -42,7 +42,7 @@ def best_ms(work: Callable[[], object], times: int = 3) -> float:
 def scene_rows(data: str, scene: str) -> None:
     root = open_root(data)
     context = open_scene(*mesh_of(root, scene), SEVERAL)
-    renderer = drawing(context.scene, "gl")
+    renderer = renderer_for(context.scene, "gl")
     print(f"\n{scene}, CPU ms a sample")
     print(
         f"{'px':>4} {'views':>5} {'one by one':>10} {'loader':>7} {'culling':>8} {'triangles':>9} {'pixels':>7} "

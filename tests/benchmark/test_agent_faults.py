@@ -14,12 +14,12 @@ import pytest
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer, load_agent
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Observation, Sensors
-from aerialdojo_gen.benchmark.asking import AgentError
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.evaluation import Limits
+from aerialdojo_gen.benchmark.guarded_agent import AgentError
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.benchmark.worker import RetryPolicy
 from aerialdojo_gen.scenes.context import open_contexts
 
 HERE, FILE = __name__, Path(__file__).stem
@@ -88,9 +88,9 @@ class Breaking(AgentBase):
 
 
 def job(how: str, limit: int = 3, tolerate: bool = False, attempts: int = 2, **options: Any) -> Evaluation:
-    conditions = Conditions(attempts, 0.0, tolerate)
+    retry_policy = RetryPolicy(attempts, 0.0, tolerate)
     given = {"how": how} | options
-    return Evaluation("r", f"{HERE}:Faulty", given, Selection(limit=limit), conditions=conditions)
+    return Evaluation("r", f"{HERE}:Faulty", given, Selection(limit=limit), retry_policy=retry_policy)
 
 
 SAID = {
@@ -128,8 +128,8 @@ def test_what_is_tolerated_is_logged(smoke: Path, tmp_path: Path) -> None:
     failures = read_run(tmp_path, "r", "failures")
     assert failures["kind"].to_pylist() == ["agent error"] * 3
     assert failures["attempts"].to_pylist() == [1] * 3, "a defect does not go away by trying again"
-    assert "'map'" in outcome.last_line()
-    assert not outcome.fruitless
+    assert "'map'" in outcome.failure_message()
+    assert not outcome.all_failed
     outcome = evaluate(smoke, job("none", 2, tolerate=True), out=tmp_path / "b")
     assert (
         read_run(tmp_path / "b", "r")["n_invalid"].to_pylist()
@@ -137,8 +137,8 @@ def test_what_is_tolerated_is_logged(smoke: Path, tmp_path: Path) -> None:
     )
     outcome = evaluate(smoke, job("act", 6, tolerate=True), out=tmp_path / "c", limits=Limits(failures_in_row=2))
     assert (outcome.finished, outcome.failed) == (0, 2)
-    assert "stopped after 2 failures in a row of one kind (agent error)" in outcome.last_line()
-    assert outcome.fruitless
+    assert "stopped after 2 failures in a row of one kind (agent error)" in outcome.failure_message()
+    assert outcome.all_failed
 
 
 @pytest.mark.parametrize("how", ["half", "number"])
@@ -167,9 +167,9 @@ def test_an_agent_that_cannot_be_made_is_one_line(tmp_path: Path, monkeypatch: p
 
 def test_a_renderer_that_fails_is_opened_anew_or_logged(smoke: Path, tmp_path: Path) -> None:
     def run(attempts: int, out: Path) -> Any:
-        conditions = Conditions(attempts, 0.0)
+        retry_policy = RetryPolicy(attempts, 0.0)
         chosen = Selection(limit=4, scenes=("U_Courtyard_0",))
-        return evaluate(smoke, Evaluation("r", f"{HERE}:Breaking", {}, chosen, conditions=conditions), out=out)
+        return evaluate(smoke, Evaluation("r", f"{HERE}:Breaking", {}, chosen, retry_policy=retry_policy), out=out)
 
     outcome = run(1, tmp_path / "a")
     assert (outcome.finished, outcome.failed) == (3, 1)

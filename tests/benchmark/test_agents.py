@@ -262,9 +262,9 @@ def test_an_agent_in_the_working_directory_is_found_and_takes_no_librarys_place(
         (tmp_path / f"{name}.py").write_text(text)
     code = (
         "from aerialdojo_gen.benchmark.agents import load_agent\n"
-        "from aerialdojo_gen.benchmark.evaluation import flying_code\n"
-        "before = flying_code('mine:Mine')\nprint(type(load_agent('mine:Mine')).__name__)\n"
-        "open('mine.py', 'a').write('x = 1')\nassert flying_code('mine:Mine') != before\n"
+        "from aerialdojo_gen.benchmark.evaluation import agent_code_digest\n"
+        "before = agent_code_digest('mine:Mine')\nprint(type(load_agent('mine:Mine')).__name__)\n"
+        "open('mine.py', 'a').write('x = 1')\nassert agent_code_digest('mine:Mine') != before\n"
         "load_agent('numpy:Mine')"
     )
     # -P: as a console script has it.

@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.episodes import TABLES, read_run, runs
 from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.benchmark.runner import Evaluation, Outcome, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, select
-from aerialdojo_gen.benchmark.worker import Conditions
+from aerialdojo_gen.benchmark.worker import RetryPolicy
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import schemas
 
@@ -68,8 +68,8 @@ class Broken(AgentBase):
 
 
 def job(agent="random", limit=12, run="r", tolerate=True, **kw):
-    conditions = Conditions(pause_s=0.0, tolerate=tolerate)
-    return Evaluation(run, agent, kw.pop("options", {}), Selection(limit=limit, **kw), conditions=conditions)
+    retry_policy = RetryPolicy(pause_s=0.0, tolerate=tolerate)
+    return Evaluation(run, agent, kw.pop("options", {}), Selection(limit=limit, **kw), retry_policy=retry_policy)
 
 
 def snapshot(out, run="r", tables=("episodes", "steps")):

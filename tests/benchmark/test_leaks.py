@@ -13,7 +13,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.runner import Evaluation
 from aerialdojo_gen.benchmark.tasks import Selection, read_tasks, select
-from aerialdojo_gen.benchmark.worker import Conditions, Worker, WorkUnit
+from aerialdojo_gen.benchmark.worker import RetryPolicy, Worker, WorkUnit
 from aerialdojo_gen.store import shards as store
 
 SENSORS = Sensors(("front", "down"), width=24, height=16)
@@ -115,7 +115,7 @@ def test_an_agent_gets_nothing_of_the_evaluators(smoke, tmp_path, modality):
     task = read_tasks(smoke, rows)[0]
     spy = Spy()
     flight = Flight(smoke, SENSORS)
-    Worker(spy, flight, smoke, Evaluation().identity(), Conditions(1, 0.0), Redactor()).fly(
+    Worker(spy, flight, smoke, Evaluation().identity(), RetryPolicy(1, 0.0), Redactor()).fly(
         WorkUnit(task.row["scene"], rows, tmp_path / "j.jsonl"), lambda _: None, lambda: False
     )
     assert len(spy.handed) >= 3

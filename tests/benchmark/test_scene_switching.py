@@ -9,7 +9,7 @@ import pytest
 
 from aerialdojo_gen import make_env
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.tasks import TaskDraw, mesh_of
+from aerialdojo_gen.benchmark.tasks import TaskSampler, mesh_of
 from aerialdojo_gen.learning.vector import OwnScenes
 from aerialdojo_gen.scenes.context import context_of, open_contexts, open_scene, prefetch_mesh, release_scene
 from aerialdojo_gen.scenes.context import release_scenes as let_go
@@ -60,20 +60,20 @@ def test_one_episode_a_scene_is_the_draw_of_old(smoke):
 
 
 @pytest.mark.parametrize("in_a_row", [1, 2, 5])
-def test_episodes_come_in_blocks_of_a_scene_and_all_tasks_as_often(in_a_row):
+def test_episodes_come_in_blocks_of_a_scene_and_all_tasks_as_often(run_length):
     scenes = ["a"] * 6 + ["b"] * 3 + ["c"]
-    tasks, draw = TaskDraw(scenes, in_a_row), np.random.default_rng(0)
+    tasks, draw = TaskSampler(scenes, run_length), np.random.default_rng(0)
     drawn = [tasks.next(draw) for _ in range(20_000)]
-    for k in range(0, len(drawn), in_a_row):
-        assert len({scenes[at] for at in drawn[k : k + in_a_row]}) == 1
+    for k in range(0, len(drawn), run_length):
+        assert len({scenes[at] for at in drawn[k : k + run_length]}) == 1
     counts = Counter(drawn)
     # Blocks of five make a fifth as many independent draws of a scene: four standard deviations of that.
-    off = 4.0 * np.sqrt(len(drawn) * in_a_row / len(scenes))
+    off = 4.0 * np.sqrt(len(drawn) * run_length / len(scenes))
     assert all(abs(counts[at] - len(drawn) / len(scenes)) < off for at in range(len(scenes)))
 
 
 def test_what_comes_is_known_and_a_seed_begins_anew():
-    tasks = TaskDraw(["a", "b", "c", "d"] * 5, 3)
+    tasks = TaskSampler(["a", "b", "c", "d"] * 5, 3)
     assert tasks.coming is None
     first = np.random.default_rng(1)
     for _ in range(30):
@@ -84,9 +84,9 @@ def test_what_comes_is_known_and_a_seed_begins_anew():
         assert tasks._scenes[tasks.next(first)] == coming
         for _ in range(2):
             tasks.next(first)
-    tasks.begin_anew()
+    tasks.restart()
     once = [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
-    tasks.begin_anew()
+    tasks.restart()
     assert once == [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
     tasks.restrict(["b"])
     draw = np.random.default_rng(0)

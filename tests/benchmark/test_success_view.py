@@ -26,7 +26,7 @@ from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.benchmark.viewpoints import viewed
+from aerialdojo_gen.benchmark.viewpoints import view_of
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.rendering.casters import in_sight
 from aerialdojo_gen.store import shards as store
@@ -132,9 +132,9 @@ _WALLED = walled()
 
 
 def test_the_goal_is_a_viewpoint_in_any_case_and_a_node_that_is_not_there_is_named() -> None:
-    view = viewed(_WALLED, "crate", np.empty((0, 3)), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
+    view = view_of(_WALLED, "crate", np.empty((0, 3)), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
     assert (view.viewpoint_distance_m, view.target_in_sight) == (2.0, True)
-    farther = viewed(_WALLED, "crate", np.array([[9.0, 9.0, 0.5]]), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
+    farther = view_of(_WALLED, "crate", np.array([[9.0, 9.0, 0.5]]), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
     assert farther.viewpoint_distance_m == 2.0
     with pytest.raises(StoreError, match="U_Walled_0 has no node 'barrel'"):
         in_sight(_WALLED, "barrel", (0.0, 0.0, 5.0))

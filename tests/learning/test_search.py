@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import drawing
+from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.geometry.cameras import view_pose
@@ -82,7 +82,7 @@ def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
             targets[told[row["nav_id"]]].add(nodes_of(root, name)[row["target_object_id"]])
     assert targets["test"]
     assert sorted(found.names) == sorted(called[node] for node in targets["train"])
-    renderer, seen = drawing(scene, "gl"), 0
+    renderer, seen = renderer_for(scene, "gl"), 0
     for pose, shown in zip(found.pose[:20].astype(np.float64), found.shown, strict=False):
         matrices = [view_pose(pose[:3], float(pose[3]), view) for view in SENSORS.views]
         instance = np.stack([p.instance for p in renderer.render_views(SENSORS.camera, matrices, True)])

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from support.dagger_round import town
+from support.flying import town
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors

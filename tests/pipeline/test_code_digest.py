@@ -13,7 +13,7 @@ import pytest
 import aerialdojo_gen
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
-from aerialdojo_gen.benchmark.evaluation import flying_code
+from aerialdojo_gen.benchmark.evaluation import agent_code_digest
 from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import code_digest
 from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, code_of, stage_code
@@ -318,11 +318,11 @@ def test_absolute_paths_are_in_no_fingerprint(tmp_path):
 
 
 def test_an_evaluation_counts_the_agents_code(tmp_path, monkeypatch):
-    assert flying_code("random") == flying_code("stop") != flying_code("explorer")
+    assert agent_code_digest("random") == agent_code_digest("stop") != agent_code_digest("explorer")
     assert "aerialdojo_gen.benchmark.report" not in code_of("aerialdojo_gen.benchmark.worker").parts
     mine = tmp_path / "my_agent_of_digest.py"
     mine.write_text("A = 1\n")
     monkeypatch.syspath_prepend(tmp_path)
-    before = flying_code("my_agent_of_digest:Agent")
+    before = agent_code_digest("my_agent_of_digest:Agent")
     mine.write_text("A = 22\n")
-    assert flying_code("my_agent_of_digest:Agent") != before
+    assert agent_code_digest("my_agent_of_digest:Agent") != before

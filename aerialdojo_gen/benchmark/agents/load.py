@@ -68,7 +68,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     if not colon or not module_name or not class_name:
         raise UsageError(unknown("no agent", name, BUILT_IN, besides=("or package.module:Class",)))
     if name not in BUILT_IN:
-        look_here()
+        add_working_directory()
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
@@ -78,7 +78,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     except AerialDojoError:
         raise
     except Exception as error:
-        raise keep_traceback(UsageError(f"cannot load agent {name!r}: {place(error)}"), error) from error
+        raise keep_traceback(UsageError(f"cannot load agent {name!r}: {error_location(error)}"), error) from error
     cls = getattr(module, class_name, None)
     if cls is None:
         raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
@@ -120,7 +120,7 @@ def load_agent(name: str, **options: Any) -> Agent:
     except (TypeError, ValueError) as error:
         raise keep_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
     except Exception as error:
-        raise keep_traceback(UsageError(f"agent {name!r} cannot be made: {place(error)}"), error) from error
+        raise keep_traceback(UsageError(f"agent {name!r} cannot be made: {error_location(error)}"), error) from error
     if not isinstance(agent, Agent):
         raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
     return agent
@@ -161,7 +161,7 @@ def _converted(name: str, option: str, text: str, default: Any) -> Any:
     return value if isinstance(value, fits) else text
 
 
-def look_here() -> None:
+def add_working_directory() -> None:
     """Let modules of the working directory be imported, as ``python -m`` does; a console script does not.
 
     Last, so that a file there takes no library's place.
@@ -170,7 +170,7 @@ def look_here() -> None:
         sys.path.append(os.getcwd())
 
 
-def place(error: BaseException) -> str:
+def error_location(error: BaseException) -> str:
     """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``.
 
     The place is the last one outside of libraries and of this package, so that it is in the agent's own code.

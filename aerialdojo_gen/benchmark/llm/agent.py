@@ -51,7 +51,7 @@ def refused(error: UsageError, model: str, key_variable: str) -> ServiceDown:
     return ServiceDown(f"{error}: {mend}")
 
 
-def unanswered(error: AgentUnavailable) -> AerialDojoError:
+def check_error(error: AgentUnavailable) -> AerialDojoError:
     """Make the error that ends the check before a run from a failure of its one request."""
     mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
     return AerialDojoError(f"{error}{mend}")
@@ -62,9 +62,9 @@ _KEPT_CHARACTERS = 4_000
 # More tokens than any request has: what a service counts beyond this it has not counted.
 _MOST_TOKENS = 1 << 40
 # What a service answers that does not know structured outputs, or tool calls.
-_NOT_TAKEN = ("bad request", "not found", "malformed answer", "server error")
+_UNSUPPORTED = ("bad request", "not found", "malformed answer", "server error")
 # What may be over a moment later, and how long the check before a run waits for that, seconds.
-_PASSING = ("rate limit", "server error", "connection lost", "malformed answer")
+_TRANSIENT = ("rate limit", "server error", "connection lost", "malformed answer")
 _PATIENCE_S = 10.0
 
 
@@ -156,13 +156,13 @@ class LanguageModelAgent(AgentBase):
         for form in forms:
             self.form = form
             try:
-                reply = self._tried(text, [Message("user", ("A grey picture:", grey))])
+                reply = self._ask_with_retry(text, [Message("user", ("A grey picture:", grey))])
             except ServiceDown as error:
                 raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
             except AgentUnavailable as error:
-                if form != forms[-1] and error.kind in _NOT_TAKEN:
+                if form != forms[-1] and error.kind in _UNSUPPORTED:
                     continue
-                raise AerialDojoError(f"checked before the run, nothing flown: {unanswered(error)}") from None
+                raise AerialDojoError(f"checked before the run, nothing flown: {check_error(error)}") from None
             if form != forms[-1] and not self._readable(reply.text):
                 continue
             self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
@@ -171,17 +171,17 @@ class LanguageModelAgent(AgentBase):
             return f"{self.service.name} answers in {seconds:.1f} s, by {form}{counted}"
         raise AssertionError("the last form either answers or raises")
 
-    def _tried(self, system: str, messages: Sequence[Message]) -> Reply:
+    def _ask_with_retry(self, system: str, messages: Sequence[Message]) -> Reply:
         """Ask once more where the service answers at all: somebody waits, and one that is not there stays so."""
         try:
-            return self._sent(system, messages, 0)
+            return self._send(system, messages, 0)
         except AgentUnavailable as error:
-            if error.kind not in _PASSING or (error.retry_after_s or 0.0) > _PATIENCE_S:
+            if error.kind not in _TRANSIENT or (error.retry_after_s or 0.0) > _PATIENCE_S:
                 raise
             time.sleep(1.0 if error.retry_after_s is None else error.retry_after_s)
-        return self._sent(system, messages, 0)
+        return self._send(system, messages, 0)
 
-    def _sent(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+    def _send(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
         """Ask; what is refused for all requests ends the run."""
         try:
             return self.ask(system, messages, retries)
@@ -231,13 +231,13 @@ class LanguageModelAgent(AgentBase):
     def act(self, observation: Observation) -> int:
         """Ask for an action."""
         actions = self.options.action_set
-        messages = [Message("user", (*self._goal, *self._report(observation)))]
-        said = self._ask(messages)
+        messages = [Message("user", (*self._goal, *self._observation_parts(observation)))]
+        text = self._ask(messages)
         try:
             try:
-                answer = parse_answer(said, actions.names)
+                answer = parse_answer(text, actions.names)
             except InvalidAnswer as error:
-                shown = said[:_KEPT_CHARACTERS].strip() or "(nothing)"
+                shown = text[:_KEPT_CHARACTERS].strip() or "(nothing)"
                 again = repair_text(str(error), actions)
                 messages += [Message("assistant", (shown,)), Message("user", (again,))]
                 answer = parse_answer(self._ask(messages), actions.names)
@@ -248,14 +248,14 @@ class LanguageModelAgent(AgentBase):
         return actions.ids[answer.action]
 
     def _ask(self, messages: Sequence[Message]) -> str:
-        reply = self._sent(self._system, messages)
+        reply = self._send(self._system, messages)
         for k, count in enumerate((reply.input_tokens, reply.output_tokens)):
             so_far = self._tokens[k]
             self._tokens[k] = None if so_far is None or count is None else so_far + count
         self._answer = reply.text[:_KEPT_CHARACTERS]
         return reply.text
 
-    def _report(self, observation: Observation) -> list[str | Picture]:
+    def _observation_parts(self, observation: Observation) -> list[str | Picture]:
         o = self.options
         parts: list[str | Picture] = []
         for step, picture in self._seen:
@@ -272,10 +272,10 @@ class LanguageModelAgent(AgentBase):
                 parts += [f"{view} camera, depth (black 0 m, white {o.max_depth_m:g} m or more):", depth]
         return parts
 
-    def reckoned_tokens(self, observation: Observation) -> int:
+    def estimate_tokens(self, observation: Observation) -> int:
         """Reckon what a request would have without sending it: four letters a token, and its pictures."""
         o = self.options
-        parts = [self._system, *self._goal, *self._report(observation)]
+        parts = [self._system, *self._goal, *self._observation_parts(observation)]
         a_picture = o.tokens_per_picture or round(o.image_size_px**2 / 750)
         return sum(a_picture if isinstance(part, Picture) else -(-len(part) // 4) for part in parts)
 

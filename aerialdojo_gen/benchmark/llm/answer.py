@@ -36,7 +36,7 @@ class ActionSet:
         """The names, in their order."""
         return tuple(self.ids)
 
-    def described(self) -> str:
+    def describe(self) -> str:
         """Return one line an action, with its magnitude."""
         lines = []
         for name, action in self.ids.items():
@@ -99,7 +99,7 @@ def parse_answer(text: str, names: Sequence[str] = SIXTEEN.names) -> Answer:
     if not body.strip():
         raise InvalidAnswer("it is empty")
     try:
-        value = json.loads(body, object_pairs_hook=_without_doubles, parse_constant=_no_number)
+        value = json.loads(body, object_pairs_hook=_reject_duplicates, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
         # A number of 4,300 digits or more is a ValueError of its own kind.
         raise _refused(f"it is not one JSON object ({error})") from None
@@ -131,11 +131,11 @@ def _refused(why: str) -> InvalidAnswer:
     return InvalidAnswer(why.encode("utf-8", "backslashreplace").decode("utf-8")[:500])
 
 
-def _no_number(name: str) -> Any:
+def _reject_constant(name: str) -> Any:
     raise ValueError(f"{name} is no number of JSON")
 
 
-def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _reject_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     value = dict(pairs)
     if len(value) != len(pairs):
         raise InvalidAnswer("a key stands twice in it")

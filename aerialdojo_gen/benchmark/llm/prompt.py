@@ -55,7 +55,7 @@ SENSORS
 {_sensors(sight)}
 
 ACTIONS
-{actions.described()}
+{actions.describe()}
 Every action is carried out exactly, unless something stands in the way. A move that would leave the flight area is \
 refused: it is spent, and the drone stays where it is.
 

@@ -1,4 +1,4 @@
-"""An agent, asked with care: what it may raise or return, and what it is told when it does something else."""
+"""Calls of an agent with checked results: what it may return and raise, and the error for anything else."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import Agent, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.benchmark.agents.load import keep_traceback, place
+from aerialdojo_gen.benchmark.agents.load import error_location, keep_traceback
 
 _TOLERATED = "--tolerate logs such episodes as failures and goes on, --traceback shows the agent's traceback"
 
 
 class AgentError(AerialDojoError):
-    """An agent raised or returned what it may not: a defect of the agent's."""
+    """An agent raised or returned something invalid: a defect of the agent."""
 
 
 class GuardedAgent:
-    """Asks an agent."""
+    """Calls an agent and checks what it returns."""
 
     def __init__(self, agent: Agent, name: str, secrets: Secrets, tolerate: bool = False) -> None:
         self._agent, self._name, self._secrets, self._tolerate = agent, name, secrets, tolerate
-        # Looked up once: they are asked at every step.
         self._answer: Any = getattr(agent, "answer", None)
         self._used: Any = getattr(agent, "usage", None)
         self.task = ""
@@ -38,7 +37,7 @@ class GuardedAgent:
             raise self._wrong(f"raised InvalidAnswer in reset, where there is nothing to answer: {error}") from error
 
     def act(self, observation: Observation) -> int | None:
-        """Ask for an action; None for an answer that names none."""
+        """Return the agent's action; None for an invalid answer."""
         try:
             answer = self._call("act", self._agent.act, observation)
         except InvalidAnswer:
@@ -46,7 +45,7 @@ class GuardedAgent:
         try:
             action = None if isinstance(answer, bool) else operator.index(answer)
         except Exception:
-            # An object of the agent's own may raise anything when it is asked for its number.
+            # The agent's own object may raise anything in __index__.
             action = None
         if action is not None and 0 <= action < N_ACTIONS:
             return action
@@ -58,12 +57,12 @@ class GuardedAgent:
         )
 
     def answer(self) -> str | None:
-        """Return the words behind the last action, without secrets."""
+        """Return the agent's text for the last action, without secrets."""
         if self._answer is None:
             return None
-        said = self._call("answer", self._answer)
-        # No file can hold half of a surrogate pair.
-        return self._secrets.text(said.encode("utf-8", "replace").decode("utf-8")) if isinstance(said, str) else None
+        text = self._call("answer", self._answer)
+        # Files cannot hold lone surrogates.
+        return self._secrets.text(text.encode("utf-8", "replace").decode("utf-8")) if isinstance(text, str) else None
 
     def usage(self) -> Usage | None:
         """Return what was used since the last `reset`."""
@@ -72,14 +71,14 @@ class GuardedAgent:
             return used
         raise self._wrong(f"returned {_short(used)} from usage, where Usage or None is expected")
 
-    def _call(self, what: str, question: Callable[..., Any], *about: Any) -> Any:
+    def _call(self, what: str, method: Callable[..., Any], *args: Any) -> Any:
         try:
-            return question(*about)
+            return method(*args)
         except AerialDojoError:
             raise
         except (Exception, SystemExit) as error:
-            # SystemExit too: an agent that gives up ends its episode, not the run without a word.
-            raise keep_traceback(self._wrong(f"{place(error)} (in {what}); {_TOLERATED}"), error) from error
+            # SystemExit too: an agent must not end the run without a message.
+            raise keep_traceback(self._wrong(f"{error_location(error)} (in {what}); {_TOLERATED}"), error) from error
 
     def _wrong(self, what: str) -> AgentError:
         line = " ".join(f"agent {self._name} failed at task {self.task}: {what}".split())
