@@ -59,7 +59,7 @@ def test_one_episode_a_scene_is_the_draw_of_old(smoke):
     assert ids == [rows[int(draw.integers(len(rows)))] for _ in range(8)]
 
 
-@pytest.mark.parametrize("in_a_row", [1, 2, 5])
+@pytest.mark.parametrize("run_length", [1, 2, 5])
 def test_episodes_come_in_blocks_of_a_scene_and_all_tasks_as_often(run_length):
     scenes = ["a"] * 6 + ["b"] * 3 + ["c"]
     tasks, draw = TaskSampler(scenes, run_length), np.random.default_rng(0)
