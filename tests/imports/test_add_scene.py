@@ -174,7 +174,7 @@ def test_a_reader_that_wants_too_much_is_ended(village):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.glb", b"glTF", "no GLB"),
+        ("a.glb", b"glTF", "not a GLB file"),
         ("a.glb", b"PK\x03\x04" + b"\0" * 60, "is a ZIP archive"),
         ("a.3ds", b"MM\xff\xff\xff\xff", "damaged 3DS"),
         ("a.3ds", b"hello, this is text", "3DS"),
