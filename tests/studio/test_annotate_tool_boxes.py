@@ -69,7 +69,7 @@ def test_a_box_takes_its_triangles_and_no_others(terrain):
     assert not ((others >= SHED[0]) & (others <= SHED[1])).all(axis=1).any()
     assert shed.category == "shed"
     assert set(shed.attributes) == {"colour"}
-    with pytest.raises(AssetError, match="name of a node that is there"):
+    with pytest.raises(AssetError, match="name of an existing node"):
         cut_out(cut, (Cut(node="shed_000", category="shed", low_m=SHED[0], high_m=SHED[1]),))
     with pytest.raises(AssetError, match="holds no triangle"):
         cut_out(scene, (Cut(node="air_000", category="air", low_m=(0, 0, 50), high_m=(1, 1, 51)),))
