@@ -159,7 +159,7 @@ def test_no_reason_is_left_over_and_what_it_names_is_there():
 CALLS = """
 import io, json, sys
 from contextlib import redirect_stderr, redirect_stdout
-from aerialdojo_gen import cli
+from aerialdojo_gen.cli import app as cli
 
 def called(words):
     sys.argv, err = ["aerialdojo-gen", *words], io.StringIO()

@@ -24,7 +24,7 @@ def call(*args, **env):
 @pytest.mark.parametrize("args", [["--help"], ["plan", "--help"], ["render", "--help"]])
 def test_help_imports_nothing_heavy(args):
     code = (
-        "import sys\nfrom aerialdojo_gen import cli\n"
+        "import sys\nfrom aerialdojo_gen.cli import app as cli\n"
         f"try:\n    cli.app({args!r})\nexcept SystemExit: pass\n"
         f"print([m for m in {HEAVY!r} if m in sys.modules])"
     )

@@ -163,7 +163,7 @@ def test_the_table_of_stages_and_its_hooks_count_by_what_they_return(copied):
     assert edited(hooks, "// config.targets_per_part", "// 2") == before
     assert edited(hooks, "config.paper_counts", "not config.paper_counts") == before
     assert edited(copied / "pipeline" / "registry.py", "Plan a collision-free", "Plan another") == before
-    assert edited(copied / "rendering" / "resolve_config.py", "say(choice.why)", "pass") == before
+    assert edited(copied / "rendering" / "resolve_config.py", "report(choice.why)", "pass") == before
 
 
 def test_another_number_of_shards_or_another_source_makes_a_scene_stale(project, smoke, tmp_path, monkeypatch):

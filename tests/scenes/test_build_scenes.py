@@ -139,7 +139,7 @@ def test_file_holds_the_built_scene_exactly(assets, tmp_path):
 def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
     script = (
         "import sys, hashlib, pathlib\n"
-        "from aerialdojo_gen import layouts\n"
+        "from aerialdojo_gen.scenes import layouts\n"
         "layouts.__path__.append(sys.argv[2])\n"
         "from aerialdojo_gen.scenes.layouts.build import build_scene\n"
         "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"
