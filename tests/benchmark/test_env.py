@@ -285,6 +285,6 @@ def test_a_task_that_was_not_chosen_is_named(smoke):
 def test_a_fork_of_a_process_that_has_drawn_is_told_so_and_does_not_hang(seeing, monkeypatch):
     from aerialdojo_gen.benchmark import observations
 
-    monkeypatch.setattr(observations, "_drawn_by_gl", [os.getppid()])
+    monkeypatch.setattr(observations, "_opengl_process", [os.getppid()])
     with pytest.raises(RenderError, match="start it by spawn"):
         seeing.reset(seed=0)

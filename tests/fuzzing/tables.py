@@ -134,7 +134,7 @@ def _journals() -> list[Case]:
 
 
 def _read_journal(folder: Path) -> None:
-    for record in journal.read(folder / "x.jsonl"):
+    for record in journal.read_journal(folder / "x.jsonl"):
         json.dumps(record).encode()
 
 

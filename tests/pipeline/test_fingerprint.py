@@ -114,9 +114,9 @@ def test_the_place_of_a_checkout_does_not_count(opened, project):
 
 def test_the_papers_figures_count_where_they_are_read(opened, tmp_path, monkeypatch):
     before = prints(opened)
-    files = fingerprint.paper.files()
+    files = fingerprint.paper_figures.files()
     copies = [shutil.copy(path, tmp_path / path.name) for path in files]
-    monkeypatch.setattr(fingerprint.paper, "files", lambda: copies)
+    monkeypatch.setattr(fingerprint.paper_figures, "files", lambda: copies)
     assert prints(opened) == before, "a checkout elsewhere"
     copies[-1].write_bytes(copies[-1].read_bytes() + b"\n")
     assert changed(before, prints(opened)) == {"annotate-import", "plan", "split"}

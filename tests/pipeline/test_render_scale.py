@@ -161,7 +161,7 @@ def test_a_flagged_view_is_rendered_once_again_and_a_fault_that_passes_leaves_no
         return {view: own | {"frozen"} if calls.count(view) <= faults else own for view, own in flags.items()}
 
     monkeypatch.setattr(render, "record_views", faulty)
-    monkeypatch.setattr(render, "choose", lambda *_: ["nav_a"])
+    monkeypatch.setattr(render, "choose_trajectories", lambda *_: ["nav_a"])
     only = CONFIG.model_copy(update={"views": ("front",)})
     for times, expected in ((1, 0), (10**6, 1)):
         faults = times
@@ -184,7 +184,7 @@ def test_a_video_that_lacks_a_frame_is_flagged_missing(tmp_path, monkeypatch):
             write(self, frames)
 
     monkeypatch.setattr(recording.VideoWriter, "write", forgetful)
-    monkeypatch.setattr(render, "choose", lambda *_: ["nav_a"])
+    monkeypatch.setattr(render, "choose_trajectories", lambda *_: ["nav_a"])
     (summary,) = run_whole(tmp_path, CONFIG.model_copy(update={"views": ("front",)}))
     assert summary.counts["missing"] == 2
 
