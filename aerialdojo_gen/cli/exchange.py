@@ -250,6 +250,7 @@ def pull(
     )
     print(moved)
     if moved.left:
-        names = [brief(name, 100) for name in moved.left[:5]]
+        # A new line in a name must not begin a line of ours.
+        names = [brief(name, 100).replace("\n", r"\n") for name in moved.left[:5]]
         print(f"left there: {', '.join(names)}{' …' if len(moved.left) > 5 else ''}")
     print(f"next: {cli_context.command('validate', no_meshes=not moved.meshes)}")

@@ -154,7 +154,7 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
         ids = set(read_run(out, "r")["task_id"].to_pylist()) if runs(out) else set()
         for path in (out / "runs" / "r" / "journal").glob("*.jsonl"):
             with contextlib.suppress(FileNotFoundError):
-                ids |= {record["task_id"] for record in journal.read(path)}
+                ids |= {record["task_id"] for record in journal.read_journal(path)}
         return ids
 
     kept = set()
