@@ -129,7 +129,7 @@ def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_pa
     ("layout", "parameters", "place"),
     [
         ("desert", {"tracks": [[[0, 0]]]}, "tracks.0: a line needs two points or more"),
-        ("desert", {"bed": [[0, 0], [5, 0], [5, 0]]}, "consecutive points of a line must be at least 0.05 m from each other"),
+        ("desert", {"bed": [[0, 0], [5, 0], [5, 0]]}, "points of a line must be at least 0.05 m from each other"),
         ("desert", {"hills": [[0, 0, 0, 1]]}, "hills.0.2: Input should be greater than or equal to 0.1"),
         ("desert", {"houses": [{"name": "a", "at": [0, 0], "size_m": [0.5, 5, 3]}]}, "houses.0.size_m.0: Input"),
         ("desert", {"ground": "wash"}, "a wash needs the middle line of its bed"),
