@@ -43,7 +43,7 @@ def test_every_type_is_found_and_used_and_every_module_belongs_to_one():
         assert callable(importlib.import_module(f"aerialdojo_gen.scenes.layouts.{module}").build)
     # Nothing lies about that no scene is made of.
     used = {part for recipe in RECIPES for part in fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts}
-    paths = [path.relative_to(PROJECT).with_suffix("") for path in (SOURCES / "layouts").rglob("*.py")]
+    paths = [path.relative_to(PROJECT).with_suffix("") for path in (SOURCES / "scenes" / "layouts").rglob("*.py")]
     assert {".".join(path.parts).removesuffix(".__init__") for path in paths} <= used
 
 
@@ -122,7 +122,7 @@ def test_a_change_makes_stale_what_is_built_with_it_and_nothing_else(copied, rel
         package = Package(copied)
         return {recipe.stem: package.of(work_module(BUILD.name), chosen(recipe)).digest for recipe in RECIPES}
 
-    path = copied / "layouts" / relative
+    path = copied / "scenes" / "layouts" / relative
     before, text = digests(), path.read_text()
     path.write_text(text + "\nFURTHER = 1\n")
     after = digests()

@@ -189,7 +189,7 @@ def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
 
 
 def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
-    for name in ("parts", "survey"):
+    for name in ("parts", "exploration_views"):
         counted = set(code_of(f"aerialdojo_gen.learning.{name}").parts)
         assert f"aerialdojo_gen.learning.{name}" in counted
         learned = {"network", "policy", "flights", "imitation", "training"}

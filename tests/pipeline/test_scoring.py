@@ -22,7 +22,7 @@ from aerialdojo_gen.pipeline.scoring.geometric import WEIGHTS, Parts, judge
 from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.rendering.backend import check, open_renderer, probe_scene
+from aerialdojo_gen.rendering.backend import check_renderer, open_renderer, probe_scene
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.raycast import RayRenderer
 from aerialdojo_gen.scenes.model import Instance
@@ -47,7 +47,7 @@ def terms(place, thing, position, yaw):
 
 def test_the_ray_renderer_passes_the_check_of_renderers():
     with RayRenderer(probe_scene()) as renderer:
-        assert "at 100.00 % of 147,456 pixels" in check(renderer)
+        assert "at 100.00 % of 147,456 pixels" in check_renderer(renderer)
 
 
 @pytest.mark.parametrize("view", ["front", "left", "right", "down"])

@@ -157,7 +157,7 @@ def test_a_canopy_over_level_ground_that_was_laid_is_not_the_ground():
                      default_colours(len(m.faces)))
              for k, m in enumerate([*posts, *halls, roof])]  # fmt: skip
     scene, repairs = import_mesh(NAME, nodes)
-    assert any("level ground" in line for line in repairs.lines)
+    assert any("ground plane added" in line for line in repairs.lines)
     assert Ground.of(scene) is None
     assert open_ground(scene) is None
 
