@@ -84,7 +84,7 @@ _FORMS: Mapping[str, Callable[[Any], bool]] = {
     "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],
     "high": _number,
     "among": _among,
-    "part": lambda v: v in _PARTS,
+    "part": lambda v: isinstance(v, str) and v in _PARTS,
 }
 
 

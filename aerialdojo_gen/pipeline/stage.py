@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from aerialdojo_gen.base.config.sections import Embodiment
-    from aerialdojo_gen.pipeline.code_digest import Choice
     from aerialdojo_gen.scenes.model import Scene
 
 
@@ -173,7 +172,7 @@ def _no_missing_input(_roots: ProjectPaths, _scene: str) -> str:
     return ""
 
 
-def _no_module_choice(_roots: ProjectPaths, _scene: str) -> Choice | None:
+def _no_module_choice(_roots: ProjectPaths, _scene: str) -> tuple[str, ...] | None:
     return None
 
 
@@ -201,8 +200,8 @@ class Stage:
         ``(roots, scene) -> str``: why a scene is left out of this stage and those downstream because its author has
         not made an input, in a line that says how to make it; empty if nothing is missing.
     imports : callable
-        ``(roots, scene) -> Choice or None``: which modules of a package the scene's work imports dynamically; the
-        code of the others does not make the scene stale. None if unknown: all count.
+        ``(roots, scene) -> tuple of str or None``: the layouts that the scene's work imports by name; the code of the
+        others does not make the scene stale. None if unknown: all count.
     idle : callable
         ``(config) -> tuple of str``: imported modules and libraries that the work does not use with this
         configuration. They do not count, so that installing an extra makes nothing stale.
@@ -234,7 +233,7 @@ class Stage:
     parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[ProjectPaths, str], list[Path]] = _no_sources
     missing_input: Callable[[ProjectPaths, str], str] = _no_missing_input
-    imports: Callable[[ProjectPaths, str], Choice | None] = _no_module_choice
+    imports: Callable[[ProjectPaths, str], tuple[str, ...] | None] = _no_module_choice
     idle: Callable[[Any], tuple[str, ...]] = _no_idle_modules
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     resolve_config: Callable[[Any, Callable[[str], None]], Any] = _unchanged

@@ -78,7 +78,7 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
     if kind not in KINDS:
         raise AssetError(f"{where}: unknown kind {kind!r}{nearest(str(kind), KINDS)} (one of {', '.join(KINDS)})")
     front = body.get("front", "")
-    if "front" in body and front not in FRONTS:
+    if "front" in body and (not isinstance(front, str) or front not in FRONTS):
         raise AssetError(f"{where}: front must be one of {', '.join(FRONTS)}, got {front!r}")
     params = _params(body.get("params", {}), f"{where} params")
     roles = _roles(body.get("roles", {}), None, materials, f"{where} roles")

@@ -95,12 +95,12 @@ def test_a_caller_of_a_changed_function_is_compiled_again(package, tmp_path):
     assert fly(package, NUMBA_CACHE_DIR=str(tmp_path / "mine")) == WRAPPED
     taken = compiled(tmp_path / "mine")
     assert {(p.name, when) for p, when in taken.items()} == {(p.name, when) for p, when in first.items()}
-    angles = package / "geometry" / "angles.py"
-    changed = re.sub(r"(def wrap_one_rad\(.*\n)", r"\1    return 7.0\n", source := angles.read_text())
+    frames = package / "geometry" / "frames.py"
+    changed = re.sub(r"(def wrap_one_rad\(.*\n)", r"\1    return 7.0\n", source := frames.read_text())
     assert changed != source
-    angles.write_text(changed)
+    frames.write_text(changed)
     # Nobody has used one of the old folders for two days.
-    (unused,) = package.glob("geometry/__pycache__/kernels/angles-*")
+    (unused,) = package.glob("geometry/__pycache__/kernels/frames-*")
     os.utime(unused, (old := time.time() - 2 * 24 * 3600, old))
     assert fly(package) == "7.0\n"
     assert not unused.exists()
@@ -128,7 +128,7 @@ def test_every_source_of_a_module_counts(package, module):
 @pytest.mark.slow
 def test_where_package_and_home_cannot_be_written_a_private_folder_is_used(package, tmp_path):
     """Files in the place of folders: permissions do not bind who runs tests as root."""
-    for folder in ("geometry", "common"):
+    for folder in ("geometry", "base"):
         (package / folder / "__pycache__").touch()
     (tmp_path / "tmp").mkdir()
     place = {"HOME": os.devnull, "XDG_CACHE_HOME": "", "TMPDIR": str(tmp_path / "tmp")}

@@ -1,7 +1,6 @@
 """Layouts are found by their folders, and a scene is as fresh as the code of its own layout."""
 
 import importlib
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +10,9 @@ import pytest
 import aerialdojo_gen
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.pipeline import fingerprint
-from aerialdojo_gen.pipeline.code_digest import PLUMBING, Package, stage_code
+from aerialdojo_gen.pipeline.code_digest import _is_cut, stage_code
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import ProjectPaths, work_module
+from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.recipe import load_recipe
 
@@ -50,7 +49,7 @@ def test_every_type_is_found_and_used_and_every_module_belongs_to_one():
 def test_what_one_type_alone_uses_lies_in_its_folder_and_what_several_share_in_parts():
     users: dict[str, set[str]] = {}
     for recipe in RECIPES:
-        home = chosen(recipe).modules[0].removesuffix(".layout")
+        home = chosen(recipe)[0].removesuffix(".layout")
         for part in fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts:
             path = SOURCES.joinpath(*part.split(".")[1:]).with_suffix(".py")
             if part.startswith("aerialdojo_gen.scenes.layouts.") and part != ENGINE and path.is_file():
@@ -89,7 +88,7 @@ def test_what_a_process_imports_to_build_a_type_is_what_counts():
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     lines = run.stdout.splitlines()
     for (layout, recipe), line in zip(one_a_type.items(), lines, strict=True):
-        loaded = set(line.split()) - set(PLUMBING)
+        loaded = {name for name in line.split() if not _is_cut(name)}
         parts = set(fingerprint.scene_code(BUILD, roots_of(recipe), recipe.stem).parts)
         assert f"aerialdojo_gen.scenes.layouts.{layouts.layout_modules()[layout]}" in loaded
         counted = {name for name in parts if ".layouts" in name}
@@ -97,42 +96,24 @@ def test_what_a_process_imports_to_build_a_type_is_what_counts():
         assert loaded <= parts
 
 
-@pytest.fixture(scope="module")
-def copied(tmp_path_factory):
-    """A copy of the package's sources, with what reading them gave before."""
-    stage_code("build-scenes")
-    folder = tmp_path_factory.mktemp("copy") / "aerialdojo_gen"
-    for path in [*SOURCES.rglob("*.py"), *SOURCES.rglob("*.toml"), *SOURCES.glob("__pycache__/code-facts.json")]:
-        target = folder / path.relative_to(SOURCES)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, target)
-    return folder
-
-
 @pytest.mark.parametrize(
-    ("relative", "stale"),
+    ("module", "users"),
     [
-        ("urban/mall/shops.py", {"mall"}),
-        ("natural/parts/strata.py", {"desert", "snowfield"}),
-        ("parts/structures.py", None),
+        ("urban.mall.shops", {"mall"}),
+        ("natural.parts.strata", {"desert", "snowfield"}),
+        ("parts.structures", None),
     ],
 )
-def test_a_change_makes_stale_what_is_built_with_it_and_nothing_else(copied, relative, stale):
-    def digests():
-        package = Package(copied)
-        return {recipe.stem: package.of(work_module(BUILD.name), chosen(recipe)).digest for recipe in RECIPES}
-
-    path = copied / "scenes" / "layouts" / relative
-    before, text = digests(), path.read_text()
-    path.write_text(text + "\nFURTHER = 1\n")
-    after = digests()
-    path.write_text(text)
-    changed = {load_recipe(recipe).layout for recipe in RECIPES if before[recipe.stem] != after[recipe.stem]}
-    if stale is None:
-        assert {"mall", "harbor", "island"} <= changed
-        assert not {"mountain", "snowfield", "desert", "forest", "courtyard"} & changed
+def test_a_layout_counts_what_it_is_built_with_and_nothing_else(module, users):
+    name = f"aerialdojo_gen.scenes.layouts.{module}"
+    counting = {
+        load_recipe(recipe).layout for recipe in RECIPES if name in stage_code(BUILD.name, chosen(recipe)).parts
+    }
+    if users is None:
+        assert {"mall", "harbor", "island"} <= counting
+        assert not {"mountain", "snowfield", "desert", "forest", "courtyard"} & counting
     else:
-        assert changed == stale
+        assert counting == users
 
 
 def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tmp_path):

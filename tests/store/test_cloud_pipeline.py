@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 from aerialdojo_gen.dataset.contents import scenes_there
-from aerialdojo_gen.pipeline.code_digest import PLUMBING
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
@@ -42,10 +41,3 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke
     again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert again.returncode == 0, again.stderr
     assert "nothing to do: all 9 stages are up to date" in again.stderr, again.stderr
-
-
-def test_what_carries_rows_about_makes_nothing_stale():
-    """Only what decides which bytes are written counts as a stage's code; that is no module of the data root."""
-    folder = Path(store.__file__).parent
-    plumbing = {f"aerialdojo_gen.store.{path.stem}" for path in folder.glob("*.py") if path.stem != "__init__"}
-    assert plumbing - set(PLUMBING) == {"aerialdojo_gen.store.memo", "aerialdojo_gen.store.tables"}

@@ -15,7 +15,6 @@ from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.sections import AnchorSampleConfig, PlanConfig, RenderConfig, SplitConfig
-    from aerialdojo_gen.pipeline.code_digest import Choice
     from aerialdojo_gen.pipeline.stage import ProjectPaths
     from aerialdojo_gen.store.root import DataRoot
 
@@ -31,18 +30,16 @@ def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
     ]
 
 
-def layout_of(roots: ProjectPaths, scene: str) -> Choice | None:
-    """Return the layout that a recipe names; None for a malformed recipe, which the stage reports itself."""
-    from aerialdojo_gen.pipeline.code_digest import Choice
-
+def layout_of(roots: ProjectPaths, scene: str) -> tuple[str, ...] | None:
+    """Return the layout's module that a recipe names; None for a malformed recipe, which the stage reports itself."""
     try:
         recipe = _recipe_header(roots.recipes / f"{scene}.toml")
     except (AssetError, OSError, UnicodeDecodeError):
         return None
     if "imported" in recipe:
-        return Choice(layouts.__name__, ())
+        return ()
     module = layouts.layout_modules().get(str(recipe.get("layout")))
-    return Choice(layouts.__name__, (f"{layouts.__name__}.{module}",)) if module else None
+    return (f"{layouts.__name__}.{module}",) if module else None
 
 
 def _recipe_header(path: Path) -> dict[str, Any]:
