@@ -199,7 +199,7 @@ def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(da
     for stage in BEFORE:
         assert hard.section(stage) == paper.section(stage)
     # That release has no counts to be full of: it searches all candidates.
-    assert hard.section("plan") == paper.plan.model_copy(update={"search": "all"})
+    assert hard.section("plan") == paper.plan.model_copy(update={"search": "all", "quota": None})
     assert (hard.seed, hard.embodiment, hard.split.salt) == (paper.seed, paper.embodiment, paper.split.salt)
 
     shutil.rmtree(data / "release")

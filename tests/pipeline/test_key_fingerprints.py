@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig
+from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig, shared_values
 from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
@@ -34,6 +34,8 @@ RELEASED = {("plan", "search"): "released", ("split", "paper_counts"): True}
 def values_of(model, path=()):
     """Each key's path, value and the words that it may have, of a model and the models in it."""
     for name, field in type(model).model_fields.items():
+        if name in shared_values(type(model)):
+            continue
         value, key = getattr(model, name), (*path, field.alias or name)
         if isinstance(value, BaseModel):
             yield from values_of(value, key)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.base.config.sections import FilterConfig, ReleasedPlanConfig
+from aerialdojo_gen.base.config.sections import FilterConfig, QuotaConfig
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, PaperQuota
 from aerialdojo_gen.pipeline.stages.work.quota import difficulty_level, select_quota
 from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.planning.planner import Route
@@ -30,10 +30,10 @@ def scene(seed: int, n: int) -> tuple[Candidates, np.ndarray, np.ndarray]:
     return Candidates("U_Test_0", keys, euclidean, free, visible, predicted), outcome, length
 
 
-def searched(draw: CandidatePolicy, outcome: np.ndarray, length: np.ndarray) -> np.ndarray:
+def searched(draw: PaperQuota, c: Candidates, outcome: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Search in rounds as `plan` does; which candidates were."""
     found: list[Route | None] = [None] * len(length)
-    rows = draw.initial_batch()
+    rows = draw.initial_batch(c)
     while len(rows):
         for k in rows.tolist():
             assert found[k] is None, "searched twice"
@@ -67,10 +67,8 @@ def released(
 def test_what_is_searched_holds_the_papers_numbers_and_metres(seed, margin, longer):
     c, outcome, length = scene(seed, 1500)
     paper = PaperScene("U_Test_0", 1, 20, 120, 90, 25, longer * (120 * 18 + 90 * 45 + 25 * 75))
-    config = ReleasedPlanConfig(
-        search="released", search_margin=margin, kept=FilterConfig(), prefer_harder=PREFERENCE
-    )
-    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
+    config = QuotaConfig(search_margin=margin, prefer_harder=PREFERENCE)
+    which = searched(PaperQuota(paper, config, 200), c, outcome, length)
     keep, setting = kept(c, outcome, length)
     rows = released(c, np.flatnonzero(keep & which), setting, length, paper)
     assert {name: int(np.count_nonzero(setting[rows] == name)) for name in paper.tasks} == paper.tasks
@@ -87,23 +85,23 @@ def test_what_is_searched_holds_the_papers_numbers_and_metres(seed, margin, long
 def test_a_pool_that_is_too_small_is_searched_whole(seed):
     c, outcome, length = scene(seed, 200)
     paper = PaperScene("U_Test_0", 1, 20, 400, 90, 25, 20_000.0)
-    config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=PREFERENCE)
-    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
+    config = QuotaConfig(prefer_harder=PREFERENCE)
+    which = searched(PaperQuota(paper, config, 200), c, outcome, length)
     assert which.tolist() == np.isfinite(c.predicted_m).tolist()
 
 
 def test_rows_in_another_order_are_searched_all_the_same():
     c, outcome, length = scene(5, 800)
     paper = PaperScene("U_Test_0", 1, 20, 60, 60, 9, 5000.0)
-    config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=PREFERENCE)
-    which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
+    config = QuotaConfig(prefer_harder=PREFERENCE)
+    which = searched(PaperQuota(paper, config, 200), c, outcome, length)
     order = np.random.default_rng(0).permutation(800)
     mixed = Candidates(
         c.scene, [c.sampling_keys[k] for k in order], c.euclidean_m[order], c.free_length_m[order], c.visible[order],
         c.predicted_m[order],
     )  # fmt: skip
     assert (
-        searched(CandidatePolicy(mixed, paper, config, 200), outcome[order], length[order]).tolist()
+        searched(PaperQuota(paper, config, 200), mixed, outcome[order], length[order]).tolist()
         == which[order].tolist()
     )
 
@@ -116,10 +114,8 @@ def test_a_few_more_are_kept_than_are_released():
     c = Candidates("U_Test_0", keys, length / 1.2, length / 1.1, np.zeros(n), length)
     for wanted, spare in ((40, 2), (150, 3)):
         paper = PaperScene("U_Test_0", 1, 20, wanted, 0, 0, wanted * 20.0)
-        config = ReleasedPlanConfig(
-            search="released", search_margin=0.02, kept=FilterConfig(), prefer_harder=PREFERENCE
-        )
+        config = QuotaConfig(search_margin=0.02, prefer_harder=PREFERENCE)
         # One in a hundred has no route.
         outcome = np.where(np.arange(n) % 100 == 0, "NO_PATH", "SOLVED")
-        which = searched(CandidatePolicy(c, paper, config, 200), outcome, length)
+        which = searched(PaperQuota(paper, config, 200), c, outcome, length)
         assert np.count_nonzero(which & (outcome == "SOLVED")) >= wanted + spare

@@ -10,16 +10,15 @@ from support.handmade import OPINIONS
 
 from aerialdojo_gen.base.config.sections import (
     Embodiment,
-    FilterConfig,
     PairObjectsConfig,
     PlanConfig,
-    ReleasedPlanConfig,
+    QuotaConfig,
 )
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
-from aerialdojo_gen.pipeline.stages.work import pair_objects, plan
+from aerialdojo_gen.pipeline.stages.work import candidate_policy, pair_objects, plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.context import release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
@@ -166,8 +165,8 @@ RELEASED = PaperScene(SCENE, 1, N_OBJECTS, 12, 3, 0, 330.0)
 @pytest.fixture
 def released(data, monkeypatch):
     def planned(paper: PaperScene, **values) -> tuple[dict, dict]:
-        monkeypatch.setattr(plan, "inventory", lambda: {SCENE: paper})
-        config = ReleasedPlanConfig(search="released", kept=FilterConfig(), prefer_harder=5.0, **values)
+        monkeypatch.setattr(candidate_policy, "inventory", lambda: {SCENE: paper})
+        config = PlanConfig(search="released", quota=QuotaConfig(prefer_harder=5.0, **values))
         out = plan.run(job(data, "plan"), config)
         assert out.rows_in == out.rows_out == store.read_scene(data, "pairs", SCENE).num_rows
         return {r["pair_id"]: r for r in check_table(schemas.PLANS, out.tables["plans"]).to_pylist()}, out.counts

@@ -19,7 +19,7 @@ from aerialdojo_gen.dataset.contents import counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import filter as filter_stage
 from aerialdojo_gen.pipeline.stages.work import split
-from aerialdojo_gen.pipeline.stages.work.selection import train_counts, train_mask
+from aerialdojo_gen.pipeline.stages.work.quota import train_counts, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas

@@ -23,6 +23,8 @@ def schema_keys():
 
     def follow(section, node):
         for name, value in node.get("properties", {}).items():
+            if "shared" in value:
+                continue
             found.add((section, name))
             for option in (value, *value.get("anyOf", ()), *value.get("allOf", ())):
                 many = "items" in option

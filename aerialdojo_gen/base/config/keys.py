@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.config.sections import shared_values
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.explain import model_in
 from aerialdojo_gen.base.names import unknown
@@ -153,6 +154,8 @@ def _keys(
     section: str, model: type[BaseModel], values: BaseModel | None, defaults: BaseModel | None
 ) -> Iterator[Key]:
     for name, field in model.model_fields.items():
+        if name in shared_values(model):
+            continue
         value, default = getattr(values, name, None), getattr(defaults, name, _default(field))
         yield _key(section, name, field, value, default)
         inner = model_in(field.annotation)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer, model_validator
 
 from aerialdojo_gen.base.config.agreement import disagreements
 from aerialdojo_gen.base.config.sections import (
@@ -16,11 +17,12 @@ from aerialdojo_gen.base.config.sections import (
     FilterConfig,
     PairObjectsConfig,
     PlanConfig,
+    QuotaConfig,
     ReferenceImagesConfig,
-    ReleasedPlanConfig,
     RenderConfig,
     Section,
     SplitConfig,
+    shared_values,
 )
 from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.base.explain import explain
@@ -53,22 +55,53 @@ class Pipeline(Section):
 
     @model_validator(mode="after")
     def _sections_agree(self) -> Pipeline:
-        faults = disagreements(self)
+        faults = [*self.fill_shared(), *disagreements(self)]
         if faults:
             raise ValueError("; ".join(faults))
         return self
 
-    def section(self, stage: str) -> Section:
-        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one.
+    @model_serializer(mode="wrap")
+    def _without_shared(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # As in a file: a value stands where it is set.
+        values: dict[str, Any] = dump(self)
+        for attribute, section in self._sections():
+            key = type(self).model_fields[attribute].alias or attribute
+            for name in shared_values(type(section)):
+                values.get(attribute, values.get(key, {})).pop(name, None)
+        return values
 
-        Where `plan` searches what is released, what decides on that is part of its section, so that its shards are
-        stale where that changes.
-        """
+    def _sections(self) -> list[tuple[str, Section]]:
+        return [(name, value) for name, value in self if isinstance(value, Section)]
+
+    def fill_shared(self) -> list[str]:
+        """Give each section the values that it shares; say where one says something else."""
+        faults = []
+        # From the last: the rules of `filter` are complete before they become a part of what `plan` reads.
+        for attribute, section in reversed(self._sections()):
+            paths = shared_values(type(section))
+            values = {name: attrgetter(path)(self) for name, path in paths.items()}
+            for name in values.keys() & section.model_fields_set:
+                if getattr(section, name) != values[name]:
+                    table, _, key = paths[name].partition(".")
+                    faults.append(f"[{attribute.replace('_', '-')}] {name} is set by [{table}] {key}")
+            section = section.model_copy(update=values)
+            section.model_fields_set.difference_update(values)
+            object.__setattr__(self, attribute, section)
+        return faults
+
+    @property
+    def searched_quota(self) -> QuotaConfig | None:
+        """What decides which candidates `plan` searches; None if it searches all."""
+        if self.plan.search == "all":
+            return None
+        return QuotaConfig(
+            search_margin=self.plan.search_margin, prefer_harder=self.split.prefer_harder, rules=self.filter
+        )
+
+    def section(self, stage: str) -> Section:
+        """Return the section of a stage, by the stage's name (``"anchor-sample"``); else an empty one."""
         section = getattr(self, stage.replace("-", "_"), Section())
         assert isinstance(section, Section)
-        if stage == "plan" and self.plan.search == "released":
-            values = self.plan.model_dump() | {"kept": self.filter, "prefer_harder": self.split.prefer_harder}
-            return ReleasedPlanConfig.model_validate(values)
         return section
 
 
@@ -123,11 +156,12 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
     section = getattr(pipeline, stage.replace("-", "_"), Section())
     given = {key: value for key, value in values.items() if value is not None}
     try:
-        changed = type(section).model_validate(section.model_dump() | given)
+        own = section.model_dump(exclude=set(shared_values(type(section))))
+        changed = type(section).model_validate(own | given)
     except ValidationError as error:
         raise ConfigError("; ".join(explain(error, type(section)))) from None
     whole = pipeline.model_copy(update={stage.replace("-", "_"): changed})
-    faults = disagreements(whole)
+    faults = whole.fill_shared() or disagreements(whole)
     if faults:
         raise ConfigError("; ".join(faults))
     return whole

@@ -7,7 +7,7 @@ default, so that a stage can be called as a library function without a file.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -20,6 +20,17 @@ class Section(BaseModel):
     """Base of every section: frozen, and unknown keys are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def shared(path: str, default: Any = None) -> Any:
+    """Declare a value that a stage reads and that is set elsewhere: `Pipeline` takes it from its attribute `path`."""
+    return Field(default, json_schema_extra={"shared": path})
+
+
+def shared_values(section: type[BaseModel]) -> dict[str, str]:
+    """Name the values of a section that are set elsewhere, with the attribute of `Pipeline` that has them."""
+    extras = {name: field.json_schema_extra for name, field in section.model_fields.items()}
+    return {name: str(extra["shared"]) for name, extra in extras.items() if isinstance(extra, dict)}
 
 
 class Embodiment(Section):
@@ -156,6 +167,58 @@ class SearchAttempt(Section):
     extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
 
 
+class Setting(Section):
+    """One length setting (paper: Base, Standard, Long-Horizon)."""
+
+    min_length_m: float = Field(ge=0, description="smallest length that belongs to it")
+    max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
+    action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
+
+    @model_validator(mode="after")
+    def _has_room(self) -> Setting:
+        if self.min_length_m >= self.max_length_m:
+            raise ValueError(
+                f"min_length_m = {self.min_length_m:g} must be less than max_length_m = {self.max_length_m:g}"
+            )
+        return self
+
+
+class FilterConfig(Section):
+    """Which candidates become tasks (paper, section on filtering)."""
+
+    min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
+    min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
+    min_plan_detour: float = Field(
+        1.0, ge=1, le=1000, description="kept: L at least this times the shortest L without obstacles"
+    )
+    max_visible_at_start: float = Field(
+        1.0, ge=0, le=1, description="kept: at most this share of the target in view at the start"
+    )
+    base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
+    standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
+    long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
+
+    @model_validator(mode="after")
+    def _settings_join(self) -> FilterConfig:
+        if (self.base.max_length_m, self.standard.max_length_m) != (
+            self.standard.min_length_m,
+            self.long_horizon.min_length_m,
+        ):
+            raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
+        budgets = (self.base.action_budget, self.standard.action_budget, self.long_horizon.action_budget)
+        if budgets != tuple(sorted(budgets)):
+            raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
+        return self
+
+
+class QuotaConfig(Section):
+    """What decides which candidates are released by the paper's counts; no section of the file, but made of some."""
+
+    search_margin: float = 0.25
+    prefer_harder: float = 0.0
+    rules: FilterConfig = FilterConfig()
+
+
 class PlanConfig(Section):
     """Reference trajectories."""
 
@@ -208,57 +271,7 @@ class PlanConfig(Section):
         max_length=16,
         description="searches tried in turn until FCL accepts what one of them finds",
     )
-
-
-class Setting(Section):
-    """One length setting (paper: Base, Standard, Long-Horizon)."""
-
-    min_length_m: float = Field(ge=0, description="smallest length that belongs to it")
-    max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
-    action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
-
-    @model_validator(mode="after")
-    def _has_room(self) -> Setting:
-        if self.min_length_m >= self.max_length_m:
-            raise ValueError(
-                f"min_length_m = {self.min_length_m:g} must be less than max_length_m = {self.max_length_m:g}"
-            )
-        return self
-
-
-class FilterConfig(Section):
-    """Which candidates become tasks (paper, section on filtering)."""
-
-    min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
-    min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
-    min_plan_detour: float = Field(
-        1.0, ge=1, le=1000, description="kept: L at least this times the shortest L without obstacles"
-    )
-    max_visible_at_start: float = Field(
-        1.0, ge=0, le=1, description="kept: at most this share of the target in view at the start"
-    )
-    base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
-    standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
-    long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
-
-    @model_validator(mode="after")
-    def _settings_join(self) -> FilterConfig:
-        if (self.base.max_length_m, self.standard.max_length_m) != (
-            self.standard.min_length_m,
-            self.long_horizon.min_length_m,
-        ):
-            raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
-        budgets = (self.base.action_budget, self.standard.action_budget, self.long_horizon.action_budget)
-        if budgets != tuple(sorted(budgets)):
-            raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
-        return self
-
-
-class ReleasedPlanConfig(PlanConfig):
-    """`plan` where it searches what is released, with what other sections say of that; no pipeline file sets it."""
-
-    kept: FilterConfig
-    prefer_harder: float
+    quota: QuotaConfig | None = shared("searched_quota")
 
 
 class SplitConfig(Section):
@@ -282,6 +295,11 @@ class SplitConfig(Section):
         0.0, ge=0, le=100,
         description="how much harder candidates are preferred where paper_counts leaves a choice; 0 is not at all",
     )  # fmt: skip
+
+    @property
+    def quota(self) -> QuotaConfig | None:
+        """What decides the last draw; None if all kept candidates are released."""
+        return QuotaConfig(prefer_harder=self.prefer_harder) if self.paper_counts else None
 
 
 # What a profile of recordings sets where nothing else is said.

@@ -91,11 +91,11 @@ def idle_scorers(config: AnchorSampleConfig) -> tuple[str, ...]:
 
 
 def plan_parts(data: DataRoot, scene: str, config: PlanConfig) -> int:
-    """Count a scene's shards: `targets_per_part` targets each, or one if all candidates are selected together."""
-    from aerialdojo_gen.base.paper_figures import inventory
+    """Count a scene's shards: `targets_per_part` targets each, or one if its candidates are compared."""
+    from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
     from aerialdojo_gen.store import shards
 
-    if config.search == "released" and scene in inventory():
+    if policy_of(scene, config.quota, seed=0).compares:
         return 1
     return -(-shards.count_rows(data, "objects", scene) // config.targets_per_part)
 

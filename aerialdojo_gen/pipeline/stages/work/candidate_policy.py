@@ -1,27 +1,37 @@
-"""Which candidates `plan` searches, and in which order, if it searches only as many as a release needs.
+"""Which candidates `plan` searches, batch by batch, and which kept ones `split` releases.
 
-A goal's cost-to-go predicts the lengths of all its routes within a few per cent before any search, and so their
-setting and difficulty, and which of them `split` will select. Those are searched first, until each setting has
-as many routes as are released, plus a margin, so that `split` can select by the true lengths.
+Without a quota that is all of them. For the paper's counts, a goal's cost-to-go predicts the lengths of all its
+routes within a few per cent before any search, and so their setting and difficulty, and which of them will be
+released. Those are searched first, until each setting has as many routes as are released, plus a margin, so that the
+last draw can select by the true lengths.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.sections import ReleasedPlanConfig
+from aerialdojo_gen.base.config.sections import QuotaConfig
 from aerialdojo_gen.base.constants import DETOUR, SETTINGS
-from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.pipeline.stages.work.quota import difficulty_level, rank_candidates, select_quota
+from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
+from aerialdojo_gen.pipeline.stages.work.quota import (
+    difficulty_level,
+    rank_candidates,
+    sampling_key,
+    select_quota,
+    train_counts,
+    train_quotas,
+)
 from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge
-from aerialdojo_gen.pipeline.stages.work.selection import sampling_key
-from aerialdojo_gen.planning.planner import Route
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.planning.planner import Route
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -44,7 +54,7 @@ class Candidates:
     euclidean_m: Floats  # (n,) float64; straight distance, and shortest length without obstacles, metres
     free_length_m: Floats
     visible: Floats  # (n,) float64; share of the target that the start sees
-    predicted_m: Floats  # Length of the cheapest grid path, metres; infinite if there is no path
+    predicted_m: Floats  # Length of the cheapest grid path, metres; infinite if there is no path, or if it is unknown
 
     @classmethod
     def of(cls, pairs: pa.Table, free_length_m: Floats, predicted_m: Floats) -> Candidates:
@@ -60,11 +70,76 @@ class Candidates:
         )
 
 
-class CandidatePolicy:
-    """Selects, batch by batch, which candidates of a scene to search next."""
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """n candidates that the rules keep."""
 
-    def __init__(self, candidates: Candidates, paper: PaperScene, config: ReleasedPlanConfig, seed: int) -> None:
-        self._candidates, self._paper, self._config, self._seed = candidates, paper, config, seed
+    sampling_keys: list[str]  # Keys for random draws
+    settings: list[str]  # Length settings
+    length_m: Floats  # (n,) float64; lengths of the routes, metres
+    levels: Floats | Integers  # (n,) difficulty levels
+
+
+class CandidatePolicy(Protocol):
+    """Selects the candidates of a scene."""
+
+    compares: bool  # Whether it compares all candidates of a scene by predicted lengths, and so needs them at once
+
+    def initial_batch(self, candidates: Candidates) -> Integers:
+        """Rows to search first, (m,) int64, ascending."""
+
+    def next_batch(self, routes: Sequence[Route | None]) -> Integers:
+        """Rows to search next, (m,) int64, ascending; empty if enough are kept. `routes` has a row a candidate."""
+
+    def enough(self, kept: Kept) -> bool:
+        """Whether what is released can be drawn from these."""
+
+    def release(self, kept: Kept) -> NDArray[np.bool_]:
+        """Draw what is released, (n,) bool."""
+
+    def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
+        """Training tasks per setting of the released tasks, of which this fraction trains unless a quota says it."""
+
+
+class AllCandidates:
+    """Searches every candidate, and releases every kept one."""
+
+    compares = False
+
+    def initial_batch(self, candidates: Candidates) -> Integers:
+        """All rows."""
+        return np.arange(len(candidates.sampling_keys))
+
+    def next_batch(self, routes: Sequence[Route | None]) -> Integers:
+        """None: all were in the first batch."""
+        return np.empty(0, np.int64)
+
+    def enough(self, kept: Kept) -> bool:
+        """Whatever there is."""
+        return True
+
+    def release(self, kept: Kept) -> NDArray[np.bool_]:
+        """Release all."""
+        return np.ones(len(kept.settings), dtype=bool)
+
+    def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
+        """Take the same share of each setting."""
+        return train_counts(settings, fraction)
+
+
+class PaperQuota:
+    """Searches and releases as many candidates of a scene as the paper has, as near as possible to its metres."""
+
+    compares = True
+
+    def __init__(self, paper: PaperScene, config: QuotaConfig, seed: int) -> None:
+        self._paper, self._config, self._seed = paper, config, seed
+        self._margin = config.search_margin
+        self._taken = dict.fromkeys(SETTINGS, 0)
+
+    def initial_batch(self, candidates: Candidates) -> Integers:
+        """Rows that are likely to be released, and a margin."""
+        self._candidates = candidates
         n = len(candidates.sampling_keys)
         predicted = candidates.predicted_m
         reason, setting = self._judge(np.where(np.isfinite(predicted), "SOLVED", "NO_PATH"), predicted, np.zeros(n))
@@ -74,15 +149,10 @@ class CandidatePolicy:
         unlikely = np.flatnonzero((reason != KEPT) & np.isfinite(predicted))
         self._order = {name: order[name] for name in SETTINGS}
         self._last = unlikely[np.argsort(predicted[unlikely], kind="stable")]
-        self._taken = dict.fromkeys(SETTINGS, 0)
-        self._margin = config.search_margin
-
-    def initial_batch(self) -> Integers:
-        """Rows of the first batch, (m,) int64, ascending."""
         return self._within_margin()
 
     def next_batch(self, routes: Sequence[Route | None]) -> Integers:
-        """Rows of the next batch, (m,) int64, ascending; empty if enough are kept."""
+        """Rows within a larger margin."""
         searched = [(k, route) for k, route in enumerate(routes) if route is not None]
         done = np.array([k for k, _ in searched], dtype=np.int64)
         outcomes = np.array([route.outcome for _, route in searched], dtype="U24")
@@ -90,7 +160,10 @@ class CandidatePolicy:
         actions = np.array([route.n_actions for _, route in searched])
         reason, setting = self._judge(outcomes, lengths, actions, done)
         kept = reason == KEPT
-        while not self._has_enough(done[kept], setting[kept], lengths[kept]):
+        rows = done[kept]
+        levels = difficulty_level(self._detour(rows, lengths[kept]), self._candidates.visible[rows])
+        kept_rows = self._kept(rows, setting[kept], lengths[kept], levels)
+        while not self.enough(kept_rows):
             self._margin = max(2.0 * self._margin, 0.1)
             rows = self._within_margin()
             if len(rows):
@@ -120,8 +193,8 @@ class CandidatePolicy:
         at = slice(None) if rows is None else rows
         detour = np.maximum(length_m / np.maximum(c.free_length_m[at], 1e-12), 1.0)
         return judge(
-            outcome.astype("U24"), c.euclidean_m[at], length_m, n_actions.astype(np.int32), self._config.kept, detour,
-            c.visible[at],
+            outcome.astype("U24"), c.euclidean_m[at], length_m, n_actions.astype(np.int32), self._config.rules,
+            detour, c.visible[at],
         )  # fmt: skip
 
     def _detour(self, rows: Integers, length_m: Floats) -> Floats:
@@ -131,22 +204,40 @@ class CandidatePolicy:
         # A difficulty level counts by its probability.
         likely = 1.0 / (1.0 + np.exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
         levels = likely + (self._candidates.visible[rows] == 0.0)
-        places = rank_candidates(
-            [self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, self._paper.tasks,
-            self._paper.path_m, self._seed, levels, self._config.prefer_harder,
-        )  # fmt: skip
+        places = self._draw(rank_candidates, self._kept(rows, setting, length_m, levels))
         return {name: rows[place] for name, place in places.items()}
 
-    def _has_enough(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats) -> bool:
-        """Whether `split` can select the paper's counts and total length from these kept candidates."""
+    def _kept(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats, levels: Floats | Integers) -> Kept:
+        return Kept([self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, levels)
+
+    def _draw(self, draw: Callable[..., Any], kept: Kept) -> Any:
+        return draw(
+            kept.sampling_keys, kept.settings, kept.length_m, self._paper.tasks, self._paper.path_m, self._seed,
+            kept.levels, self._config.prefer_harder,
+        )  # fmt: skip
+
+    def enough(self, kept: Kept) -> bool:
+        """Whether the paper's counts and total length can be selected from these."""
+        setting = np.asarray(kept.settings)
         for name, n in self._paper.tasks.items():
             if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_LEAST_SPARE * n)):
                 return False
-        levels = difficulty_level(self._detour(rows, length_m), self._candidates.visible[rows])
-        chosen = select_quota(
-            [self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, self._paper.tasks,
-            self._paper.path_m, self._seed, levels, self._config.prefer_harder,
-        )  # fmt: skip
         # A few tasks cannot match the total length exactly: allow half a route.
         half_a_route = self._paper.path_m / (2 * max(sum(self._paper.tasks.values()), 1))
-        return abs(float(length_m[chosen].sum()) - self._paper.path_m) <= _ON_PATH * self._paper.path_m + half_a_route
+        total = float(kept.length_m[self.release(kept)].sum())
+        return abs(total - self._paper.path_m) <= _ON_PATH * self._paper.path_m + half_a_route
+
+    def release(self, kept: Kept) -> NDArray[np.bool_]:
+        """Draw the paper's counts, with lengths that sum to its metres."""
+        mask: NDArray[np.bool_] = self._draw(select_quota, kept)
+        return mask
+
+    def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
+        """Take the scene's share of the paper's training tasks."""
+        return train_quotas(self._paper.scene, inventory(), splits())
+
+
+def policy_of(scene: str, quota: QuotaConfig | None, seed: int) -> CandidatePolicy:
+    """Make a scene's policy: by the paper's counts if there is a quota and the paper has the scene."""
+    paper = inventory().get(scene) if quota else None
+    return AllCandidates() if quota is None or paper is None else PaperQuota(paper, quota, seed)

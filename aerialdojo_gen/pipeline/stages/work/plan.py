@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,11 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.config.sections import PlanConfig, ReleasedPlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.base.paper_figures import PaperScene, inventory
 from aerialdojo_gen.geometry.frames import wrap_one_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates, policy_of
 from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of, free_lengths_m
 from aerialdojo_gen.planning.planner import Planner, Route
 from aerialdojo_gen.scenes.context import context_of
@@ -38,10 +38,10 @@ def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> lis
 
 
 def run(job: Job, config: PlanConfig) -> Output:
-    """Plan the candidates of a slice of the scene's targets, or as many as the release needs."""
-    paper = paper_scene(job.scene, config)
+    """Plan the candidates of a slice of the scene's targets, or those that the policy selects of the whole scene."""
+    policy = policy_of(job.scene, config.quota, job.seed)
     targets = job.read("objects")["object_id"].to_pylist()
-    if paper is None:
+    if not policy.compares:
         targets = targets_of_part(targets, job.part, config)
     pairs = job.read("pairs")
     pairs = pairs.filter(pc.is_in(pairs["target_object_id"], pa.array(targets, pa.int32()))).sort_by("pair_id")
@@ -49,11 +49,7 @@ def run(job: Job, config: PlanConfig) -> Output:
     planner = None
     if pairs.num_rows:
         planner = _planner(job.scene_model(), config, job.embodiment.radius_m)
-        goals, starts = _ends(job, pairs)
-        if paper is None or not isinstance(config, ReleasedPlanConfig):
-            routes = _by_goal(planner.plan_target, goals, starts, np.arange(pairs.num_rows))
-        else:
-            routes = _released(planner, pairs, goals, starts, paper, config, job.seed)
+        routes = _search(planner, pairs, *_ends(job, pairs), policy)
     counts = Counter(route.outcome for route in routes)
     return Output(
         {"plans": _table(job.scene, pairs["pair_id"].to_pylist(), routes, planner)},
@@ -61,11 +57,6 @@ def run(job: Job, config: PlanConfig) -> Output:
         rows_out=len(routes),
         counts={outcome: counts[outcome] for outcome in OUTCOMES if counts[outcome]},
     )
-
-
-def paper_scene(scene: str, config: PlanConfig) -> PaperScene | None:
-    """Return the paper's row of a scene if only released candidates are searched."""
-    return inventory().get(scene) if config.search == "released" else None
 
 
 def _by_goal(
@@ -81,29 +72,24 @@ def _by_goal(
     return [route for route in found if route is not None]
 
 
-def _released(
-    planner: Planner,
-    pairs: pa.Table,
-    goals: Floats,
-    starts: Floats,
-    paper: PaperScene,
-    config: ReleasedPlanConfig,
-    seed: int,
-) -> list[Route]:
-    """Search the candidates that the release needs; the others get the outcome of the estimate, or NOT_NEEDED."""
-    with planner.keeping_fields(*_FIELDS_MB):
-        routes = _by_goal(planner.estimate_routes, goals, starts, np.arange(pairs.num_rows))
-        open_ = np.array([route.outcome == "NOT_NEEDED" for route in routes])
-        predicted = np.where(open_, [route.cost_to_go_m for route in routes], np.inf)
-        free = free_lengths_m(starts, goals[:, :3], config.max_approach_m)
-        policy = CandidatePolicy(Candidates.of(pairs, free, predicted), paper, config, seed)
-        found: list[Route | None] = [None] * len(routes)
-        rows = policy.initial_batch()
+def _search(planner: Planner, pairs: pa.Table, goals: Floats, starts: Floats, policy: CandidatePolicy) -> list[Route]:
+    """Search the candidates that the policy selects; the others get the outcome of the estimate, or NOT_NEEDED."""
+    n = pairs.num_rows
+    estimates: list[Route] = []
+    found: list[Route | None] = [None] * n
+    predicted = np.full(n, np.inf)
+    with planner.keeping_fields(*_FIELDS_MB) if policy.compares else nullcontext():
+        if policy.compares:
+            estimates = _by_goal(planner.estimate_routes, goals, starts, np.arange(n))
+            open_ = np.array([route.outcome == "NOT_NEEDED" for route in estimates])
+            predicted = np.where(open_, [route.cost_to_go_m for route in estimates], np.inf)
+        free = free_lengths_m(starts, goals[:, :3], planner.config.max_approach_m)
+        rows = policy.initial_batch(Candidates.of(pairs, free, predicted))
         while len(rows):
             for row, route in zip(rows.tolist(), _by_goal(planner.plan_target, goals, starts, rows), strict=True):
                 found[row] = route
             rows = policy.next_batch(found)
-    return [route or foreseen for route, foreseen in zip(found, routes, strict=True)]
+    return [route or estimates[row] for row, route in enumerate(found)]
 
 
 def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:

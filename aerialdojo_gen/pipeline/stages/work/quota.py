@@ -1,8 +1,10 @@
-"""Selection by the paper's counts: which kept candidates are released, and how many of them train."""
+"""Random draws by key: which kept candidates are released by the paper's counts, and which of them train."""
 
 from __future__ import annotations
 
+import hashlib
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -143,3 +145,25 @@ def _score(
 def _gumbel(seed: int, key: str) -> float:
     uniform = (rank(seed, "quota", key) + 0.5) / 2**64
     return -math.log(-math.log(uniform))
+
+
+def sampling_key(scene: str, pair_id: str) -> str:
+    """A candidate's key for random draws; it depends on the pair alone, so that the salt changes no selection."""
+    return f"{scene}-{hashlib.blake2b(f'{scene}/{pair_id}'.encode(), digest_size=6).hexdigest()}"
+
+
+def train_counts(settings: Sequence[str], fraction: float) -> dict[str, int]:
+    """Training tasks per setting: the same share of each, rounded half up."""
+    return {setting: int(fraction * n + 0.5) for setting, n in Counter(settings).items()}
+
+
+def train_mask(
+    keys: Sequence[str], settings: Sequence[str], trains: Mapping[str, int], seed: int
+) -> NDArray[np.bool_]:
+    """Training mask (n,) bool; it depends on the seed and a task's key, not on its row."""
+    mask = np.zeros(len(keys), dtype=bool)
+    for setting, n in trains.items():
+        rows = [i for i, s in enumerate(settings) if s == setting]
+        rows.sort(key=lambda i: rank(seed, "split", keys[i]))
+        mask[rows[:n]] = True
+    return mask

@@ -10,10 +10,9 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import SplitConfig
-from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.pipeline.stages.work import quota
-from aerialdojo_gen.pipeline.stages.work.selection import sampling_key, train_counts, train_mask
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import Kept, policy_of
+from aerialdojo_gen.pipeline.stages.work.quota import difficulty_level, sampling_key, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
@@ -108,20 +107,16 @@ def tasks_table(
     return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
 
 
-def _select_routes(routes: pa.Table, paper: PaperScene, seed: int, preference: float) -> NDArray[np.bool_]:
+def _kept(routes: pa.Table) -> Kept:
     detour, visible = (
         routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
         for name in ("plan_detour", "target_visible_at_start")
     )
-    return quota.select_quota(
+    return Kept(
         routes.column("sampling_key").to_pylist(),
         routes.column("setting").to_pylist(),
         routes.column("length_m").to_numpy(),
-        paper.tasks,
-        paper.path_m,
-        seed,
-        quota.difficulty_level(detour, visible),
-        preference,
+        difficulty_level(detour, visible),
     )
 
 
@@ -149,13 +144,10 @@ def run(job: Job, config: SplitConfig) -> Output:
     named = pictured.drop_columns("reference_image").append_column(
         "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
     )
-    paper = inventory().get(job.scene) if config.paper_counts else None
-    if paper is not None:
-        routes = routes.filter(pa.array(_select_routes(routes, paper, job.seed, config.prefer_harder)))
-        trains = quota.train_quotas(job.scene, inventory(), splits())
-    else:
-        fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
-        trains = train_counts(routes.column("setting").to_pylist(), fraction)
+    policy = policy_of(job.scene, config.quota, job.seed)
+    routes = routes.filter(pa.array(policy.release(_kept(routes))))
+    fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
+    trains = policy.train_counts(routes.column("setting").to_pylist(), fraction)
     train = train_mask(
         routes.column("sampling_key").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed
     )
