@@ -207,7 +207,11 @@ def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(da
     more = "[filter]\nmin_plan_detour = 1.05\nmax_visible_at_start = 0.0\n"
     split(data, pipeline("hard", (A, B), more))
     assert times(data / "plans") | times(data / "pairs") == before
-    verdicts = pd.read_parquet(data / "verdicts")
+    verdicts, plans, pairs = (pd.read_parquet(data / name) for name in ("verdicts", "plans", "pairs"))
+    key = ["scene", "pair_id"]
+    verdicts = verdicts.merge(plans[[*key, "plan_detour"]], on=key).merge(
+        pairs[[*key, "target_visible_at_start"]], on=key
+    )
     allowed = (verdicts["plan_detour"] >= 1.05) & (verdicts["target_visible_at_start"] == 0.0)
     assert set(verdicts["reason"]) >= {"kept", "small_plan_detour", "target_in_view"}
     assert not verdicts["keep"][~allowed].any()

@@ -5,7 +5,6 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,6 +17,7 @@ from aerialdojo_gen.pipeline.stages.work.quota import apportion, difficulty_leve
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.tables import from_rows
 from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -161,34 +161,30 @@ def test_the_ids_of_pictures_do_not_tell_which_objects_are_held_out():
     assert len(held_out("U_A_0", range(200), 0.2, key) & set(by_id[:40])) < 20
 
 
-def verdicts(data, scene, kept):
-    rows = []
-    for setting, n in kept.items():
+def judged(data, scene, kept):
+    """Write the plans and verdicts of a scene with so many kept candidates of each setting."""
+    plans, verdicts = [], []
+    for setting, n in sorted(kept.items()):
         low, high = SETTINGS[setting]
         for k in range(n):
-            length = low + (high - low) * (k + 0.5) / n
-            rows.append(
-                {
-                    "scene": scene,
-                    "pair_id": f"{setting}_{k:05}",
-                    "euclidean_m": length / 1.1,
-                    "length_m": length,
-                    "detour_ratio": 1.1,
-                    "n_actions": 9,
-                    "keep": True,
-                    "reason": "kept",
-                    "setting": setting,
-                    "action_budget": 90,
-                }
-            )
-    rows.sort(key=lambda row: row["pair_id"])
-    table = pa.Table.from_pylist(rows, schema=schemas.VERDICTS.schema)
-    store.write_shard(data, "verdicts", scene, 0, table)
+            key = {"scene": scene, "pair_id": f"{setting}_{k:05}"}
+            plan = dict.fromkeys(schemas.PLANS.schema.names) | {
+                "outcome": "SOLVED",
+                "length_m": low + (high - low) * (k + 0.5) / n,
+                "n_actions": 9,
+                "expansions": 0,
+                "min_clearance_m": 1.0,
+                **{name: [0] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")},
+            }
+            plans.append(plan | key)
+            verdicts.append(key | {"keep": True, "reason": "kept", "setting": setting, "action_budget": 90})
+    for name, rows in (("plans", plans), ("verdicts", verdicts)):
+        store.write_shard(data, name, scene, 0, from_rows(store.LAYOUT[name].spec, rows))
 
 
 def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
-    verdicts(tmp_path, "D_Flood_1", {"base": 150, "standard": 94, "long_horizon": 5})
-    verdicts(tmp_path, "U_Park_0", {"base": 173, "standard": 45, "long_horizon": 3})
+    judged(tmp_path, "D_Flood_1", {"base": 150, "standard": 94, "long_horizon": 5})
+    judged(tmp_path, "U_Park_0", {"base": 173, "standard": 45, "long_horizon": 3})
     with pytest.raises(PoolError) as error:
         require_pools(tmp_path, ["D_Flood_1", "U_Park_0"])
     lines = str(error.value).splitlines()

@@ -208,17 +208,15 @@ def test_the_split_by_objects_keeps_both_ends_out_of_training(data):
     assert 0 < train.sum() < len(tasks)
 
 
-def test_difficulty_goes_from_plans_and_pairs_to_verdicts_and_routes(data):
+def test_difficulty_goes_from_plans_and_pairs_to_routes(data):
     told = ["free_length_m", "plan_detour", "straight_line_free", "climb_m"]
     seen = ["target_visible_at_start", "visible_view_at_start"]
     pairs, plans = (pd.read_parquet(data / name).set_index("pair_id") for name in ("pairs", "plans"))
-    verdicts = pd.read_parquet(data / "verdicts").set_index("pair_id")
-    pd.testing.assert_frame_equal(verdicts[told], plans[told].loc[verdicts.index])
-    pd.testing.assert_frame_equal(verdicts[seen], pairs[seen].loc[verdicts.index])
+    figures = pairs[seen].join(plans[told])
     ends = ["start_object_id", "start_anchor_id", "target_object_id"]
     for row in load(data, "routes").itertuples():
         pair = "{}_{}__{}".format(*(getattr(row, name) for name in ends))
-        own = verdicts.loc[pair]
+        own = figures.loc[pair]
         assert all(getattr(row, name) == own[name] for name in (*told, seen[0]))
         assert [row.visible_view_at_start == "down", own["visible_view_at_start"] == "down"] == [
             row.target_visible_at_start > 0
@@ -227,10 +225,15 @@ def test_difficulty_goes_from_plans_and_pairs_to_verdicts_and_routes(data):
 
 
 def test_verdicts_are_judged_by_each_candidates_own_figures(data):
-    verdicts = pd.read_parquet(data / "verdicts").set_index("pair_id")
-    assert np.allclose(verdicts["detour_ratio"], verdicts["length_m"] / verdicts["euclidean_m"], atol=1e-12)
-    paper, roots = verdicts[verdicts["keep"]], ProjectPaths(data, data, data, data)
-    assert paper["detour_ratio"].min() >= 1.05
+    verdicts, pairs, plans = (
+        pd.read_parquet(data / name).set_index("pair_id") for name in ("verdicts", "pairs", "plans")
+    )
+    assert not set(verdicts) & (set(pairs) | set(plans)) - {"scene"}
+    figures = pairs[["euclidean_m", "target_visible_at_start"]].join(plans[["length_m", "plan_detour"]])
+    paper, roots = figures.loc[verdicts.index[verdicts["keep"]]], ProjectPaths(data, data, data, data)
+    assert (paper["length_m"] / paper["euclidean_m"]).min() >= 1.05
+    routes = load(data, "routes")
+    assert np.allclose(routes["detour_ratio"], routes["length_m"] / routes["euclidean_m"], atol=1e-12)
     job = Job("filter", SCENE, 0, 1, 0, Embodiment(), roots)
     for rule, kept in (
         ({"max_visible_at_start": 0.25}, paper["target_visible_at_start"] <= 0.25),

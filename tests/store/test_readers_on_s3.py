@@ -30,7 +30,7 @@ _BLIND = Sensors(views=())
 def uploaded(cloud: str, smoke: Path) -> str:
     """The smoke run's release and meshes, and what filter kept, in a bucket."""
     root = open_root(cloud)
-    for folder in ("release", "meshes", "verdicts"):
+    for folder in ("release", "meshes", "plans", "verdicts"):
         for path in sorted((smoke / folder).rglob("*")):
             if path.is_file():
                 with root.commit(path.relative_to(smoke).as_posix()) as copy:

@@ -7,7 +7,6 @@ import pyarrow as pa
 from aerialdojo_gen.store.schemas.columns import (
     AGENT_ACTION,
     CLEARANCE,
-    DETOUR,
     DIFFICULTY,
     EUCLIDEAN,
     LISTS,
@@ -172,16 +171,11 @@ PLANS = table(
     command="plan",
 )  # fmt: skip
 
+# What candidates are stands in `pairs`, and their routes' figures in `plans`, by the same key.
 VERDICTS = table(
     "verdicts", ["scene", "pair_id"],
     SCENE,
     column("pair_id", pa.string(), "candidate task"),
-    EUCLIDEAN,
-    column("length_m", pa.float64(), "length of the planned route", "m", True),
-    column("detour_ratio", pa.float64(), DETOUR, nullable=True),
-    column("n_actions", pa.int32(), "number of actions, Stop included", nullable=True),
-    *DIFFICULTY,
-    *START_VIEW,
     column("keep", pa.bool_(), "whether the candidate becomes a task"),
     column("reason", pa.string(), "kept, or why not: a stable word"),
     column("setting", pa.string(), "length setting, null where the length fits none", nullable=True),

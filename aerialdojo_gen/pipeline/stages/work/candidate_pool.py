@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pyarrow.compute as pc
 
 from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory
@@ -45,7 +46,9 @@ def pool_of(root: Where, scene: str) -> Pool:
     verdicts = store.read_scene(root, "verdicts", scene)
     keep = verdicts["keep"].to_numpy(zero_copy_only=False)
     setting = np.asarray(verdicts["setting"].to_pylist(), dtype=object)
-    length = verdicts["length_m"].to_numpy(zero_copy_only=False)
+    plans = store.read_scene(root, "plans", scene, ["pair_id", "length_m"])
+    rows = pc.index_in(verdicts["pair_id"], value_set=plans["pair_id"].combine_chunks())
+    length = plans["length_m"].take(rows).to_numpy()
     lengths = {s: np.sort(length[keep & (setting == s)]) for s in SETTINGS}
     paper = inventory().get(scene)
     path = None

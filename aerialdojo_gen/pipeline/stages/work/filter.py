@@ -16,7 +16,6 @@ from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge, settings_of
 from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, SETTINGS, VERDICTS
-from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 
 def _stops(plans: pa.Table) -> NDArray[np.float64]:
@@ -44,11 +43,10 @@ def run(job: Job, config: FilterConfig) -> Output:
     And then by what its agent sees at the end (``"target_hidden"``).
     """
     pairs = job.read("pairs")
-    difficulty_names = [field.name for field in DIFFICULTY]
     flown = ["x_m", "y_m", "z_m", "action"]
     plans = (
         job.read("plans")
-        .select(["pair_id", "outcome", "length_m", "n_actions", *difficulty_names, *flown])
+        .select(["pair_id", "outcome", "length_m", "n_actions", "plan_detour", *flown])
         .sort_by("pair_id")
     )
     if not plans.column("pair_id").combine_chunks().equals(pairs.column("pair_id").combine_chunks()):
@@ -66,19 +64,12 @@ def run(job: Job, config: FilterConfig) -> Output:
     reason, setting = judge(outcome, euclidean, length, n_actions, config, detour, visible)
     fit = np.flatnonzero(reason == KEPT)
     reason[fit[_hidden_at_stop(job, plans.take(fit), pairs.take(fit))]] = "target_hidden"
-    solved = outcome == "SOLVED"
     budgets = {name: rule.action_budget for name, rule in zip(SETTINGS, settings_of(config), strict=True)}
     n = len(outcome)
     table = pa.table(
         {
             "scene": pa.array([job.scene] * n, pa.string()),
             "pair_id": pairs.column("pair_id"),
-            "euclidean_m": euclidean,
-            "length_m": pa.array(length, mask=~solved),
-            "detour_ratio": pa.array(length / np.maximum(euclidean, 1e-12), mask=~solved),
-            "n_actions": pa.array(n_actions, pa.int32(), mask=~solved),
-            **{name: plans.column(name) for name in difficulty_names},
-            **{field.name: pairs.column(field.name) for field in START_VIEW},
             "keep": reason == KEPT,
             "reason": pa.array(reason.tolist(), pa.string()),
             "setting": pa.array([s or None for s in setting.tolist()], pa.string()),

@@ -47,8 +47,9 @@ def routes_table(
         "setting": kept.column("setting"),
         **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
         **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
-        **{name: kept.column(name) for name in ("euclidean_m", "length_m", "detour_ratio", "n_actions")},
-        **{field.name: kept.column(field.name) for field in (*DIFFICULTY, *START_VIEW)},
+        **{name: pairs.column(name) for name in ("euclidean_m", *(field.name for field in START_VIEW))},
+        "detour_ratio": pc.divide(plans.column("length_m"), pc.max_element_wise(pairs.column("euclidean_m"), 1e-12)),
+        **{name: plans.column(name) for name in ("length_m", "n_actions", *(field.name for field in DIFFICULTY))},
         **{name: plans.column(name) for name in ("min_clearance_m", *_LISTS, "agent_action")},
     }
     routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
