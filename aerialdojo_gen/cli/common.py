@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -25,7 +26,7 @@ from aerialdojo_gen.dataset.build import (
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
-    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.store.root import Where
 
@@ -145,14 +146,10 @@ def run_until(
     data: Where,
     scene: list[str] | None = None,
     pipeline: Path | None = None,
-    workers: int | None = None,
+    options: RunOptions,
     force: bool = False,
     quiet: bool = False,
     verbose: bool = False,
-    limits: Limits | None = None,
-    replace: bool = False,
-    executor: str = "local",
-    address: str | None = None,
     **overrides: object,
 ) -> None:
     """Bring a stage's tables up to date, running what it needs upstream; the twin of a stage's command."""
@@ -161,10 +158,8 @@ def run_until(
 
     config, roots = open_pipeline(pipeline, data)
     config = with_overrides(config, stage, **overrides)
-    run_chosen(
-        list(upstream(stage)), config, roots, scene, workers, [stage] if force else [], quiet, limits, replace,
-        executor, address, verbose,
-    )  # fmt: skip
+    options = replace(options, force=frozenset({stage} if force else ()))
+    run_chosen(list(upstream(stage)), config, roots, scene, options, quiet, verbose)
 
 
 def run_chosen(
@@ -172,13 +167,8 @@ def run_chosen(
     config: Pipeline,
     roots: ProjectPaths,
     scene: list[str] | None,
-    workers: int | None,
-    force: list[str],
+    options: RunOptions,
     quiet: bool,
-    limits: Limits | None = None,
-    replace: bool = False,
-    executor: str = "local",
-    address: str | None = None,
     verbose: bool = False,
 ) -> None:
     """Run stages with progress (`aerialdojo_gen.dataset.build.run_stages`), and say what an error or Ctrl-C left."""
@@ -186,13 +176,11 @@ def run_chosen(
     from aerialdojo_gen.pipeline.progress import Reporter
 
     kept = "finished shards are kept, " + (
-        "and --force computes them again" if force else "the same command continues from where it stopped"
+        "and --force computes them again" if options.force else "the same command continues from where it stopped"
     )
     try:
-        run_stages(
-            stages, config, roots, scene, workers=workers, executor=executor, address=address, force=force,
-            reporter=Reporter(quiet=quiet, verbose=verbose), limits=limits, replace=replace,
-        )  # fmt: skip
+        reporter = Reporter(quiet=quiet, verbose=verbose)
+        run_stages(stages, config, roots, scene, options=options, reporter=reporter)
     except KeyboardInterrupt:
         # Said here because Typer turns Ctrl-C into a silent exit.
         print(f"interrupted: {kept}", file=sys.stderr)

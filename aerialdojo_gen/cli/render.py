@@ -75,13 +75,13 @@ def render(
     executor: ExecutorName = "local", address: Address = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
-    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
 
     scene = merge_scenes(scenes, scene)
     if prune:
         _prune(data, scene)
         return
-    limits = Limits(
+    limits = RunLimits(
         share_of(shard) if shard else (0, 1), time.time() + duration_s(budget) if budget else None, verify
     )
     overrides: dict[str, object] = {
@@ -95,8 +95,8 @@ def render(
         raise UsageError("--json goes with --estimate: what was recorded stands in the tables recordings and frames")
     chosen = _scenes_of(split, scene, pipeline, data)
     run_until(
-        "render", data=data, scene=chosen, pipeline=pipeline, workers=workers, force=force, quiet=quiet,
-        verbose=verbose, limits=limits, replace=replace, executor=executor, address=address, **overrides,
+        "render", data=data, scene=chosen, pipeline=pipeline, force=force, quiet=quiet, verbose=verbose,
+        options=RunOptions(workers, executor, address, replace=replace, limits=limits), **overrides,
     )  # fmt: skip
 
 

@@ -29,6 +29,7 @@ from aerialdojo_gen.cli.common import (
     run_chosen,
     run_until,
 )
+from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
 app = typer.Typer()
@@ -44,8 +45,8 @@ def _stage_command(name: str) -> Callable[..., None]:
         executor: ExecutorName = "local", address: Address = None,
     ) -> None:  # fmt: skip
         run_until(
-            name, data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
-            quiet=quiet, verbose=verbose, executor=executor, address=address,
+            name, data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, force=force, quiet=quiet,
+            verbose=verbose, options=RunOptions(workers, executor, address),
         )  # fmt: skip
 
     return command
@@ -67,8 +68,8 @@ def plan(
 ) -> None:  # fmt: skip
     """Plan reference trajectories, with what they need upstream."""
     run_until(
-        "plan", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
-        quiet=quiet, verbose=verbose, executor=executor, address=address, search="all" if every else None,
+        "plan", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, force=force, quiet=quiet,
+        verbose=verbose, options=RunOptions(workers, executor, address), search="all" if every else None,
     )  # fmt: skip
 
 
@@ -81,8 +82,8 @@ def split(
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
     run_until(
-        "split", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, workers=workers, force=force,
-        quiet=quiet, verbose=verbose, replace=replace, executor=executor, address=address,
+        "split", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, force=force, quiet=quiet,
+        verbose=verbose, options=RunOptions(workers, executor, address, replace=replace),
     )  # fmt: skip
 
 
@@ -115,20 +116,9 @@ def run(
 
     config, roots = open_pipeline(pipeline, data)
     stages = stages_named(config.stages)
-    forced = [stage.name for stage in stages] if force else []
-    run_chosen(
-        stages,
-        config,
-        roots,
-        merge_scenes(scenes, scene),
-        workers,
-        forced,
-        quiet,
-        replace=replace,
-        executor=executor,
-        address=address,
-        verbose=verbose,
-    )
+    forced = frozenset(stage.name for stage in stages if force)
+    options = RunOptions(workers, executor, address, forced, replace)
+    run_chosen(stages, config, roots, merge_scenes(scenes, scene), options, quiet, verbose)
     if stats:
         from aerialdojo_gen.cli import release
 

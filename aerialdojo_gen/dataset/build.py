@@ -19,7 +19,7 @@ from aerialdojo_gen.base.shipped import home
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
-    from aerialdojo_gen.pipeline.freshness import Limits
+    from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.pipeline.summary import StageSummary
@@ -41,7 +41,6 @@ def run_pipeline(
     address: str | None = None,
     force: Iterable[str] = (),
     replace: bool = False,
-    limits: Limits | None = None,
     reporter: Reporter | None = None,
 ) -> list[StageSummary]:
     """Bring the tables of a pipeline up to date; the twin of ``aerialdojo-gen run`` and of the stages' commands.
@@ -68,8 +67,6 @@ def run_pipeline(
         Stages whose shards are computed even where they are fresh.
     replace : bool
         Whether scenes of the release that another pipeline made may be lost.
-    limits : Limits, optional
-        How much of the last stage is computed now; all of it where absent.
     reporter : Reporter, optional
         Shows progress and summaries; nothing is shown where absent.
 
@@ -83,6 +80,7 @@ def run_pipeline(
     AerialDojoError
         An expected failure, in one line that names the thing and the mend; finished shards stay.
     """
+    from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.registry import upstream
     from aerialdojo_gen.pipeline.runner import stages_named
 
@@ -96,10 +94,8 @@ def run_pipeline(
     given = replaced(given, pipeline=str(pipeline) if isinstance(pipeline, (str, Path)) else given.pipeline)
     given = replaced(given, data=str(data) if isinstance(data, (str, Path)) and str(data) != "data" else given.data)
     with cli_context.use_context(given):
-        return run_stages(
-            chosen, config, roots, scenes, workers=workers, executor=executor, address=address, force=force,
-            reporter=reporter, limits=limits, replace=replace,
-        )  # fmt: skip
+        options = RunOptions(workers, executor, address, frozenset(force), replace)
+        return run_stages(chosen, config, roots, scenes, options=options, reporter=reporter)
 
 
 def pipeline_file(given: str | Path | None = None) -> Path:
@@ -215,19 +211,14 @@ def run_stages(
     roots: ProjectPaths,
     scenes: Sequence[str] | None = None,
     *,
-    workers: int | None = None,
-    executor: str = "local",
-    address: str | None = None,
-    force: Iterable[str] = (),
+    options: RunOptions | None = None,
     reporter: Reporter | None = None,
-    limits: Limits | None = None,
-    replace: bool = False,
 ) -> list[StageSummary]:
     """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date.
 
     A scene without annotations is left out, with a warning that names the mend; the others are finished.
 
-    Parameters as for `run_pipeline`; `scenes` are names or globs, the pipeline's own where absent.
+    `scenes` are names or globs, the pipeline's own where absent.
 
     Raises
     ------
@@ -240,10 +231,11 @@ def run_stages(
     from aerialdojo_gen.dataset.provenance import check_replaced
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.pipeline.freshness import cache_footers
+    from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.store.footer_cache import cached_footers
 
-    reporter = reporter or Reporter(quiet=True)
+    options, reporter = options or RunOptions(), reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)
     releases = any(stage.name == "split" for stage in stages)
     left_out = runner.scenes_missing_input(stages, names, roots)
@@ -252,7 +244,7 @@ def run_stages(
     ready = [name for name in names if name not in left_out]
 
     def prepare() -> None:
-        if releases and not replace:
+        if releases and not options.replace:
             check_replaced(roots.data, config, names, whole=not scenes)
 
     def finish() -> None:
@@ -261,8 +253,7 @@ def run_stages(
 
     with cached_footers(roots.data):
         summaries = runner.run(
-            stages, names, config, roots, workers=workers, executor=executor, address=address, force=force,
-            reporter=reporter, limits=limits, prepare=prepare, finish=finish,
+            stages, names, config, roots, options=options, reporter=reporter, prepare=prepare, finish=finish,
         )  # fmt: skip
         if any(summary.computed for summary in summaries):
             cache_footers(stages, ready, roots)

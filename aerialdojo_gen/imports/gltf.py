@@ -80,9 +80,9 @@ class _File:
 
     def _primitive(self, primitive: dict[str, Any], name: str, world: Floats) -> RawNode:
         attributes = primitive["attributes"]
-        local = self._array(attributes["POSITION"]).astype(np.float64)
+        local = self._attribute(attributes, "POSITION", 3)
         with np.errstate(invalid="ignore", over="ignore"):
-            vertices = local[:, :3] @ world[:3, :3].T + world[:3, 3]
+            vertices = local @ world[:3, :3].T + world[:3, 3]
         faces = self._faces(primitive, len(vertices))
         if np.linalg.det(world[:3, :3]) < 0:
             faces = faces[:, ::-1]
@@ -95,11 +95,11 @@ class _File:
         if material is not None:
             shown = self._surfaces[self._index[material]]
             colours = np.tile(np.array(shown.colour, dtype=np.uint8), (m, 1))
-            uv = self._texture_coordinates(self._document["materials"][material], attributes)
+            uv = self._texture_coordinates(self._document["materials"][material], attributes, len(vertices))
             if shown.texture is not None and uv is not None:
                 corners[..., :2] = uv[faces]
         if "COLOR_0" in attributes:
-            light = self._array(attributes["COLOR_0"])[:, :3].astype(np.float64)
+            light = self._attribute(attributes, "COLOR_0", 3, len(vertices))
             factor = self._factor(material)
             if factor is not None:
                 light = light * factor
@@ -135,7 +135,7 @@ class _File:
         return out
 
     def _texture_coordinates(
-        self, material: dict[str, Any], attributes: dict[str, int]
+        self, material: dict[str, Any], attributes: dict[str, int], n: int
     ) -> NDArray[np.float32] | None:
         source = _base_colour(material)[1]
         if source is None:
@@ -144,7 +144,7 @@ class _File:
         which = f"TEXCOORD_{moved.get('texCoord', source.get('texCoord', 0))}"
         if which not in attributes:
             return None
-        uv = self._array(attributes[which])[:, :2].astype(np.float64)
+        uv = self._attribute(attributes, which, 2, n)
         if moved:
             angle = float(moved.get("rotation", 0.0))
             c, s = np.cos(angle), np.sin(angle)
@@ -187,6 +187,15 @@ class _File:
         if uri.startswith("data:"):
             return base64.b64decode(uri.split(",", 1)[1])
         return self._resolve(unquote(uri))
+
+    def _attribute(self, attributes: dict[str, int], name: str, width: int, n: int | None = None) -> Floats:
+        """Return the first `width` numbers of an attribute of `n` vertices."""
+        values = self._array(attributes[name])
+        if values.shape[1] < width or (n is not None and len(values) != n):
+            raise AssetError(
+                f"is a damaged glTF file: {name} has {values.shape[1]} numbers for {len(values)} vertices"
+            )
+        return values[:, :width].astype(np.float64)
 
     def _array(self, accessor: int) -> NDArray[Any]:
         """Return an accessor's values, (n, width); normalised integers as 0-1."""

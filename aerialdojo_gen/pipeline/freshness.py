@@ -7,28 +7,21 @@ matches.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.environment_errors import check_memory
 from aerialdojo_gen.base.errors import AerialDojoError, DamagedFile
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
+from aerialdojo_gen.pipeline.options import RunLimits
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths, Stage
 from aerialdojo_gen.pipeline.task import Task
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-
-
-@dataclass(frozen=True)
-class Limits:
-    """How much of a stage to compute now, and whether to verify files; repeating the command does the rest."""
-
-    share: tuple[int, int] = (0, 1)  # (int, int)
-    deadline: float | None = None  # Seconds since the epoch after which no task starts
-    verify: bool = False  # Compare the files' digests, not only their sizes
 
 
 @dataclass(frozen=True)
@@ -45,45 +38,75 @@ class Shards:
         return not self.tasks and not self.errors
 
 
-def shards_of(
-    stage: Stage,
-    config: Section,
-    scenes: Sequence[str],
-    pipeline: Pipeline,
-    roots: ProjectPaths,
-    force: bool,
-    reporter: Reporter,
-    limits: Limits,
-) -> Shards:
-    """Find which of a stage's shards are fresh, and remove surplus shards."""
-    pipeline = pipeline.model_copy(update={stage.name.replace("-", "_"): config})
-    found = Shards([], [], {})
-    shard = -1
-    for scene in scenes:
-        try:
-            fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
-            parts = stage.parts(roots.data, scene, config)
-        except AerialDojoError as error:
-            found.errors[scene] = error
-            continue
-        for table in stage.writes:
-            store.prune(roots.data, table, scene, parts)
-        for part in range(parts):
-            shard += 1
-            if shard % limits.share[1] != limits.share[0]:
+class ShardFinder:
+    """Finds the shards that a run must compute, under one resolved configuration a stage."""
+
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        roots: ProjectPaths,
+        scenes: Sequence[str],
+        reporter: Reporter,
+        force: Collection[str] = (),
+        limits: RunLimits | None = None,
+    ) -> None:
+        self._pipeline, self._roots, self._scenes, self._reporter = pipeline, roots, scenes, reporter
+        self._force, self._limits = force, limits or RunLimits()
+        self._configs: dict[str, Section] = {}
+
+    def find(self, stage: Stage, scenes: Sequence[str]) -> Shards:
+        """Find the stale shards of some scenes; raises the stage's `check` of all scenes if there are any."""
+        if stage.name not in self._configs:
+            section = self._pipeline.section(stage.name)
+            # Resolving takes time: skip it while everything is fresh under one of the possible results.
+            try_choices = stage.name not in self._force and len(scenes) == len(self._scenes)
+            for choice in stage.choices(section) if try_choices else ():
+                found = self._shards(stage, choice, scenes, Reporter(quiet=True))
+                if found.all_fresh:
+                    self._configs[stage.name] = choice
+                    return found
+            self._configs[stage.name] = stage.resolve_config(section, self._reporter.line)
+        config = self._configs[stage.name]
+        found = self._shards(stage, config, scenes, self._reporter)
+        if found.tasks:
+            check_memory(stage.name)
+            stage.check(self._roots.data, self._scenes, config)
+        return found
+
+    def _shards(self, stage: Stage, config: Section, scenes: Sequence[str], reporter: Reporter) -> Shards:
+        """Find which of a stage's shards are fresh under a configuration, and remove surplus shards."""
+        roots, limits, force = self._roots, self._limits, stage.name in self._force
+        pipeline = self._pipeline.model_copy(update={stage.name.replace("-", "_"): config})
+        found = Shards([], [], {})
+        number, shares = limits.share
+        shard = -1
+        for scene in scenes:
+            try:
+                fingerprint = scene_fingerprint(stage, pipeline, roots, scene)
+                parts = stage.parts(roots.data, scene, config)
+            except AerialDojoError as error:
+                found.errors[scene] = error
                 continue
-            shard_at = (stage, roots.data, scene, part)
-            summary = None if force else _fresh(*shard_at, parts, fingerprint, reporter)
-            if summary is not None and limits.verify and not _verified(*shard_at, reporter):
-                summary = None
-            if summary is not None:
-                found.fresh.append(summary)
-            else:
-                bare_job = Job(stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots)
+            for table in stage.writes:
+                store.prune(roots.data, table, scene, parts)
+            for part in range(parts):
+                shard += 1
+                if shard % shares != number:
+                    continue
+                shard_at = (stage, roots.data, scene, part)
+                summary = None if force else _fresh(*shard_at, parts, fingerprint, reporter)
+                if summary is not None and limits.verify and not _verified(*shard_at, reporter):
+                    summary = None
+                if summary is not None:
+                    found.fresh.append(summary)
+                    continue
                 code = scene_code(stage, roots, scene, config).digest
-                job = replace(bare_job, deadline=limits.deadline, force=force, verify=limits.verify, code=code)
+                job = Job(
+                    stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots,
+                    deadline=limits.deadline, force=force, verify=limits.verify, code=code,
+                )  # fmt: skip
                 found.tasks.append(Task(job, config, fingerprint))
-    return found
+        return found
 
 
 def is_fresh(stage: Stage, config: Section, scene: str, pipeline: Pipeline, roots: ProjectPaths) -> bool:

@@ -7,20 +7,21 @@ tables do not depend on the number of workers, their order, or kills.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, BudgetSpent, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
-from aerialdojo_gen.pipeline.chain import SceneScheduler
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
-from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
-from aerialdojo_gen.pipeline.freshness import Limits, prefetch_digests
+from aerialdojo_gen.pipeline.freshness import ShardFinder, prefetch_digests
 from aerialdojo_gen.pipeline.interrupt import Interrupts
+from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
+from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
+from aerialdojo_gen.pipeline.scheduler import SceneScheduler
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, compute
@@ -35,21 +36,17 @@ def run(
     pipeline: Pipeline,
     roots: ProjectPaths,
     *,
-    workers: int | None = 1,
-    executor: str = "local",
-    address: str | None = None,
-    force: Iterable[str] = (),
+    options: RunOptions | None = None,
     reporter: Reporter | None = None,
-    limits: Limits | None = None,
     prepare: Callable[[], None] | None = None,
     finish: Callable[[], None] | None = None,
 ) -> list[StageSummary]:
     """Run stages in order on the scenes that have their inputs."""
-    reporter = reporter or Reporter(quiet=True)
-    forced, started = set(force), time.monotonic()
+    options, reporter = options or RunOptions(workers=1), reporter or Reporter(quiet=True)
+    started = time.monotonic()
     summaries: list[StageSummary] = []
     for first in stages[:1]:
-        if first.name not in forced:
+        if first.name not in options.force:
             prefetch_digests(first, scenes, roots)
     for stage in stages:
         # Digest all code now, as loaded: edits during the run make the shards stale next time.
@@ -58,16 +55,17 @@ def run(
     folders = SharedPaths(on_disk(roots.data), sources, on_disk(roots.data), reporter.line)
     left_out = scenes_missing_input(stages, scenes, roots)
     scenes = [scene for scene in scenes if scene not in left_out]
-    executor_of_run = make_executor(executor, workers, address, folders)
+    executor_of_run = make_executor(options.executor, options.workers, options.address, folders)
     with roots.data.lock(), Interrupts() as interrupts, executor_of_run as pool:
         if prepare:
             prepare()
         estimate = RuntimeEstimate(stages, scenes, roots)
-        for group in group_stages(stages, alone=limits is not None):
+        for group in group_stages(stages, alone=options.limits is not None):
             # Other processes may have written.
             roots.data.refresh()
-            group_limits = limits if limits and group[-1] is stages[-1] else Limits()
-            scheduler = SceneScheduler(group, scenes, pipeline, roots, forced, group_limits, reporter, estimate)
+            limits = options.limits if group[-1] is stages[-1] else None
+            finder = ShardFinder(pipeline, roots, scenes, reporter, options.force, limits)
+            scheduler = SceneScheduler(group, scenes, finder, roots.data, reporter, estimate)
             busy = [stage.name for stage in group if any(estimate.left(stage.name, scene) for scene in scenes)]
             if scheduler and (cold := uncompiled(busy)):
                 reporter.line(f"compiling {', '.join(cold)} to machine code, once: up to two minutes of CPU time")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -28,3 +29,21 @@ class StageSummary:
             f"{self.stage}: {self.rows_in:,} rows in, {self.rows_out:,} out"
             f"{f' ({counts})' if counts else ''}; {fresh}; {self.seconds:.1f} s"
         )
+
+
+@dataclass
+class StageTotals:
+    """Results of a stage's shards so far."""
+
+    summaries: list[dict[str, Any]] = field(default_factory=list)  # Of shards, as in their footers
+    tasks: int = 0
+    computed: int = 0
+    seconds: float = 0.0
+
+    def summary(self, stage: str) -> StageSummary:
+        """Sum up."""
+        counts: Counter[str] = Counter()
+        for summary in self.summaries:
+            counts.update(summary["counts"])
+        rows_in, rows_out = (sum(summary[name] for summary in self.summaries) for name in ("rows_in", "rows_out"))
+        return StageSummary(stage, rows_in, rows_out, counts, len(self.summaries), self.computed, self.seconds)

@@ -14,7 +14,8 @@ from support.command_line import said
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.store import shards as store
@@ -51,7 +52,7 @@ def times(data):
 
 
 def split(data, pipeline, scene=None, **options):
-    run_until("split", data=data, pipeline=pipeline, scene=scene, workers=1, quiet=True, **options)
+    run_pipeline(pipeline, data, stages=["split"], scenes=scene, workers=1, **options)
 
 
 def test_a_release_names_its_pipeline(smoke):

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
-from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.pipeline.stages.work.quota import apportion, difficulty_level, select_quota, train_quotas
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
@@ -216,6 +217,6 @@ def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
         n_landmarks=len(source["landmarks"]),
     )  # fmt: skip
     with pytest.raises(PoolError, match=r"D_Flood_1: \d+ base tasks short"):
-        run_until("split", data=data, pipeline=project / "pipeline.toml", workers=1, quiet=True)
+        run_pipeline(project / "pipeline.toml", data, stages=["split"], workers=1)
     assert store.shards(data, "verdicts", "D_Flood_1")
     assert not (data / "release").exists()

@@ -12,7 +12,8 @@ from support import foreign
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, UsageError
-from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import check_glb, read_mesh
 from aerialdojo_gen.imports.import_mesh import import_mesh
@@ -237,7 +238,7 @@ def planned(tmp_path, name, mesh, n_objects, **options):
     added = add_scene(name, mesh, project, **options)
     pipeline, roots = open_pipeline(added.pipeline, data)
     draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, options=DraftOptions(max_per_category=30))
-    run_until("filter", data=data, pipeline=added.pipeline, scene=[name], workers=1, quiet=True)
+    run_pipeline(added.pipeline, data, stages=["filter"], scenes=[name], workers=1)
     return added, store.read_scene(data, "verdicts", name)
 
 

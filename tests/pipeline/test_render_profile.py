@@ -16,7 +16,7 @@ from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import ConfigError, RenderError
 from aerialdojo_gen.cli.render import profile_keys
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.pipeline.freshness import Limits
+from aerialdojo_gen.pipeline.options import RunLimits
 from aerialdojo_gen.rendering.codecs import VideoWriter
 from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.placement import TILED
@@ -108,10 +108,10 @@ def test_what_is_whole_stays_and_a_flipped_bit_is_found(data, tmp_path):
     file = tmp_path / "media" / SCENE / "nav_a" / TILED
     sound = file.read_bytes()
     assert sound == (data / "media" / SCENE / "nav_a" / TILED).read_bytes()
-    (summary,) = run_whole(tmp_path, TRAINING, limits=Limits(verify=True))
+    (summary,) = run_whole(tmp_path, TRAINING, limits=RunLimits(verify=True))
     assert summary.computed == 0
     file.write_bytes(sound[:-200] + bytes([sound[-200] ^ 1]) + sound[-199:])
-    (summary,) = run_whole(tmp_path, TRAINING, limits=Limits(verify=True))
+    (summary,) = run_whole(tmp_path, TRAINING, limits=RunLimits(verify=True))
     assert summary.computed == 1
     assert file.read_bytes() == sound
 

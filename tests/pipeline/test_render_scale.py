@@ -21,7 +21,7 @@ from support.court import write_inputs as write_some
 
 from aerialdojo_gen.base.errors import RenderError, UsageError
 from aerialdojo_gen.cli.render import duration_s, share_of
-from aerialdojo_gen.pipeline.freshness import Limits
+from aerialdojo_gen.pipeline.options import RunLimits
 from aerialdojo_gen.pipeline.stages.work import render
 from aerialdojo_gen.rendering import backend, recording
 from aerialdojo_gen.rendering.codecs import to_metres
@@ -81,7 +81,7 @@ def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):
     together: dict[str, bytes] = {}
     for k, data in enumerate(machines):
         write_inputs(data)
-        (summary,) = run_whole(data, ALL, limits=Limits((k, 3)))
+        (summary,) = run_whole(data, ALL, limits=RunLimits((k, 3)))
         assert summary.computed in (1, 2)
         written = files_of(data)
         assert not together.keys() & written.keys()
@@ -108,7 +108,7 @@ def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_p
     clock = [time.time()]
     monkeypatch.setattr(render._Trajectory, "record", slow)
     monkeypatch.setattr(time, "time", lambda: clock[0])
-    (summary,) = run_whole(tmp_path, ALL, limits=Limits(deadline=clock[0] + 65.0))
+    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=clock[0] + 65.0))
     assert len(recorded) == 7
     assert summary.computed == 1
     assert not list((tmp_path / "media" / SCENE).glob(".*"))
@@ -353,9 +353,9 @@ def test_verify_finds_a_flipped_bit_and_records_that_trajectory_alone_again(tmp_
         kept = {p: p.stat().st_mtime_ns for p in media.rglob("*") if p.is_file() and "nav_b" not in p.parts}
         (summary,) = run_whole(data, config)
         assert summary.computed == 0
-        (summary,) = run_whole(data, config, limits=Limits(verify=True))
+        (summary,) = run_whole(data, config, limits=RunLimits(verify=True))
         assert summary.computed == 1
         assert files_of(data) == files_of(source)
         assert {p: p.stat().st_mtime_ns for p in kept} == kept
-        (summary,) = run_whole(data, config, limits=Limits(verify=True))
+        (summary,) = run_whole(data, config, limits=RunLimits(verify=True))
         assert summary.computed == 0

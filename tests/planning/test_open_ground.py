@@ -14,7 +14,8 @@ from support.planting import Planted, check, poses
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
@@ -194,7 +195,7 @@ def surveyed(tmp_path_factory):
         added = add_scene(NAME, mesh, root / "mine", up="z")
         pipeline, roots = open_pipeline(added.pipeline, root / "data")
         draft_scene(NAME, pipeline, roots, n_landmarks=2, n_objects=8, options=DraftOptions(max_per_category=30))
-        run_until("split", data=root / "data", pipeline=added.pipeline, scene=[NAME], workers=1, quiet=True)
+        run_pipeline(added.pipeline, root / "data", stages=["split"], scenes=[NAME], workers=1)
         found[seed] = (root / "data", pipeline, field, shift_of(field, boxes))
     return found
 

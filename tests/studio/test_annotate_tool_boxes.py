@@ -24,7 +24,8 @@ from support import annotating
 from support.browser import until
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.cli.common import open_pipeline, run_until
+from aerialdojo_gen.cli.common import open_pipeline
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
@@ -104,7 +105,7 @@ def test_what_is_boxed_out_is_annotated_becomes_an_object_and_can_be_put_back(te
     assert document["objects"][0]["faults"] == []
     assert (document["objects"][0]["landmark"], document["objects"][0]["direction"]) == ("tower", "northeast")
     assert len(client.get("/api/objects/0/anchors").json()) == 3
-    run_until("anchor-sample", data=roots.data, pipeline=terrain.pipeline, scene=["Scan"], workers=1, quiet=True)
+    run_pipeline(terrain.pipeline, roots.data, stages=["anchor-sample"], scenes=["Scan"], workers=1)
     refused = client.delete("/api/boxes/garden_shed_000")
     assert (refused.status_code, "is annotated" in refused.json()["error"]) == (400, True)
     body = {"who": "Ada", "client": "a", "operation": {"do": "remove", "kind": "objects", "id": 0}}

@@ -18,7 +18,7 @@ from support import browser as chrome
 from support.annotate_page import Page, entries
 from support.browser import until
 
-from aerialdojo_gen.cli.common import run_until
+from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.store import shards as store
@@ -139,7 +139,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         until("redone", lambda: page.text("#progress-text") == "3 of 3 objects done")
         assert scene.annotations.read_text() == written
         assert chrome.errors(browser) == []
-    run_until("filter", data=data, pipeline=scene.pipeline, scene=[NAME], workers=1, quiet=True)
+    run_pipeline(scene.pipeline, data, stages=["filter"], scenes=[NAME], workers=1)
     anchors = store.read_scene(data, "anchors", NAME).to_pylist()
     assert {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]} == dict.fromkeys(range(3), "human")
     assert pc.sum(store.read_scene(data, "verdicts", NAME)["keep"]).as_py() >= 1

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.pipeline.executors.base import TaskQueue
-from aerialdojo_gen.pipeline.executors.link import at_end
+from aerialdojo_gen.pipeline.executors.channels import at_end
 from aerialdojo_gen.pipeline.task import compute
 
 

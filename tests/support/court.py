@@ -12,6 +12,7 @@ from support.rendered import courtyard
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import Embodiment, RenderConfig
 from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import render
@@ -103,11 +104,13 @@ def run_all(data, config, stage=render, name="render"):
     return outputs
 
 
-def run_whole(data, config, workers=1, **options):
+def run_whole(data, config, workers=1, reporter=None, **options):
     """Run the stage as the command does."""
     roots = ProjectPaths(data=data, scene_assets=data, recipes=data, annotations=data)
     pipeline = Pipeline(render=config)
-    return runner.run([BY_NAME["render"]], [SCENE], pipeline, roots, workers=workers, **options)
+    return runner.run(
+        [BY_NAME["render"]], [SCENE], pipeline, roots, options=RunOptions(workers, **options), reporter=reporter
+    )
 
 
 def files_of(data):

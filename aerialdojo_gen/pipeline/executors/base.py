@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.pipeline.executors.link import WorkerChannel
+from aerialdojo_gen.pipeline.executors.channels import WorkerChannel
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 EXECUTORS = ("local", "ray")

@@ -21,7 +21,7 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, T, TaskQueue, guarded
-from aerialdojo_gen.pipeline.executors.link import InProcessChannel, RateLimiter, end
+from aerialdojo_gen.pipeline.executors.channels import InProcessChannel, RateLimiter, end
 
 # How often the parent checks whether workers must stop, seconds.
 _LOOK_EVERY_S = 0.2

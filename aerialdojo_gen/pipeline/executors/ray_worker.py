@@ -14,7 +14,7 @@ from typing import Any
 
 from aerialdojo_gen.pipeline.executors.base import guarded
 from aerialdojo_gen.pipeline.executors.bundled import Unpacked
-from aerialdojo_gen.pipeline.executors.link import RateLimiter, end
+from aerialdojo_gen.pipeline.executors.channels import RateLimiter, end
 
 _POLL_EVERY_S = 0.5
 

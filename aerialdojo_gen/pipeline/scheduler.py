@@ -8,34 +8,20 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.config.sections import Section
-from aerialdojo_gen.base.environment_errors import check_memory
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.executors.base import TaskQueue
-from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
-from aerialdojo_gen.pipeline.freshness import Limits, Shards, shards_of
+from aerialdojo_gen.pipeline.freshness import ShardFinder, Shards
 from aerialdojo_gen.pipeline.progress import Overview, Reporter
-from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
-from aerialdojo_gen.pipeline.summary import StageSummary
+from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
+from aerialdojo_gen.pipeline.stage import Stage
+from aerialdojo_gen.pipeline.summary import StageSummary, StageTotals
 from aerialdojo_gen.pipeline.task import Computed, Task
+from aerialdojo_gen.store.root import DataRoot
 
 # A second process must first read and build the scene again, which takes about half of that.
 _JOIN_S = 6.0
-
-
-@dataclass
-class _StageTotals:
-    """Results of a stage's shards."""
-
-    summaries: list[dict[str, Any]] = field(default_factory=list)
-    tasks: int = 0
-    computed: int = 0
-    seconds: float = 0.0
 
 
 class SceneScheduler(TaskQueue[Task]):
@@ -45,19 +31,15 @@ class SceneScheduler(TaskQueue[Task]):
         self,
         stages: Sequence[Stage],
         scenes: Sequence[str],
-        pipeline: Pipeline,
-        roots: ProjectPaths,
-        forced: Collection[str],
-        limits: Limits,
+        finder: ShardFinder,
+        data: DataRoot,
         reporter: Reporter,
         estimate: RuntimeEstimate,
     ) -> None:
         super().__init__((), lambda task: task.scene)
-        self._stages, self._names = stages, list(scenes)
-        self._pipeline, self._roots, self._forced = pipeline, roots, forced
-        self._limits, self._reporter, self._estimate = limits, reporter, estimate
-        self._configs: dict[str, Section] = {}
-        self._totals = [_StageTotals() for _ in stages]
+        self._stages, self._names, self._data = stages, list(scenes), data
+        self._finder, self._reporter, self._estimate = finder, reporter, estimate
+        self._totals = [StageTotals() for _ in stages]
         # How many stages a scene has behind it, and how many shards of its next one are there, and not done.
         self._passed = dict.fromkeys(scenes, 0)
         self._shards, self._left = Counter[str](), Counter[str]()
@@ -137,7 +119,7 @@ class SceneScheduler(TaskQueue[Task]):
             self._end([scene])
             return
         # Other processes may have written.
-        self._roots.data.refresh()
+        self._data.refresh()
         while self._passed[scene] < len(self._stages):
             if not self._enter(self._passed[scene], [scene]):
                 return
@@ -154,7 +136,7 @@ class SceneScheduler(TaskQueue[Task]):
             return []
         stage, totals, started = self._stages[number], self._totals[number], time.monotonic()
         try:
-            found = self._find_shards(stage, scenes)
+            found = self._finder.find(stage, scenes)
         except AerialDojoError as error:
             found = Shards([], [], dict.fromkeys(scenes, error))
         totals.summaries += found.fresh
@@ -171,26 +153,6 @@ class SceneScheduler(TaskQueue[Task]):
             self._passed[scene] = number + 1
             self._estimate.drop(stage.name, scene)
         return passed
-
-    def _find_shards(self, stage: Stage, scenes: list[str]) -> Shards:
-        """Find the stale shards of a stage, under one configuration for all scenes."""
-        section, force = self._pipeline.section(stage.name), stage.name in self._forced
-        common = (scenes, self._pipeline, self._roots, force)
-        if stage.name not in self._configs:
-            # Resolving takes time: skip it while everything is fresh under one of the possible results.
-            try_choices = not force and len(scenes) == len(self._names)
-            for choice in stage.choices(section) if try_choices else ():
-                found = shards_of(stage, choice, *common, Reporter(quiet=True), self._limits)
-                if found.all_fresh:
-                    self._configs[stage.name] = choice
-                    return found
-            self._configs[stage.name] = stage.resolve_config(section, self._reporter.line)
-        config = self._configs[stage.name]
-        found = shards_of(stage, config, *common, self._reporter, self._limits)
-        if found.tasks:
-            check_memory(stage.name)
-            stage.check(self._roots.data, self._names, config)
-        return found
 
     def _fail(self, number: int, scene: str, error: AerialDojoError) -> None:
         self._errors.append((number, self._names.index(scene), error))
@@ -222,18 +184,7 @@ class SceneScheduler(TaskQueue[Task]):
         if totals.computed < totals.tasks:
             left = f"{totals.tasks - totals.computed:,} of {totals.tasks:,} shards are left"
             self._reporter.line(f"{stage.name}: the budget is spent, {left}; the same command continues from here")
-        counts: Counter[str] = Counter()
-        for summary in totals.summaries:
-            counts.update(summary["counts"])
-        return StageSummary(
-            stage.name,
-            sum(summary["rows_in"] for summary in totals.summaries),
-            sum(summary["rows_out"] for summary in totals.summaries),
-            counts,
-            len(totals.summaries),
-            totals.computed,
-            totals.seconds,
-        )
+        return totals.summary(stage.name)
 
 
 def _part(task: Task) -> str:

@@ -11,13 +11,13 @@ from support import chores
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.build import open_pipeline
-from aerialdojo_gen.pipeline.chain import SceneScheduler
 from aerialdojo_gen.pipeline.executors import make_executor
-from aerialdojo_gen.pipeline.expectation import RuntimeEstimate
-from aerialdojo_gen.pipeline.freshness import Limits
+from aerialdojo_gen.pipeline.freshness import ShardFinder
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 from aerialdojo_gen.pipeline.runner import group_stages
+from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
+from aerialdojo_gen.pipeline.scheduler import SceneScheduler
 
 SCENES = ("U_Courtyard_0", "U_Courtyard_1")
 TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
@@ -45,19 +45,20 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
     stages = [BY_NAME[name] for name in TABLES]
     known = RuntimeEstimate(stages, SCENES, roots)
     expected_s = known.left_s
-    chain = SceneScheduler(stages, SCENES, config, roots, (), Limits(), Reporter(quiet=True), known)
+    quiet = Reporter(quiet=True)
+    finder = ShardFinder(config, roots, SCENES, quiet)
+    scheduler = SceneScheduler(stages, SCENES, finder, roots.data, quiet, known)
     with make_executor("local", 2) as pool:
-        outcomes = list(pool.run(chores.compute_and_sign, chain))
-    assert not chain.errors
+        outcomes = list(pool.run(chores.compute_and_sign, scheduler))
+    assert not scheduler.errors
     pids = {path.name: path.read_text() for path in notes.iterdir()}
-    assert (
-        len(pids) == len(outcomes) == chain.overview().scenes * 2 + len([name for name in pids if " plan " in name])
-    )
+    planned = [name for name in pids if " plan " in name]
+    assert len(pids) == len(outcomes) == scheduler.overview().scenes * 2 + len(planned)
     assert len(set(pids.values())) == 2
     for scene in SCENES:
         # A part of `plan` may have been done by who had nothing else to do.
         assert pids[f"{scene} pair-objects 0"] == pids[f"{scene} plan 0"]
-    assert [(one.stage, one.shards, one.computed) for one in chain.summaries()] == [
+    assert [(one.stage, one.shards, one.computed) for one in scheduler.summaries()] == [
         (name, len([p for p in pids if f" {name} " in p]), len([p for p in pids if f" {name} " in p]))
         for name in TABLES
     ]
