@@ -23,6 +23,13 @@ DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "s
 VIEWS = ("front", "left", "right", "down")
 # From here on obstacles cost a route something: its `plan_detour`, length over the shortest without obstacles.
 DETOUR = 1.05
+# The drone's body, and its cameras' horizontal field of view.
+RADIUS_M = WHEELBASE_M = 0.25
+FOV_DEG = 90.0
+# The paper's; other radii are computed from the log of distances.
+SUCCESS_RADIUS_M = 3.0
+# How far from its goal an agent may be that has flown all of a route's actions, which are without the Approach.
+NEAR_GOAL_M = 1.0
 # What ends an episode (benchmark): an agent's Stop, a collision, or the last action of the budget.
 TERMINATIONS = ("stop", "collision", "budget")
 FAMILIES = {"U": "Urban", "N": "Natural", "I": "Infrastructure", "D": "Disaster"}

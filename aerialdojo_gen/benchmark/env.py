@@ -12,8 +12,8 @@ import pyarrow.compute as pc
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.config.shared import Embodiment
+from aerialdojo_gen.base.constants import SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.agents.load import BUILT_IN, add_working_directory

@@ -9,8 +9,8 @@ from threading import Thread
 import numpy as np
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.config.shared import Embodiment
+from aerialdojo_gen.base.constants import SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.observations import render_views

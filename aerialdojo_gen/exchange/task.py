@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.sections import FilterConfig
+from aerialdojo_gen.base.config.shared import TaskConfig
 from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
 from aerialdojo_gen.geometry.frames import wrap_turned_rad
@@ -79,7 +79,7 @@ class Context:
         return np.append(self.frame.positions_to_world(position), yaw)
 
 
-_BUDGETS = {name: getattr(FilterConfig(), name).action_budget for name in ("base", "standard", "long_horizon")}
+_BUDGETS = {name: getattr(TaskConfig(), name).action_budget for name in ("base", "standard", "long_horizon")}
 
 
 def digest(*parts: str) -> str:

@@ -17,6 +17,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.constants import FOV_DEG
+
 Floats = NDArray[np.float64]
 
 # Columns are the camera's x, y and z axes in the body frame (x forward, y left, z up).
@@ -42,7 +44,7 @@ class Camera:
 
     width: int = 640
     height: int = 640
-    fov_deg: float = 90.0
+    fov_deg: float = FOV_DEG
 
     def __post_init__(self) -> None:
         """Refuse what is no picture."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import nodes_of

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.base.config.agreement import SUCCESS_RADIUS_M
-from aerialdojo_gen.base.config.sections import Embodiment, PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.base.config.shared import Embodiment
+from aerialdojo_gen.base.constants import RADIUS_M, SUCCESS_RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
@@ -43,7 +44,7 @@ class Teacher:
     first action of the route that the release would have from there.
     """
 
-    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = 0.25) -> None:
+    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = RADIUS_M) -> None:
         # Who has strayed may be nearer than any task begins, or straight before the goal.
         own = (config or PlanConfig()).model_copy(update={"min_detour_ratio": 0.0})
         self._planner = Planner(scene, own, radius_m)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS
 from aerialdojo_gen.planning.attempt import costs_at
@@ -88,7 +89,7 @@ class Geodesic:
         return cost
 
 
-def geodesic(mesh: Path, sha256: str, radius_m: float = 0.25) -> Geodesic:
+def geodesic(mesh: Path, sha256: str, radius_m: float = RADIUS_M) -> Geodesic:
     """Return a scene's distances, a part of its context; parameters as for `flight_space`."""
     space = flight_space(mesh, sha256, radius_m)
     return context_of(space.scene).part("geodesic", lambda: Geodesic(space), radius_m)

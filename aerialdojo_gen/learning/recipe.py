@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from aerialdojo_gen.base.cli_context import PROGRAM
-from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.safe_parse import read_toml

@@ -10,7 +10,7 @@ from typing import Any
 
 from aerialdojo_gen.base import paper_figures
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_digest import Code, stage_code
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.environment_errors import check_memory
 from aerialdojo_gen.base.errors import AerialDojoError, DamagedFile
 from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint

@@ -18,7 +18,7 @@ from aerialdojo_gen.store.root import DataRoot, open_root
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from aerialdojo_gen.base.config.sections import Embodiment
+    from aerialdojo_gen.base.config.shared import Embodiment
     from aerialdojo_gen.scenes.model import Scene
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.cli_context import CliContext, current_context, use_context
-from aerialdojo_gen.base.config.sections import Section
+from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.environment_errors import environment_error
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.registry import BY_NAME

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, nearest_owners, point_distance
@@ -79,7 +80,7 @@ class ClearanceGrid:
         cls,
         scene: Scene,
         cell_m: float = 0.5,
-        radius_m: float = 0.25,
+        radius_m: float = RADIUS_M,
         band_m: float = 1.0,
         cap_m: float = 5.0,
         margin_m: float = 0.0,
@@ -94,7 +95,7 @@ class ClearanceGrid:
         cls,
         scene: Scene,
         cell_m: float = 0.5,
-        radius_m: float = 0.25,
+        radius_m: float = RADIUS_M,
         band_m: float = 1.0,
         cap_m: float = 5.0,
         margin_m: float = 0.0,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
 from aerialdojo_gen.planning.certify import certify_profile
@@ -85,7 +86,7 @@ class Planner:
         The body's radius.
     """
 
-    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = 0.25) -> None:
+    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = RADIUS_M) -> None:
         config = config or PlanConfig()
         self.config = config
         self.radius_m = radius_m
@@ -310,7 +311,7 @@ def _poses(goal: ArrayLike, starts: ArrayLike) -> tuple[NDArray[np.float64], NDA
 
 
 def plan(
-    scene: Scene, start: ArrayLike, goal: ArrayLike, *, config: PlanConfig | None = None, radius_m: float = 0.25
+    scene: Scene, start: ArrayLike, goal: ArrayLike, *, config: PlanConfig | None = None, radius_m: float = RADIUS_M
 ) -> Route:
     """Plan one trajectory; for several in one scene make a `Planner`, which is where the time goes.
 

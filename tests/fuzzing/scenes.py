@@ -76,7 +76,7 @@ def _pipelines() -> list[Case]:
                           "vlm": {"model": "m"}},
         "reference-images": {"width": 64}, "pair-objects": {"start_variants": 2},
         "plan": {"cell_m": 0.5, "ladder": [{"weight": 1.1, "budget": 1000, "heading_sectors": 4}]},
-        "filter": {"base": {"min_length_m": 5, "max_length_m": 30, "action_budget": 90}},
+        "task": {"base": {"min_length_m": 5, "max_length_m": 30, "action_budget": 90}},
         "split": {"id_train_fraction": 0.5}, "render": {"views": ["front"], "offsets_m": {"front": [0.1, 0, 0]}},
     }  # fmt: skip
     paths = [ROOT / "pipelines" / "smoke.toml", ROOT / "pipelines" / "aerialdojo-200k.toml"]

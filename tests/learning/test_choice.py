@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aerialdojo_gen.base.config.sections import Embodiment
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.encoding import DeadReckoning

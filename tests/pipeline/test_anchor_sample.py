@@ -7,7 +7,8 @@ import pytest
 import trimesh
 from support.handmade import box, instance, mesh_of, scene
 
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, StoreError
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist

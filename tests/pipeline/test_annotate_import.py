@@ -11,7 +11,8 @@ from support.annotation_scenes import NAMES, street, street_annotations
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotations, parse_annotations
-from aerialdojo_gen.base.config.sections import AnnotateImportConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnnotateImportConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths

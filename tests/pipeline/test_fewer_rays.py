@@ -8,7 +8,8 @@ import pytest
 from support.handmade import box, instance, scene
 from support.two_coloured import item_of, job_in, world_of
 
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.part_visibility import in_picture
 from aerialdojo_gen.geometry.rays import instance_caster

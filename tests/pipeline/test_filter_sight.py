@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from support.walled import SCENE, VIEWPOINTS, filled, walled, write_walled
 
-from aerialdojo_gen.base.config.sections import Embodiment, FilterConfig
+from aerialdojo_gen.base.config.sections import FilterConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.filter import run
 from aerialdojo_gen.rendering.casters import all_in_sight, in_sight

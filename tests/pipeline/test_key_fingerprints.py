@@ -8,7 +8,8 @@ import pytest
 from pydantic import BaseModel
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig, shared_values
+from aerialdojo_gen.base.config.sections import PROFILES, ClipConfig, VlmConfig
+from aerialdojo_gen.base.config.shared import shared_values
 from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
@@ -21,12 +22,18 @@ ALL = set(BY_NAME)
 # Keys that say what is run, or where files are: the files count by their bytes.
 UNCOUNTED = {"name", "scenes", "stages", "scene_assets", "recipes", "annotations"}
 # Keys that must keep the same value.
-CAMERA = [("anchor-sample", "fov_deg"), ("reference-images", "fov_deg"), ("render", "fov_deg")]
 BOUNDS = [
-    [("filter", "base", "max_length_m"), ("filter", "standard", "min_length_m")],
-    [("filter", "standard", "max_length_m"), ("filter", "long_horizon", "min_length_m")],
+    [("task", "base", "max_length_m"), ("task", "standard", "min_length_m")],
+    [("task", "standard", "max_length_m"), ("task", "long_horizon", "min_length_m")],
 ]
-JOINED = {key: keys for keys in (CAMERA, *BOUNDS) for key in keys}
+JOINED = {key: keys for keys in BOUNDS for key in keys}
+# Which stages read a shared key; `filter` reads the others of [task].
+SHARED = {
+    ("camera", "fov_deg"): {"anchor-sample", "reference-images", "render"},
+    ("task", "min_euclidean_m"): {"pair-objects", "filter"},
+    ("task", "max_approach_m"): {"pair-objects", "plan"},
+    ("task", "long_horizon", "max_length_m"): {"pair-objects", "plan", "filter"},
+}
 # `plan` searches what is released, and then depends on what decides on that.
 RELEASED = {("plan", "search"): "released", ("split", "paper_counts"): True}
 
@@ -127,11 +134,11 @@ def test_a_key_counts_for_the_stages_that_read_it(project, tmp_path, base):
         if other is None:
             fixed.add(key)
             continue
-        sections = {name for name, *_ in JOINED.get(key, [key])}
+        sections = SHARED.get(key, {key[0].replace("task", "filter")})
         expected = ALL if sections & {"seed", "embodiment"} else sections - UNCOUNTED
         if isinstance(value, Path):
             expected = set()
-        if base and (sections == {"filter"} or key == ("split", "prefer_harder")):
+        if base and ("filter" in sections or key == ("split", "prefer_harder")):
             expected = expected | {"plan"}
         after = prints(other)
         assert {name for name in ALL if before[name] != after[name]} == expected, key
@@ -139,4 +146,4 @@ def test_a_key_counts_for_the_stages_that_read_it(project, tmp_path, base):
     # What contradicts another section whatever it says is changed with the other base.
     assert fixed == ({("split", "paper_counts")} if base else {("plan", "search")})
     assert len(judged) > 100
-    assert {key[0] for key in judged} >= ALL - {"build-scenes"} | {"seed", "embodiment"}
+    assert {key[0] for key in judged} >= ALL - {"build-scenes"} | {"seed", "embodiment", "camera", "task"}

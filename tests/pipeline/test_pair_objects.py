@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.handmade import OPINIONS, box, instance, scene
 
-from aerialdojo_gen.base.config.sections import Embodiment, PairObjectsConfig
+from aerialdojo_gen.base.config.sections import PairObjectsConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import pair_objects

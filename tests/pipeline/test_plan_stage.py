@@ -8,12 +8,8 @@ import pytest
 from support.flying import along, distances, solid, town
 from support.handmade import OPINIONS
 
-from aerialdojo_gen.base.config.sections import (
-    Embodiment,
-    PairObjectsConfig,
-    PlanConfig,
-    QuotaConfig,
-)
+from aerialdojo_gen.base.config.sections import PairObjectsConfig, PlanConfig, QuotaConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.geometry.motion import replay

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from support.handmade import OPINIONS, box, instance
 from support.handmade import scene as handmade_scene
 
-from aerialdojo_gen.base.config.sections import Embodiment, FilterConfig, SplitConfig
+from aerialdojo_gen.base.config.sections import FilterConfig, SplitConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.dataset.card import write_card
 from aerialdojo_gen.dataset.contents import counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, in_picture, off_front_rad, visible_shares
 from aerialdojo_gen.geometry.rays import RayCaster

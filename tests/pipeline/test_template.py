@@ -59,7 +59,7 @@ def test_values_are_the_pipelines_and_defaults_the_models(project):
     assert keys["filter", "min_plan_detour"].value == 1.05
     assert keys["filter", "min_plan_detour"].default == 1.0
     assert keys["filter", "min_plan_detour"].bounds == "≥ 1, ≤ 1000"
-    assert keys["filter.long_horizon", "action_budget"].value == 300
+    assert keys["task.long_horizon", "action_budget"].value == 300
     changed = {at for at, key in keys.items() if key.changed}
     assert ("filter", "base") not in changed
     assert ("split", "salt") in changed

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen.base.config.sections import BuildScenesConfig, Embodiment
+from aerialdojo_gen.base.config.sections import BuildScenesConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths

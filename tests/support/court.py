@@ -10,7 +10,8 @@ from support.handmade import OPINIONS, UNTOLD
 from support.rendered import courtyard
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
-from aerialdojo_gen.base.config.sections import Embodiment, RenderConfig
+from aerialdojo_gen.base.config.sections import RenderConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.registry import BY_NAME

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from support.handmade import box, ground, instance
 
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig, Embodiment
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig
+from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.base.config.sections import shared_values
+from aerialdojo_gen.base.config.shared import shared_values
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.explain import model_in
 from aerialdojo_gen.base.names import unknown
@@ -89,7 +89,7 @@ def config_keys(pipeline: str | Path | Pipeline | None = None, stage: str | None
     pipeline : str, Path or Pipeline, optional
         A TOML file, or what was read of one, whose values are listed; the defaults where absent.
     stage : str, optional
-        The section of this stage alone, or ``"embodiment"``; the file's own keys and all sections where absent.
+        The section of this stage alone, or ``"embodiment"``, ``"camera"``, ``"task"``; all keys where absent.
 
     Returns
     -------

@@ -13,17 +13,15 @@ from aerialdojo_gen.base.config.sections import (
     AnchorSampleConfig,
     AnnotateImportConfig,
     BuildScenesConfig,
-    Embodiment,
     FilterConfig,
     PairObjectsConfig,
     PlanConfig,
     QuotaConfig,
     ReferenceImagesConfig,
     RenderConfig,
-    Section,
     SplitConfig,
-    shared_values,
 )
+from aerialdojo_gen.base.config.shared import CameraConfig, Embodiment, Section, TaskConfig, shared_values
 from aerialdojo_gen.base.errors import ConfigError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -43,6 +41,8 @@ class Pipeline(Section):
     recipes: Path | None = Field(None, description="folder of recipes; scene_assets/scenes where absent")
     annotations: Path | None = Field(None, description="folder of annotation files, relative to the file")
     embodiment: Embodiment = Embodiment()
+    camera: CameraConfig = CameraConfig()
+    task: TaskConfig = TaskConfig()
     build_scenes: BuildScenesConfig = Field(BuildScenesConfig(), alias="build-scenes")
     annotate_import: AnnotateImportConfig = Field(AnnotateImportConfig(), alias="annotate-import")
     anchor_sample: AnchorSampleConfig = Field(AnchorSampleConfig(), alias="anchor-sample")
@@ -83,7 +83,8 @@ class Pipeline(Section):
             for name in values.keys() & section.model_fields_set:
                 if getattr(section, name) != values[name]:
                     table, _, key = paths[name].partition(".")
-                    faults.append(f"[{attribute.replace('_', '-')}] {name} is set by [{table}] {key}")
+                    remedy = f"set [{table}] {key}" if key else "leave it out"
+                    faults.append(f"[{attribute.replace('_', '-')}] {name} is no key of this section: {remedy}")
             section = section.model_copy(update=values)
             section.model_fields_set.difference_update(values)
             object.__setattr__(self, attribute, section)

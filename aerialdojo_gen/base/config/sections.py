@@ -1,43 +1,22 @@
 """Configuration: one frozen, validated section a stage, read from a pipeline's TOML file.
 
 A key that does not exist is an error that names the file, the key and what was probably meant. Every value has a
-default, so that a stage can be called as a library function without a file.
+default, so that a stage can be called as a library function without a file. What several stages read of one thing
+stands once, in [embodiment], [camera] or [task].
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from aerialdojo_gen.base.config.shared import Section, Setting, shared
 
 RendererName = Literal["gl", "pybullet"]
 # The fastest first.
 RENDERERS: tuple[RendererName, ...] = ("gl", "pybullet")
-
-
-class Section(BaseModel):
-    """Base of every section: frozen, and unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-def shared(path: str, default: Any = None) -> Any:
-    """Declare a value that a stage reads and that is set elsewhere: `Pipeline` takes it from its attribute `path`."""
-    return Field(default, json_schema_extra={"shared": path})
-
-
-def shared_values(section: type[BaseModel]) -> dict[str, str]:
-    """Name the values of a section that are set elsewhere, with the attribute of `Pipeline` that has them."""
-    extras = {name: field.json_schema_extra for name, field in section.model_fields.items()}
-    return {name: str(extra["shared"]) for name, extra in extras.items() if isinstance(extra, dict)}
-
-
-class Embodiment(Section):
-    """The drone's body (paper, section on the embodiment)."""
-
-    radius_m: float = Field(0.25, gt=0, le=10, description="radius of the collision sphere")
-    wheelbase_m: float = Field(0.25, gt=0, le=10, description="distance between opposite rotors; told to agents")
 
 
 class BuildScenesConfig(Section):
@@ -112,7 +91,7 @@ class AnchorSampleConfig(Section):
     surface_points: int = Field(
         256, ge=8, le=100_000, description="points of the object's surface that rays are cast to"
     )
-    fov_deg: float = Field(90.0, gt=0, lt=180, description="field of view of the front camera")
+    fov_deg: float = shared("camera.fov_deg")
     min_visible_fraction: float = Field(0.3, ge=0, le=1, description="visible fraction below which nothing is seen")
     pictured: int = Field(6, ge=1, le=1000, description="candidates an object that are pictured and scored")
     picture_px: int = Field(
@@ -137,7 +116,7 @@ class ReferenceImagesConfig(Section):
 
     width: int = Field(320, ge=16, le=4096, description="columns, pixels")
     height: int = Field(320, ge=16, le=4096, description="rows, pixels")
-    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view, as the drone's camera")
+    fov_deg: float = shared("camera.fov_deg")
     renderer: Literal["auto", "gl", "pybullet"] = Field(
         "auto", description="what draws; auto is the fastest that works, pybullet gives the same bytes anywhere"
     )
@@ -147,9 +126,9 @@ class PairObjectsConfig(Section):
     """Candidate tasks: ordered pairs of objects times the start object's anchors."""
 
     start_variants: int = Field(3, ge=1, le=1000, description="how many anchors of the start object may start a task")
-    min_euclidean_m: float = Field(3.0, ge=0, description="d_E at or below which no task is kept")
-    max_length_m: float = Field(100.0, gt=0, le=10_000, description="L at or above which no task is kept")
-    max_approach_m: float = Field(1.0, ge=0, le=100, description="longest straight Approach at the end of a route")
+    min_euclidean_m: float = shared("task.min_euclidean_m")
+    max_length_m: float = shared("task.long_horizon.max_length_m")
+    max_approach_m: float = shared("task.max_approach_m")
     surface_points: int = Field(
         64, ge=1, le=100_000, description="points of a target's surface that are looked for from the starts"
     )
@@ -167,26 +146,9 @@ class SearchAttempt(Section):
     extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
 
 
-class Setting(Section):
-    """One length setting (paper: Base, Standard, Long-Horizon)."""
-
-    min_length_m: float = Field(ge=0, description="smallest length that belongs to it")
-    max_length_m: float = Field(gt=0, description="smallest length that is too long for it")
-    action_budget: int = Field(ge=1, description="most actions an episode may take, Stop included")
-
-    @model_validator(mode="after")
-    def _has_room(self) -> Setting:
-        if self.min_length_m >= self.max_length_m:
-            raise ValueError(
-                f"min_length_m = {self.min_length_m:g} must be less than max_length_m = {self.max_length_m:g}"
-            )
-        return self
-
-
 class FilterConfig(Section):
     """Which candidates become tasks (paper, section on filtering)."""
 
-    min_euclidean_m: float = Field(3.0, ge=0, description="kept: d_E greater than this")
     min_detour_ratio: float = Field(1.05, ge=1, description="kept: κ at least this")
     min_plan_detour: float = Field(
         1.0, ge=1, le=1000, description="kept: L at least this times the shortest L without obstacles"
@@ -194,21 +156,10 @@ class FilterConfig(Section):
     max_visible_at_start: float = Field(
         1.0, ge=0, le=1, description="kept: at most this share of the target in view at the start"
     )
-    base: Setting = Setting(min_length_m=5, max_length_m=30, action_budget=90)
-    standard: Setting = Setting(min_length_m=30, max_length_m=60, action_budget=180)
-    long_horizon: Setting = Setting(min_length_m=60, max_length_m=100, action_budget=300)
-
-    @model_validator(mode="after")
-    def _settings_join(self) -> FilterConfig:
-        if (self.base.max_length_m, self.standard.max_length_m) != (
-            self.standard.min_length_m,
-            self.long_horizon.min_length_m,
-        ):
-            raise ValueError("the settings must join: base.max_length_m = standard.min_length_m, and so on")
-        budgets = (self.base.action_budget, self.standard.action_budget, self.long_horizon.action_budget)
-        if budgets != tuple(sorted(budgets)):
-            raise ValueError(f"longer routes need more actions: action_budget falls in {budgets}")
-        return self
+    min_euclidean_m: float = shared("task.min_euclidean_m")
+    base: Setting = shared("task.base")
+    standard: Setting = shared("task.standard")
+    long_horizon: Setting = shared("task.long_horizon")
 
 
 class QuotaConfig(Section):
@@ -233,11 +184,11 @@ class PlanConfig(Section):
     targets_per_part: int = Field(8, ge=1, le=100_000, description="targets whose plans share a shard")
     cell_m: float = Field(0.5, ge=0.05, le=10, description="edge of the cells of clearance grid and cost-to-go")
     margin_m: float = Field(0.002, ge=0, le=10, description="added to the body's radius in the search alone")
-    max_length_m: float = Field(100.0, gt=0, le=10_000, description="longest route worth planning")
+    max_length_m: float = shared("task.long_horizon.max_length_m")
     length_slack: float = Field(
-        1.04, ge=1, le=100, description="the cost-to-go may exceed it by this: it overestimates"
+        1.04, ge=1, le=100, description="the cost-to-go may exceed a task's longest by this: it overestimates"
     )
-    max_approach_m: float = Field(1.0, gt=0, le=100, description="longest straight Approach at the end")
+    max_approach_m: float = shared("task.max_approach_m")
     min_detour_ratio: float = Field(
         0.0, ge=0, description="no search where a grid path is shorter than this times d_E"
     )
@@ -335,7 +286,7 @@ class RenderConfig(Section):
     )
     width: int = Field(640, ge=16, le=4096, multiple_of=2, description="columns, pixels")
     height: int = Field(640, ge=16, le=4096, multiple_of=2, description="rows, pixels")
-    fov_deg: float = Field(90.0, gt=0, lt=180, description="horizontal field of view")
+    fov_deg: float = shared("camera.fov_deg")
     fps: float = Field(15.0, ge=0.01, le=240, description="frames a second; for steps, how fast the video plays")
     cruise_m_s: float = Field(3.0, ge=0.01, le=1000, description="speed along the path, for sampling by time")
     yaw_rate_deg_s: float = Field(90.0, ge=0.1, le=36_000, description="speed of turns, for sampling by time")

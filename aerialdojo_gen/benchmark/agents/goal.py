@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.constants import FOV_DEG, RADIUS_M, WHEELBASE_M
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.geometry.cameras import Camera
@@ -41,7 +42,7 @@ class Sensors:
     depth: bool = True
     width: int = 640
     height: int = 640
-    fov_deg: float = 90.0
+    fov_deg: float = FOV_DEG
     max_depth_m: float = 65.535
 
     def __post_init__(self) -> None:
@@ -91,8 +92,8 @@ class Rules:
 
     action_budget: int
     success_radius_m: float = 3.0
-    radius_m: float = 0.25
-    wheelbase_m: float = 0.25
+    radius_m: float = RADIUS_M
+    wheelbase_m: float = WHEELBASE_M
     sensors: Sensors = BLIND
 
 

@@ -10,6 +10,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerialdojo_gen.base.constants import FOV_DEG
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet
 
@@ -32,7 +33,7 @@ class Sight:
     views: tuple[str, ...] = ("front",)  # Cameras whose pictures are sent
     depth: bool = True  # Whether depth pictures go with them
     max_depth_m: float = 50.0  # Depth that is drawn white; horizontal field of view
-    fov_deg: float = 90.0
+    fov_deg: float = FOV_DEG
     width: int = 640  # Of the pictures, pixels
     height: int = 640
     past_pictures: int = 0  # Of how many earlier steps the first camera's colour picture is sent again

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.base.config.agreement import NEAR_GOAL_M
+from aerialdojo_gen.base.constants import NEAR_GOAL_M
 from aerialdojo_gen.dataset.validate.foreign_keys import sound
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, pose_text

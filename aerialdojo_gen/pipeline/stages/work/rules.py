@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.config.sections import FilterConfig, Setting
+from aerialdojo_gen.base.config.sections import FilterConfig
+from aerialdojo_gen.base.config.shared import Setting
 from aerialdojo_gen.base.constants import SETTINGS
 
 KEPT = "kept"
