@@ -80,8 +80,8 @@ class Pipeline(Section):
         for attribute, section in reversed(self._sections()):
             paths = shared_values(type(section))
             values = {name: attrgetter(path)(self) for name, path in paths.items()}
-            for name in values.keys() & section.model_fields_set:
-                if getattr(section, name) != values[name]:
+            for name, value in values.items():
+                if name in section.model_fields_set and getattr(section, name) != value:
                     table, _, key = paths[name].partition(".")
                     remedy = f"set [{table}] {key}" if key else "leave it out"
                     faults.append(f"[{attribute.replace('_', '-')}] {name} is no key of this section: {remedy}")
