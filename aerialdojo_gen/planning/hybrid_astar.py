@@ -142,6 +142,36 @@ def _backtrack(node: int, parents: NDArray[np.int32], moves: NDArray[np.int8]) -
     return found
 
 
+@njit(cache=True, inline="always")
+def _flights(yaw: float) -> NDArray[np.float64]:
+    """Step (dx, dy, dz) and length of every translation from a start's yaw; (N_TRANSLATIONS, 4), metres."""
+    flights = np.zeros((N_TRANSLATIONS, 4))
+    for m in range(N_FLAT):
+        angle, length = yaw + m // N_STEPS * TURN_RAD, STEPS_M[m % N_STEPS]
+        flights[m, 0], flights[m, 1], flights[m, 3] = math.cos(angle) * length, math.sin(angle) * length, length
+    for m in range(N_FLAT, N_TRANSLATIONS):
+        flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
+    return flights
+
+
+@njit(cache=True, inline="always")
+def _push(
+    f: float,
+    parent: int,
+    move: int,
+    entry: int,
+    edge_parent: NDArray[np.int32],
+    edge_move: NDArray[np.int8],
+    edge_next: NDArray[np.int32],
+    heads: NDArray[np.int32],
+) -> int:
+    """Write an edge as entry `entry` and put it first in the bucket of its cost; return the bucket."""
+    bucket = max(0, int(f / _BUCKET_M))
+    edge_parent[entry], edge_move[entry], edge_next[entry] = parent, move, heads[bucket]
+    heads[bucket] = entry
+    return bucket
+
+
 @njit(cache=True, error_model="numpy")
 def search(
     start: NDArray[np.float64],
@@ -153,12 +183,7 @@ def search(
     o: SearchOptions,
 ) -> tuple[int, int, NDArray[np.int8]]:
     """Search a short way from a pose (4,) to a goal (3,): status, expansions and moves (n,) without the Approach."""
-    flights = np.zeros((N_TRANSLATIONS, 4))  # dx, dy, dz and length of every translation
-    for m in range(N_FLAT):
-        angle, length = start[3] + m // N_STEPS * TURN_RAD, STEPS_M[m % N_STEPS]
-        flights[m, 0], flights[m, 1], flights[m, 3] = math.cos(angle) * length, math.sin(angle) * length, length
-    for m in range(N_FLAT, N_TRANSLATIONS):
-        flights[m, 2], flights[m, 3] = LIFTS_M[m - N_FLAT], abs(LIFTS_M[m - N_FLAT])
+    flights = _flights(start[3])
     # Scalars and plain arrays: passing a tuple of arrays costs more than the inner loop's work.
     pose, cost, headings, moves, parents = s.pose, s.cost, s.heading, s.move, s.parent
     edge_parent, edge_move, edge_next, edge_extra, heads, keys, stamps, blockers = (
@@ -181,6 +206,7 @@ def search(
     legs, metres = np.zeros(3, np.int64), np.zeros(3, np.int64)
     no_moves = np.empty(0, np.int8)
     while True:
+        # 1. Take the cheapest edge.
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
         if lowest == _N_BUCKETS:
@@ -191,6 +217,7 @@ def search(
         entry, level = heads[lowest], lowest
         heads[lowest] = edge_next[entry]
         parent, move = edge_parent[entry], int(edge_move[entry])
+        # 2. An edge to the goal ends the search.
         if move == _TO_GOAL:
             return FOUND, n, _backtrack(parent, parents, moves)
         if move == _DIRECT:
@@ -199,6 +226,7 @@ def search(
                 x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
             return FOUND, n, append_legs(_backtrack(parent, parents, moves), legs, metres)
+        # 3. Of a direction whose longer steps were deferred, push them now.
         clearance_known = move < 0
         if clearance_known:
             move = ~move
@@ -213,11 +241,9 @@ def search(
                 h = cost_between(u, v, pz, ox, oy, oz, edge, cost_to_go)
                 f = cost[parent] + flights[m, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
                 if f < f_max:
-                    bucket = max(0, int(f / _BUCKET_M))
-                    edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = parent, m, heads[bucket]
-                    heads[bucket] = n_edges
+                    lowest = min(lowest, _push(f, parent, m, n_edges, edge_parent, edge_move, edge_next, heads))
                     n_edges += 1
-                    lowest = min(lowest, bucket)
+        # 4. Follow the edge to its state; one that is closed already is not expanded again.
         x, y, z, heading, g = start[0], start[1], start[2], 0, 0.0
         if parent >= 0:
             px, py, pz, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2], int(headings[parent])
@@ -233,6 +259,7 @@ def search(
         slot = ~_slot(key, now, keys, stamps)
         if slot < 0:
             continue
+        # 5. Test the edge for collisions, and push it again if its clearance cost makes it dearer.
         if clearance_known:
             g += edge_extra[entry]
         elif parent >= 0:
@@ -249,11 +276,13 @@ def search(
                     edge_move[entry], edge_extra[entry] = ~move, extra
                     edge_next[entry], heads[bucket] = heads[bucket], entry
                     continue
+        # 6. Close the state.
         if n >= o.budget:
             return BUDGET, n, no_moves
         keys[slot], stamps[slot] = key, now
         pose[n, 0], pose[n, 1], pose[n, 2] = x, y, z
         cost[n], headings[n], moves[n], parents[n] = g, heading, move, parent
+        # 7. Push the edges to the goal: the Approach, and the direct path.
         gap = math.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2)
         if gap <= o.approach and segment_free(x, y, z, goal[0], goal[1], goal[2], o.radius, grid, False):
             f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1) - f0
@@ -263,11 +292,9 @@ def search(
             f += clearance_penalty(x, y, z, goal[0], goal[1], goal[2], near_m, near_weight, ox, oy, oz, edge, field)
             f -= o.goal_tolerance
             if f < f_max:
-                f_max, bucket = f, max(0, int(f / _BUCKET_M))
-                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _TO_GOAL, heads[bucket]
-                heads[bucket] = n_edges
+                f_max = f
+                lowest = min(lowest, _push(f, n, _TO_GOAL, n_edges, edge_parent, edge_move, edge_next, heads))
                 n_edges += 1
-                lowest = min(lowest, bucket)
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
         direct, extra = np.inf, 0.0
         max_direct = f_max + f0 + o.goal_tolerance - g - _MIN_GAIN_M
@@ -280,11 +307,10 @@ def search(
             f = g + direct + _CLEARANCE_FACTOR * extra - f0 - o.goal_tolerance
             f += o.action_cost * count_actions(heading, goal_heading, legs, metres)
             if f < f_max:
-                f_max, bucket = f, max(0, int(f / _BUCKET_M))
-                edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, _DIRECT, heads[bucket]
-                heads[bucket] = n_edges
+                f_max = f
+                lowest = min(lowest, _push(f, n, _DIRECT, n_edges, edge_parent, edge_move, edge_next, heads))
                 n_edges += 1
-                lowest = min(lowest, bucket)
+        # 8. Push the translations: in every direction the steps that stay inside, then up and down.
         f_near = g + o.weight * h - f0 + _DEFER_MARGIN_M
         for m in range(0, N_FLAT, N_STEPS):
             turns = N_TURNS[wrap_heading(m // N_STEPS - heading)]
@@ -296,12 +322,9 @@ def search(
                 f = g + flights[m + step, 3] + o.action_cost * (turns + 1) + o.weight * h - f0
                 deferred = step == 0 and f > f_near
                 if f < f_max:
-                    bucket = max(0, int(f / _BUCKET_M))
-                    edge_parent[n_edges], edge_next[n_edges] = n, heads[bucket]
-                    edge_move[n_edges] = _DEFERRED + m // N_STEPS if deferred else m + step
-                    heads[bucket] = n_edges
+                    kind = _DEFERRED + m // N_STEPS if deferred else m + step
+                    lowest = min(lowest, _push(f, n, kind, n_edges, edge_parent, edge_move, edge_next, heads))
                     n_edges += 1
-                    lowest = min(lowest, bucket)
                 if deferred:
                     break
         for m in range(N_FLAT, N_TRANSLATIONS):
@@ -310,11 +333,7 @@ def search(
                 continue
             h = cost_between(x, y, w, ox, oy, oz, edge, cost_to_go)
             f = g + flights[m, 3] + o.action_cost + o.weight * h - f0
-            if not f < f_max:
-                continue
-            bucket = max(0, int(f / _BUCKET_M))
-            edge_parent[n_edges], edge_move[n_edges], edge_next[n_edges] = n, m, heads[bucket]
-            heads[bucket] = n_edges
-            n_edges += 1
-            lowest = min(lowest, bucket)
+            if f < f_max:
+                lowest = min(lowest, _push(f, n, m, n_edges, edge_parent, edge_move, edge_next, heads))
+                n_edges += 1
         n += 1
