@@ -9,9 +9,9 @@ last draw can select by the true lengths.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -21,6 +21,7 @@ from aerialdojo_gen.base.config.sections import QuotaConfig
 from aerialdojo_gen.base.constants import DETOUR, SETTINGS
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
 from aerialdojo_gen.pipeline.stages.work.quota import (
+    Kept,
     difficulty_level,
     rank_candidates,
     sampling_key,
@@ -68,16 +69,6 @@ class Candidates:
             pairs["target_visible_at_start"].to_numpy(),
             predicted_m,
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """n candidates that the rules keep."""
-
-    sampling_keys: list[str]  # Keys for random draws
-    settings: list[str]  # Length settings
-    length_m: Floats  # (n,) float64; lengths of the routes, metres
-    levels: Floats | Integers  # (n,) difficulty levels
 
 
 class CandidatePolicy(Protocol):
@@ -133,7 +124,8 @@ class PaperQuota:
     compares = True
 
     def __init__(self, paper: PaperScene, config: QuotaConfig, seed: int) -> None:
-        self._paper, self._config, self._seed = paper, config, seed
+        self._paper, self._config = paper, config
+        self._rules = paper.tasks, paper.path_m, seed, config.prefer_harder
         self._margin = config.search_margin
         self._taken = dict.fromkeys(SETTINGS, 0)
 
@@ -204,17 +196,11 @@ class PaperQuota:
         # A difficulty level counts by its probability.
         likely = 1.0 / (1.0 + np.exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
         levels = likely + (self._candidates.visible[rows] == 0.0)
-        places = self._draw(rank_candidates, self._kept(rows, setting, length_m, levels))
-        return {name: rows[place] for name, place in places.items()}
+        kept = self._kept(rows, setting, length_m, levels)
+        return {name: rows[place] for name, place in rank_candidates(kept, *self._rules).items()}
 
     def _kept(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats, levels: Floats | Integers) -> Kept:
         return Kept([self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, levels)
-
-    def _draw(self, draw: Callable[..., Any], kept: Kept) -> Any:
-        return draw(
-            kept.sampling_keys, kept.settings, kept.length_m, self._paper.tasks, self._paper.path_m, self._seed,
-            kept.levels, self._config.prefer_harder,
-        )  # fmt: skip
 
     def enough(self, kept: Kept) -> bool:
         """Whether the paper's counts and total length can be selected from these."""
@@ -229,8 +215,7 @@ class PaperQuota:
 
     def release(self, kept: Kept) -> NDArray[np.bool_]:
         """Draw the paper's counts, with lengths that sum to its metres."""
-        mask: NDArray[np.bool_] = self._draw(select_quota, kept)
-        return mask
+        return select_quota(kept, *self._rules)
 
     def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
         """Take the scene's share of the paper's training tasks."""

@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,45 +55,40 @@ def difficulty_level(plan_detour: Floats, visible_at_start: Floats) -> NDArray[n
     return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
 
 
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """n candidates that the rules keep."""
+
+    sampling_keys: Sequence[str]  # Keys for random draws
+    settings: Sequence[str]  # Length settings
+    length_m: Floats  # (n,) float64; lengths of the routes, metres
+    levels: Floats | NDArray[np.int64] | float = 0.0  # Difficulty levels, (n,) or one of all
+
+
 def select_quota(
-    keys: Sequence[str],
-    settings: Sequence[str],
-    length_m: Floats,
-    counts: Mapping[str, int],
-    path_m: float,
-    seed: int,
-    levels: NDArray[np.int64] | Floats | None = None,
-    preference: float = 0.0,
+    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> NDArray[np.bool_]:
     """Weighted sample without replacement (Gumbel's trick), (n,) bool.
 
     The counts of each setting hold, lengths sum to `path_m` by tilting the weights, harder tasks are preferred. A
     task's chance depends on its key, length and level, never on its row.
     """
-    scores, tie_rank = _score(keys, settings, length_m, counts, path_m, seed, levels, preference)
-    mask = np.zeros(len(keys), dtype=bool)
-    for rows, n in _groups(settings, counts):
-        mask[_best(scores, tie_rank, rows)[:n]] = True
+    mask = np.zeros(len(kept.settings), dtype=bool)
+    for name, rows in rank_candidates(kept, counts, path_m, seed, preference).items():
+        mask[rows[: counts[name]]] = True
     return mask
 
 
 def rank_candidates(
-    keys: Sequence[str],
-    settings: Sequence[str],
-    length_m: Floats,
-    counts: Mapping[str, int],
-    path_m: float,
-    seed: int,
-    levels: NDArray[np.int64] | Floats | None = None,
-    preference: float = 0.0,
+    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> dict[str, NDArray[np.int64]]:
     """Rows of each setting's tasks in the order of selection by `select_quota`."""
-    scores, tie_rank = _score(keys, settings, length_m, counts, path_m, seed, levels, preference)
-    return {name: _best(scores, tie_rank, np.flatnonzero(np.asarray(settings) == name)) for name in sorted(counts)}
+    scores, tie_rank = _score(kept, counts, path_m, seed, preference)
+    return {name: _best(scores, tie_rank, rows) for name, rows in _groups(kept, counts).items()}
 
 
-def _groups(settings: Sequence[str], counts: Mapping[str, int]) -> list[tuple[NDArray[np.int64], int]]:
-    return [(np.flatnonzero(np.asarray(settings) == s), n) for s, n in sorted(counts.items())]
+def _groups(kept: Kept, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
+    return {name: np.flatnonzero(np.asarray(kept.settings) == name) for name in sorted(counts)}
 
 
 def _best(scores: Floats, tie_rank: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -101,22 +97,14 @@ def _best(scores: Floats, tie_rank: NDArray[np.int64], rows: NDArray[np.int64]) 
 
 
 def _score(
-    keys: Sequence[str],
-    settings: Sequence[str],
-    length_m: Floats,
-    counts: Mapping[str, int],
-    path_m: float,
-    seed: int,
-    levels: NDArray[np.int64] | Floats | None,
-    preference: float,
+    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`; and the ranks (n,) that break ties."""
-    gumbel_scores = np.array([_gumbel(seed, key) for key in keys])
-    if levels is not None:
-        gumbel_scores = gumbel_scores + preference * levels
+    length_m = kept.length_m
+    gumbel_scores = np.array([_gumbel(seed, key) for key in kept.sampling_keys]) + preference * kept.levels
     # Ties are broken by key, not by row order.
-    tie_rank = np.argsort(np.argsort(np.asarray(keys)))
-    groups = _groups(settings, counts)
+    tie_rank = np.argsort(np.argsort(np.asarray(kept.sampling_keys)))
+    groups = [(rows, counts[name]) for name, rows in _groups(kept, counts).items()]
 
     def tilted(tilt: float) -> Floats:
         return np.asarray(gumbel_scores + tilt * length_m / _SCALE_M)

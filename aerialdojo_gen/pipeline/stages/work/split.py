@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.pipeline.stage import Job, Output
-from aerialdojo_gen.pipeline.stages.work.candidate_policy import Kept, policy_of
-from aerialdojo_gen.pipeline.stages.work.quota import difficulty_level, sampling_key, train_mask
+from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
+from aerialdojo_gen.pipeline.stages.work.quota import Kept, difficulty_level, sampling_key, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
