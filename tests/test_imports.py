@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -99,6 +100,20 @@ def test_libraries_are_imported_where_they_belong():
     assert found["fcl"] == {"planning/collision.py"}
     assert found["moderngl"]
     assert found["pyarrow.parquet"]
+
+
+def test_what_is_a_dependency_is_imported():
+    declared = tomllib.loads(PYPROJECT.read_text())["project"]["dependencies"]
+    modules = {"opencv-python-headless": "cv2", "python-fcl": "fcl"}
+    found = {
+        module.partition(".")[0]
+        for path in PACKAGE.rglob("*.py")
+        for module in imported(ast.parse(path.read_bytes()))
+    }
+    names = [re.split(r"[^\w-]", requirement)[0] for requirement in declared]
+    unused = {name for name in names if modules.get(name, name) not in found}
+    # PyArrow imports it, in `to_pandas()` of the tables that the public functions return.
+    assert unused == {"pandas"}
 
 
 def test_pybullet_is_loaded_by_who_draws_with_it():

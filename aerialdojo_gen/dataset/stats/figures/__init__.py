@@ -7,9 +7,9 @@ from pathlib import Path
 
 from aerialdojo_gen.dataset.stats.difficulty import read_tasks
 from aerialdojo_gen.dataset.stats.figures.charts import composition, detours, lengths
-from aerialdojo_gen.dataset.stats.figures.cloud import categories, names
 from aerialdojo_gen.dataset.stats.figures.difficulty import difficulty
 from aerialdojo_gen.dataset.stats.figures.maps import maps
+from aerialdojo_gen.dataset.stats.figures.ranking import categories, names
 from aerialdojo_gen.dataset.stats.figures.shares import shares
 from aerialdojo_gen.dataset.stats.figures.style import Routes, read_routes, save
 from aerialdojo_gen.store.root import Where, open_root
