@@ -5,6 +5,7 @@ import io
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from collections import Counter
 from dataclasses import replace
 
 import cv2
@@ -27,6 +28,7 @@ from aerialdojo_gen.dataset.stats.difficulty import (
 from aerialdojo_gen.dataset.stats.figures import draw_figures
 from aerialdojo_gen.dataset.stats.figures.charts import composition
 from aerialdojo_gen.dataset.stats.figures.maps import _round_length
+from aerialdojo_gen.dataset.stats.figures.ranking import _ranking
 from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, read_routes
 from aerialdojo_gen.dataset.stats.quality import flight_table, goal_table, read_flights, read_goals, worth_tables
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
@@ -325,6 +327,16 @@ def test_bars_are_as_long_as_the_counts(smoke):
     assert sum(bar.get_width() for bar in axes.patches) == instances
     assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}
     assert len(SETTING_COLOURS) == len(set(SETTING_COLOURS.values())) == len(axes.containers)
+
+
+def test_a_ranking_has_the_most_frequent_words_from_the_top_down():
+    counts = {f"w{k}": Counter({"Urban": k, "Natural": 2}) for k in range(1, 72)}
+    figure = _ranking(counts, "tasks", "names")
+    drawn = [(label.get_text(), bar.get_width()) for axes in figure.axes
+             for label, bar in zip(axes.get_yticklabels(), axes.patches, strict=True)]  # fmt: skip
+    assert drawn == [(f"w{k}", k + 2) for k in range(71, 11, -1)]
+    assert figure.get_suptitle() == "60 of 71 names"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Urban"]
 
 
 @pytest.mark.parametrize(("most", "length"), [(47.0, 20.0), (50.0, 50.0), (9.9, 5.0), (0.3, 0.2), (199, 100)])
