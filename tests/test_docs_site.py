@@ -35,8 +35,8 @@ def test_every_command_is_there_with_every_option(pages):
     assert set(parts) == set(commands)
     for name, command in commands.items():
         for one in command.params:
-            for text in one.opts if one.param_type_name == "option" else ():
-                assert f"`{text}" in parts[name] or f", {text}" in parts[name], (name, text)
+            for text in (*one.opts, *one.secondary_opts) if one.param_type_name == "option" else ():
+                assert re.search(rf"(`|, | / ){text}\b", parts[name]), (name, text)
 
 
 def test_every_key_and_every_column_is_there_with_its_unit(pages):
