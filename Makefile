@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture nightly lint format gallery bench lock clean
+.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture nightly facts lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -109,6 +109,9 @@ gallery: .venv/.installed  ## picture every prop and every scene into docs/galle
 
 docs: .venv/.dev  ## build the documentation's site into build/site/; a broken link or a page left out ends it
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet
+
+facts: .venv/.dev  ## measure the published figures on $(DATA): docs/facts.json, and the figures and tables of the pages
+	@.venv/bin/python tests/facts.py $(DATA)
 
 bench: .venv/.dev  ## measure planner, renderer and OMPL's planners beside ours
 	@for bench in tests/bench/bench_*.py; do echo "== $$bench"; .venv/bin/python $$bench || exit 1; done
