@@ -7,6 +7,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
@@ -17,15 +18,8 @@ from aerialdojo_gen.dataset.contents import CARD, TABLES, check_release, counts,
 from aerialdojo_gen.dataset.croissant import CITE_AS
 from aerialdojo_gen.dataset.provenance import made_of_scenes, makers
 from aerialdojo_gen.dataset.stats.comparison import Comparison
-from aerialdojo_gen.dataset.stats.difficulty import (
-    Tasks,
-    held_out_table,
-    read_tasks,
-    scene_table,
-    seen_table,
-    setting_table,
-)
-from aerialdojo_gen.dataset.stats.quality import worth_tables
+from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
 from aerialdojo_gen.dataset.stats.tables import Made
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -93,17 +87,10 @@ def _of_paper(made: Made) -> bool:
     )
 
 
-def _difficulty(tasks: Tasks) -> dict[str, str]:
+def _difficulty(tasks: pd.DataFrame) -> dict[str, str]:
     """Tables of difficulty and splits as Markdown, without their headings; none where the release does not tell."""
-    if not tasks.has_columns or not (tasks.target_split != "").any():
-        return {}
-    tables = {
-        "setting": setting_table(tasks),
-        "scene": scene_table(tasks),
-        "seen": seen_table(tasks),
-        "held_out": held_out_table(tasks),
-    }
-    return {name: _rows(table) for name, table in tables.items()}
+    made = dict(zip(("setting", "scene", "seen", "held_out"), difficulty_tables(tasks), strict=False))
+    return {name: _rows(table) for name, table in made.items()} if "held_out" in made else {}
 
 
 def _rows(table: Comparison) -> str:
@@ -154,9 +141,9 @@ def render_card(data: Where) -> str:
         made_by=sorted({maker.name for maker in known.values()} - {""}),
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),
-        worth={table.title: _rows(table) for table in worth_tables(root, names)},
-        least_detour=float(np.min(tasks.plan_detour)) if len(tasks) else None,
-        most_visible=float(np.max(tasks.target_visible_at_start)) if len(tasks) else None,
+        worth={table.title: _rows(table) for table in worth_tables(read_goals(root, names), tasks)},
+        least_detour=float(np.min(tasks["plan_detour"].to_numpy())) if len(tasks) else None,
+        most_visible=float(np.max(tasks["target_visible_at_start"].to_numpy())) if len(tasks) else None,
         detour=DETOUR,
         citation=CITE_AS.replace(", title", ",\n  title")
         .replace(", author", ",\n  author")

@@ -16,21 +16,22 @@ import pytest
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.dataset.contents import check_release
 from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
-from aerialdojo_gen.dataset.stats.difficulty import (
-    Tasks,
-    difficulty_tables,
-    held_out_table,
-    read_tasks,
-    scene_table,
-    seen_table,
-    setting_table,
-)
 from aerialdojo_gen.dataset.stats.figures import draw_figures
 from aerialdojo_gen.dataset.stats.figures.charts import composition
 from aerialdojo_gen.dataset.stats.figures.maps import _round_length
 from aerialdojo_gen.dataset.stats.figures.ranking import _ranking
-from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, read_routes
-from aerialdojo_gen.dataset.stats.quality import flight_table, goal_table, read_flights, read_goals, worth_tables
+from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS
+from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
+from aerialdojo_gen.dataset.stats.measures import (
+    difficulty_tables,
+    flight_table,
+    goal_table,
+    held_out_table,
+    scene_table,
+    seen_table,
+    setting_table,
+    worth_tables,
+)
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
 from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
 from aerialdojo_gen.store import schemas
@@ -237,7 +238,7 @@ def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
 
 
 def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
-    table = flight_table(read_flights(smoke, check_release(smoke)))
+    table = flight_table(tasks := read_tasks(smoke, check_release(smoke)))
     turns = ahead = sideways = 0
     for actions in frame["action"]:
         names = [schemas.ACTION_NAMES[a] for a in actions]
@@ -253,13 +254,18 @@ def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
         len(frame), frame["min_clearance_m"].median(), frame["min_clearance_m"].quantile(0.1), n_actions.median(),
         100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
     ))  # fmt: skip
-    assert max(len(line) for t in worth_tables(smoke, check_release(smoke)) for line in t.terminal(80)) <= 80
+    assert (
+        max(
+            len(line) for t in worth_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80)
+        )
+        <= 80
+    )
 
 
 def test_tables_of_difficulty_fit_a_terminal(smoke):
     tasks = read_tasks(smoke, check_release(smoke))
-    many = Tasks(**{name: np.tile(values, 3) for name, values in vars(tasks).items()})
-    many = replace(many, scene=np.resize([*inventory()], len(many)))
+    many = pd.concat([tasks] * 3, ignore_index=True)
+    many = many.assign(scene=np.resize([*inventory()], len(many)))
     for table in difficulty_tables(many):
         assert max(map(len, table.terminal())) <= 100
         assert max(map(len, table.terminal(80))) <= 80
@@ -268,8 +274,8 @@ def test_tables_of_difficulty_fit_a_terminal(smoke):
 
 def test_a_release_that_does_not_say_has_no_such_tables(smoke):
     tasks = read_tasks(smoke, check_release(smoke))
-    assert difficulty_tables(replace(tasks, plan_detour=np.full(len(tasks), np.nan))) == []
-    unsplit = replace(tasks, target_split=np.full(len(tasks), ""))
+    assert difficulty_tables(tasks.assign(plan_detour=np.nan)) == []
+    unsplit = tasks.assign(target_split="")
     assert len(difficulty_tables(unsplit)) == 2
 
 
@@ -294,8 +300,10 @@ FIGURES = ("composition", "shares", "lengths", "detours", "difficulty", "categor
 def test_the_command_writes_what_it_prints(smoke, drawn):
     out, printed = drawn
     scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
-    told = difficulty_tables(read_tasks(smoke, [m.scene for m in scenes]))
-    made = [*tables(scenes), *worth_tables(smoke, [m.scene for m in scenes]), *told, benchmark_table(scenes)]
+    names = [m.scene for m in scenes]
+    tasks = read_tasks(smoke, names)
+    measured = [*worth_tables(read_goals(smoke, names), tasks), *difficulty_tables(tasks)]
+    made = [*tables(scenes), *measured, benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)
     assert "\n\n".join("\n".join(table.terminal(80)) for table in made) in printed
@@ -322,7 +330,7 @@ def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tm
 
 def test_bars_are_as_long_as_the_counts(smoke):
     names = check_release(smoke)
-    axes = composition(read_routes(smoke, names)).axes[0]
+    axes = composition(read_tasks(smoke, names)).axes[0]
     instances = sum(made_of(smoke, name).instances for name in names)
     assert sum(bar.get_width() for bar in axes.patches) == instances
     assert {t.get_text() for t in axes.texts} == {f"{instances:,}"}

@@ -8,9 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aerialdojo_gen.base import text_table
 from aerialdojo_gen.base.text_table import TextTable
 
@@ -141,24 +138,6 @@ class Comparison:
             for row in self.rows
             for column, ours, paper in zip(self.columns, row.ours, row.paper, strict=True)
         ]
-
-
-def quantile(values: NDArray[np.float64], q: float) -> Figure:
-    """Quantile of the values that are known, None without any."""
-    known = values[np.isfinite(values)]
-    return float(np.quantile(known, q)) if len(known) else None
-
-
-def own_table(
-    title: str,
-    key: str,
-    columns: tuple[Column, ...],
-    rows: list[tuple[str, tuple[Figure, ...]]],
-    notes: tuple[str, ...] = (),
-) -> Comparison:
-    """Make a table that the paper has nothing of."""
-    none: tuple[Figure, ...] = (None,) * len(columns)
-    return Comparison(title, key, columns, tuple(Row(name, ours, none) for name, ours in rows), notes)
 
 
 @dataclass(frozen=True)

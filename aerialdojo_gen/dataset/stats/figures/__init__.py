@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerialdojo_gen.dataset.stats.difficulty import read_tasks
-from aerialdojo_gen.dataset.stats.figures.charts import composition, detours, lengths
-from aerialdojo_gen.dataset.stats.figures.difficulty import difficulty
+from aerialdojo_gen.dataset.stats.figures.charts import composition, detours, difficulty, lengths, shares
 from aerialdojo_gen.dataset.stats.figures.maps import maps
 from aerialdojo_gen.dataset.stats.figures.ranking import categories, names
-from aerialdojo_gen.dataset.stats.figures.shares import shares
-from aerialdojo_gen.dataset.stats.figures.style import Routes, read_routes, save
+from aerialdojo_gen.dataset.stats.figures.style import save
+from aerialdojo_gen.dataset.stats.frames import read_tasks
+from aerialdojo_gen.dataset.stats.measures import tells_difficulty
 from aerialdojo_gen.store.root import Where, open_root
 
 __all__ = ["draw_figures"]
@@ -20,14 +19,13 @@ __all__ = ["draw_figures"]
 def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]:
     """Draw all figures."""
     root = open_root(data)
-    routes: Routes = read_routes(root, scenes)
     tasks = read_tasks(root, scenes)
     figures = {
-        "composition": composition(routes),
-        "shares": shares(routes),
-        "lengths": lengths(routes),
-        "detours": detours(routes),
-        **({"difficulty": difficulty(tasks)} if tasks.has_columns else {}),
+        "composition": composition(tasks),
+        "shares": shares(tasks),
+        "lengths": lengths(tasks),
+        "detours": detours(tasks),
+        **({"difficulty": difficulty(tasks)} if tells_difficulty(tasks) else {}),
         "categories": categories(root, scenes),
         "names": names(root, scenes),
         "maps": maps(root, scenes),

@@ -1,32 +1,34 @@
-"""Charts of a release's tasks: what they are made of, how long they are, how far from straight."""
+"""Charts of a release's tasks: what they are made of, how long they are, how far from straight, and how hard."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.constants import DETOUR
 from aerialdojo_gen.dataset.stats.figures.style import (
     FAMILY_COLOURS,
     OTHER_COLOUR,
     SETTING_COLOURS,
     SETTING_NAMES,
     WIDTH_IN,
-    Routes,
+    family_order,
     styled,
 )
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _THOUSANDS = FuncFormatter(lambda value, _: f"{value:,.0f}")
-
-
-def _families(routes: Routes) -> list[str]:
-    there = set(routes.family.tolist())
-    return [*(f for f in FAMILY_COLOURS if f in there), *sorted(there - {*FAMILY_COLOURS})]
+_SUBSET_COLOURS = {"train": "#6b7a8f", "test": "#e0a458"}
+_PARTITIONS = ("ID", "OOD")
+# A curve of tens of thousands of steps is cut down to what a printed page can show.
+_STEPS = 2000
 
 
 def _bars(axes: Axes, names: list[str], counts: NDArray[np.int64]) -> None:
@@ -48,31 +50,30 @@ def _bars(axes: Axes, names: list[str], counts: NDArray[np.int64]) -> None:
     axes.set_xlabel("task instances")
 
 
-def _counts(routes: Routes, keys: NDArray[np.str_], names: list[str]) -> NDArray[np.int64]:
-    """Task instances (two a navigation task) by name and setting."""
-    return np.array(
-        [[2 * np.count_nonzero((keys == name) & (routes.setting == s)) for s in SETTINGS] for name in names]
-    )
+def _counts(tasks: pd.DataFrame, key: str, names: Iterable[str], by: str, kinds: Iterable[str]) -> NDArray[np.int64]:
+    """Task instances (two a navigation task) by the values of two columns."""
+    found = pd.crosstab(tasks[key], tasks[by]).reindex(index=[*names], columns=[*kinds], fill_value=0)
+    return np.asarray(2 * found.to_numpy(), dtype=np.int64)
 
 
-def composition(routes: Routes) -> Figure:
+def composition(tasks: pd.DataFrame) -> Figure:
     """Draw task instances by family and by scene type, in shades of their length setting."""
-    families = _families(routes)
-    family_of = dict(zip(routes.scene_type.tolist(), routes.family.tolist(), strict=True))
+    families = family_order(tasks["family"])
+    family_of = dict(zip(tasks["scene_type"], tasks["family"], strict=True))
     types = [
         kind
         for family in families
         for kind in sorted(
-            (k for k, f in family_of.items() if f == family), key=lambda k: (-(routes.scene_type == k).sum(), k)
+            (k for k, f in family_of.items() if f == family), key=lambda k: (-(tasks["scene_type"] == k).sum(), k)
         )
     ]
     with styled():
         figure = Figure(figsize=(WIDTH_IN, max(2.2, 0.9 + 0.165 * len(types))), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.25))
-        _bars(left, families, _counts(routes, routes.family, families))
+        _bars(left, families, _counts(tasks, "family", families, "setting", SETTINGS))
         left.set_title("By scene family", loc="left")
         spaced = [re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind) for kind in types]
-        _bars(right, spaced, _counts(routes, routes.scene_type, types))
+        _bars(right, spaced, _counts(tasks, "scene_type", types, "setting", SETTINGS))
         right.set_title("By scene type", loc="left")
         for axes, owners in ((left, families), (right, [family_of[kind] for kind in types])):
             for label, owner in zip(axes.get_yticklabels(), owners, strict=True):
@@ -82,8 +83,8 @@ def composition(routes: Routes) -> Figure:
     return figure
 
 
-def _histogram(axes: Axes, routes: Routes, values: NDArray[np.float64], edges: NDArray[np.float64]) -> None:
-    parts = [values[routes.setting == s] for s in SETTINGS]
+def _histogram(axes: Axes, tasks: pd.DataFrame, name: str, edges: NDArray[np.float64]) -> None:
+    parts = [tasks[name][tasks["setting"] == s].to_numpy(np.float64) for s in SETTINGS]
     axes.hist(
         parts,
         bins=edges.tolist(),
@@ -96,41 +97,29 @@ def _histogram(axes: Axes, routes: Routes, values: NDArray[np.float64], edges: N
     axes.set_xlim(0, float(edges[-1]))
 
 
-def lengths(routes: Routes) -> Figure:
+def lengths(tasks: pd.DataFrame) -> Figure:
     """Draw how long the reference trajectories are, in metres and in actions."""
     with styled():
         figure = Figure(figsize=(WIDTH_IN, 2.5), layout="constrained")
         left, right = figure.subplots(1, 2)
-        _histogram(left, routes, routes.length_m, np.arange(0.0, 101.0, 2.0))
+        _histogram(left, tasks, "length_m", np.arange(0.0, 101.0, 2.0))
         left.set_xlabel("length of the reference trajectory, m")
         left.set_ylabel("navigation tasks per 2 m")
         left.legend(loc="upper right")
-        most = int(routes.n_actions.max(initial=0))
+        most = int(tasks["n_actions"].max()) if len(tasks) else 0
         step = max(1, round(most / 50))
-        _histogram(right, routes, routes.n_actions.astype(np.float64), np.arange(0.5, most + 2.0 * step, step))
+        _histogram(right, tasks, "n_actions", np.arange(0.5, most + 2.0 * step, step))
         right.set_xlabel("actions, Stop included")
         right.set_ylabel("navigation tasks per action" if step == 1 else f"navigation tasks per {step} actions")
     return figure
 
 
-def detours(routes: Routes) -> Figure:
+def detours(tasks: pd.DataFrame) -> Figure:
     """Draw how much longer than the straight line the reference trajectories are."""
     with styled():
         figure = Figure(figsize=(WIDTH_IN * 0.62, 2.6), layout="constrained")
         axes = figure.subplots()
-        far = 1.5
-        for setting in SETTINGS:
-            values = np.sort(routes.detour_ratio[routes.setting == setting])
-            if not len(values):
-                continue
-            share = 100.0 * (1.0 - np.arange(1, len(values) + 1) / len(values))
-            label = f"{SETTING_NAMES[setting]} (median {np.median(values):.2f})"
-            # Curves of tens of thousands of steps are cut down to what a printed page can show.
-            thin = np.unique(np.linspace(0, len(values) - 1, 2000).astype(int))
-            axes.step(values[thin], share[thin], where="post", color=SETTING_COLOURS[setting], lw=1.6, label=label)
-            far = max(far, float(np.quantile(values, 0.995)))
-        axes.set_xlim(1.0, far)
-        axes.set_ylim(0, 100)
+        _beyond(axes, tasks, "detour_ratio", 1.0, 1.5, 0.995, 1.6, " (median {:.2f})")
         axes.set_xlabel("detour ratio κ = length / straight distance")
         axes.set_ylabel("tasks with a larger ratio, %")
         axes.axvline(1.05, color="#888888", lw=0.8, ls=(0, (3, 2)))
@@ -141,3 +130,99 @@ def detours(routes: Routes) -> Figure:
         axes.grid()
         axes.legend(loc="upper right")
     return figure
+
+
+def shares(tasks: pd.DataFrame) -> Figure:
+    """Draw instances by family and setting, train and test by partition, and the mean length by family."""
+    families = family_order(tasks["family"])
+    with styled():
+        figure = Figure(figsize=(WIDTH_IN, 2.7), layout="constrained")
+        left, middle, right = figure.subplots(1, 3, width_ratios=(1.3, 0.8, 1.0))
+        by_family = _counts(tasks, "family", families, "setting", SETTINGS)
+        _grouped(left, families, by_family, [(SETTING_NAMES[s], SETTING_COLOURS[s]) for s in SETTINGS])
+        left.set_ylabel("task instances")
+        left.set_title("(a) By family and setting", loc="left")
+        by_partition = _counts(tasks, "partition", _PARTITIONS, "subset", _SUBSET_COLOURS)
+        _grouped(middle, list(_PARTITIONS), by_partition, list(_SUBSET_COLOURS.items()))
+        middle.set_title("(b) Train and test", loc="left")
+        means = [float(tasks["length_m"][tasks["family"] == f].to_numpy().mean()) for f in families]
+        bars = right.bar(families, means, width=0.62, color=[FAMILY_COLOURS.get(f, OTHER_COLOUR) for f in families])
+        right.bar_label(bars, [f"{mean:.1f}" for mean in means], padding=2, fontsize=7)
+        right.set_ylabel("mean length, m")
+        right.set_title("(c) Reference trajectories", loc="left")
+        right.set_ylim(0.0, 1.14 * max(means, default=1.0))
+        for axes in (left, right):
+            axes.set_xticks(range(len(families)), families, rotation=22, ha="right", rotation_mode="anchor")
+        for axes in (left, middle, right):
+            axes.grid(axis="y")
+            axes.tick_params(axis="x", length=0)
+    return figure
+
+
+def _grouped(axes: Axes, names: list[str], counts: NDArray[np.int64], kinds: list[tuple[str, str]]) -> None:
+    """Draw a group of bars a name, a bar a kind, with their counts above."""
+    width = 0.8 / len(kinds)
+    for k, (kind, colour) in enumerate(kinds):
+        places = np.arange(len(names)) + (k - (len(kinds) - 1) / 2) * width
+        bars = axes.bar(places, counts[:, k], width=0.92 * width, color=colour, label=kind)
+        axes.bar_label(bars, [_short(int(n)) for n in counts[:, k]], padding=1.5, fontsize=5)
+    axes.set_xticks(range(len(names)), names)
+    axes.yaxis.set_major_formatter(_THOUSANDS)
+    axes.set_ylim(0.0, 1.1 * int(counts.max(initial=0)) or 1.0)
+    axes.legend(loc="upper right")
+
+
+def _short(count: int) -> str:
+    """Write a count in the little room above a bar: 286, 7.1k, 42k, 114k."""
+    return f"{count}" if count < 1000 else f"{count / 1000:.{3 if count >= 100_000 else 2}g}k"
+
+
+def difficulty(tasks: pd.DataFrame) -> Figure:
+    """Draw the shares of tasks with a greater detour, with a greater climb, and with what makes a task easy."""
+    with styled():
+        figure = Figure(figsize=(WIDTH_IN, 2.5), layout="constrained")
+        left, middle, right = figure.subplots(1, 3, width_ratios=(1.1, 1.0, 1.1))
+        _beyond(left, tasks, "plan_detour", 1.0, 1.1)
+        left.axvline(DETOUR, color="#888888", lw=0.8, ls=(0, (3, 2)))
+        left.set_xlabel("length / shortest without obstacles")
+        left.set_ylabel("tasks beyond, %")
+        left.legend(loc="upper right")
+        left.set_title("(a) Detour", loc="left")
+        _beyond(middle, tasks, "climb_m", 0.0, 0.1)
+        middle.set_xlabel("metres flown upwards")
+        middle.set_title("(b) Climb", loc="left")
+        easy = {
+            f"detour\nbelow {DETOUR}": tasks["plan_detour"] < DETOUR,
+            "straight\nline free": tasks["straight_line_free"] == 1.0,
+            "target\nin view": tasks["target_visible_at_start"] > 0.0,
+        }
+        for k, setting in enumerate(SETTINGS):
+            own = tasks["setting"] == setting
+            shares = [100.0 * float(np.mean(mask[own])) if own.any() else 0.0 for mask in easy.values()]
+            right.bar(np.arange(3) + (k - 1) * 0.27, shares, width=0.25, color=SETTING_COLOURS[setting])
+        right.set_xticks(range(3), list(easy))
+        right.tick_params(axis="x", length=0)
+        right.set_ylabel("tasks, %")
+        right.set_ylim(bottom=0.0)
+        right.set_title("(c) What makes tasks easy", loc="left")
+        for axes in (left, middle, right):
+            axes.grid(axis="y")
+    return figure
+
+
+def _beyond(
+    axes: Axes, tasks: pd.DataFrame, name: str, least: float, far: float, q: float = 0.99, width: float = 1.4,
+    median: str = "",
+) -> None:  # fmt: skip
+    """Draw the share of tasks beyond each value of a column, a curve a setting."""
+    for setting in SETTINGS:
+        own = np.sort(tasks[name][tasks["setting"] == setting].dropna().to_numpy(np.float64))
+        if not len(own):
+            continue
+        share = 100.0 * (1.0 - np.arange(1, len(own) + 1) / len(own))
+        thin = np.unique(np.linspace(0, len(own) - 1, _STEPS).astype(int))
+        label = SETTING_NAMES[setting] + median.format(np.median(own))
+        axes.step(own[thin], share[thin], where="post", color=SETTING_COLOURS[setting], lw=width, label=label)
+        far = max(far, float(np.quantile(own, q)))
+    axes.set_xlim(least, far)
+    axes.set_ylim(0, 100)

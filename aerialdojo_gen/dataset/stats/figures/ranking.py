@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from aerialdojo_gen.dataset.stats.figures.style import FAMILY_COLOURS, OTHER_COLOUR, WIDTH_IN, styled
+from aerialdojo_gen.dataset.stats.figures.style import FAMILY_COLOURS, OTHER_COLOUR, WIDTH_IN, family_order, styled
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 
@@ -57,8 +57,7 @@ def _ranking(counts: Mapping[str, Counter[str]], unit: str, things: str) -> Figu
             axes.set_xlabel(unit)
             axes.grid(axis="x")
         figure.suptitle(f"{len(shown)} of {len(ranked)} {things}", x=0.01, ha="left", fontsize="medium")
-        there = {*families.values()}
-        order = [*(f for f in FAMILY_COLOURS if f in there), *sorted(there - {*FAMILY_COLOURS})]
+        order = family_order(families.values())
         patches = [Patch(color=FAMILY_COLOURS.get(f, OTHER_COLOUR), label=f) for f in order]
         figure.legend(handles=patches, loc="outside upper right", ncols=max(len(patches), 1))
     return figure

@@ -1,22 +1,16 @@
-"""What all figures share: the routes' figures, colours, type, and files that do not change from run to run."""
+"""What all figures share: colours, type, and files that do not change from run to run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
-import pyarrow as pa
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.atomic import atomic_file
-from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 # Settings are ordered, so they are shades of one colour; families are not (Paul Tol's muted scheme).
@@ -50,41 +44,10 @@ _STYLE: Any = {
 }
 
 
-@dataclass(frozen=True)
-class Routes:
-    """One entry a navigation task."""
-
-    family: NDArray[np.str_]  # (n,) arrays of str
-    scene_type: NDArray[np.str_]
-    partition: NDArray[np.str_]
-    subset: NDArray[np.str_]
-    setting: NDArray[np.str_]
-    length_m: NDArray[np.float64]  # (n,) float64
-    detour_ratio: NDArray[np.float64]
-    n_actions: NDArray[np.int32]  # (n,) int32
-
-
-def read_routes(root: DataRoot, scenes: Sequence[str]) -> Routes:
-    """Read what the charts show of the scenes' routes."""
-    columns = ["setting", "length_m", "detour_ratio", "n_actions"]
-    belongs = ("family", "scene_type", "partition")
-    tables: list[pa.Table] = []
-    keys: list[tuple[str, ...]] = []
-    for scene in scenes:
-        row = store.read_scene(root, "release/scenes", scene, belongs).to_pylist()[0]
-        for subset in ("train", "test"):
-            tables.append(store.read_scene(root, f"routes/{subset}", scene, columns))
-            keys += [(*(row[name] for name in belongs), subset)] * tables[-1].num_rows
-    table = pa.concat_tables(tables)
-    family, scene_type, partition, side = np.array(keys, dtype=np.str_).reshape(-1, 4).T
-    return Routes(
-        family,
-        scene_type,
-        partition,
-        side,
-        np.array(table.column("setting").to_pylist(), dtype=np.str_),
-        *(table.column(name).to_numpy() for name in columns[1:]),
-    )
+def family_order(there: Iterable[str]) -> list[str]:
+    """Order families as the paper has them, others behind them by name."""
+    names = set(there)
+    return [*(f for f in FAMILY_COLOURS if f in names), *sorted(names - {*FAMILY_COLOURS})]
 
 
 def styled() -> AbstractContextManager[None]:
