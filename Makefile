@@ -75,17 +75,20 @@ evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 6
 	@$(RUN) report $(SAMPLE_AGENTS:%=tables-%) --table results --table partition --data $(DATA) --out $(DATA)/report
 
 PYTEST_FLAGS ?= -n 2 --dist loadfile
+# A test that never ends is ended; the longest takes half a minute on an idle machine.
+PYTEST := .venv/bin/python -m pytest --timeout 600
 test: .venv/.dev  ## run the tests (PYTEST_FLAGS='-k planner' for some of them)
-	@.venv/bin/python -m pytest $(PYTEST_FLAGS)
+	@$(PYTEST) $(PYTEST_FLAGS)
 
 test-fast: .venv/.dev  ## unit and property tests alone: no whole pipeline, browser, kill, scene, cluster or object store
-	@.venv/bin/python -m pytest $(PYTEST_FLAGS) -m fast
+	@$(PYTEST) $(PYTEST_FLAGS) -m fast
 
 fuzz: .venv/.dev  ## mutants of every input into every parser, N=500 each
 	@PYTHONPATH=tests .venv/bin/python -m fuzzing -n $(or $(N),500) $(if $(SEED),--seed $(SEED)) $(foreach t,$(TARGET),--target $(t))
 torture: .venv/.dev  ## kill run, render, export, import and evaluate N=100 times and compare what repeating them leaves
 	@.venv/bin/python tests/torture.py -n $(or $(N),100) $(if $(SEED),--seed $(SEED))
-nightly: .venv/.dev  ## some hours: fuzz with N=10000, torture with N=100, ten small scenes under load, the golden file
+nightly: .venv/.dev  ## some hours: the nightly tests, fuzz with N=10000, torture with N=100, ten scenes under load, the golden file
+	@$(PYTEST) $(PYTEST_FLAGS) -m nightly
 	@$(MAKE) --no-print-directory fuzz N=10000 SEED=$(NIGHT)
 	@$(MAKE) --no-print-directory torture N=100 SEED=$(NIGHT)
 	@.venv/bin/python tests/under_load.py

@@ -21,9 +21,15 @@ if TYPE_CHECKING:
     from support.planting import Planted
 
 # A test with one of these marks is left out of `make test-fast`; every other gets the mark "fast".
-NOT_FAST = frozenset({"pipeline", "browser", "kill", "scenes", "ray", "s3", "slow"})
+NOT_FAST = frozenset({"pipeline", "browser", "kill", "scenes", "ray", "s3", "slow", "nightly"})
 # Marks that go with a fixture.
 BY_FIXTURE = {"smoke": "pipeline", "browser": "browser", "mesh_of": "scenes"}
+# Skips that `--expected-skips-only` (.ci/run) allows, by how their reasons begin; any other skip fails the run.
+EXPECTED_SKIPS = (
+    "LEROBOT_PYTHON names no Python",  # some GB, and versions of packages that differ from ours
+    "stable-baselines3 is not installed",
+    "this machine lets nobody make namespaces",  # most containers
+)
 
 
 # Where it is ignored, as in a script's background job, the processes of the tests would ignore Ctrl-C too.
@@ -35,9 +41,36 @@ hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--expected-skips-only", action="store_true", help="fail at a skip not in EXPECTED_SKIPS")
+
+
+def unexpected_skips(config: pytest.Config) -> list[str]:
+    """Where and why tests or modules were skipped, without those that are expected."""
+    if not config.getoption("expected_skips_only") or hasattr(config, "workerinput"):
+        return []
+    reports = config.pluginmanager.get_plugin("terminalreporter").stats.get("skipped", [])
+    reasons = {report.nodeid: report.longrepr[2].removeprefix("Skipped: ") for report in reports}
+    return [f"{name}: {why}" for name, why in reasons.items() if not why.startswith(EXPECTED_SKIPS)]
+
+
+def pytest_terminal_summary(terminalreporter, config: pytest.Config) -> None:
+    for line in unexpected_skips(config):
+        terminalreporter.write_line(f"skipped, which EXPECTED_SKIPS does not allow: {line}", red=True)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if unexpected_skips(session.config) and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put every test into its tier."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Put every test into its tier; leave out the nightly ones, unless they are named or asked for by `-m`."""
+    if "nightly" not in config.option.markexpr and not any("::" in arg for arg in config.args):
+        nightly = [item for item in items if item.get_closest_marker("nightly")]
+        config.hook.pytest_deselected(items=nightly)
+        items[:] = [item for item in items if item not in nightly]
     for item in items:
         for fixture in BY_FIXTURE.keys() & set(getattr(item, "fixturenames", ())):
             item.add_marker(BY_FIXTURE[fixture])
@@ -86,15 +119,7 @@ def smoke(project: Path, shared: Path) -> Path:
     with (shared / "smoke.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not whole.exists():
-            command = [
-                sys.executable,
-                "-m",
-                "aerialdojo_gen.cli",
-                "run",
-                "pipelines/smoke.toml",
-                "--data",
-                str(data),
-            ]
+            command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(data)]
             done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stderr
             whole.touch()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, props_of
+from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.layouts.natural.desert.sands import dunes, wash
@@ -15,14 +15,14 @@ from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 SCENES = [f"N_{kind}_{k}" for kind in ("Desert", "Snowfield") for k in (0, 1)]
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = each_scene(SCENES)
 
 
 def blank(size: float = 60.0) -> Site:
     return Site("N_T_0", Recipe(layout="none", size_m=(size, size), ceiling_m=20), catalogue())
 
 
-@each_scene
+@of_each_scene
 def test_things_keep_clear_of_rocks_and_houses(scene_of, name):
     scene = scene_of(name)
     hulls = [(i, shapely.MultiPoint(i.vertices[:, :2]).convex_hull) for i in scene.instances if i.category == "hut"]

@@ -26,6 +26,7 @@ def blank() -> Site:
     return Site("D_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
 
 
+@pytest.mark.nightly
 def test_every_category_of_the_theme_stands_somewhere(scene_of):
     placed = {i.category for name in SCENES for i in props_of(scene_of(name))}
     theme = {"rubble_heap", "rescue_tent", "field_hospital_tent", "ambulance", "fire_engine", "stretcher",

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from support.layout_checks import props_of
+from support.layout_checks import each_scene, props_of
 
 SCENES = ["D_Flood_0", "D_Flood_1"]
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = each_scene(SCENES)
 
 
-@each_scene
+@of_each_scene
 def test_the_water_stands_up_to_the_windows(scene_of, name):
     houses = [i for i in scene_of(name).instances if i.category in ("house", "flat_house")]
     assert len(houses) >= 3
@@ -18,7 +18,7 @@ def test_the_water_stands_up_to_the_windows(scene_of, name):
         assert -0.3 < glass.min() < 0.3
 
 
-@each_scene
+@of_each_scene
 def test_what_is_half_under_shows_more_than_half(scene_of, name):
     for prop in props_of(scene_of(name)):
         if prop.attributes.get("place", "").startswith("half under"):
@@ -27,7 +27,7 @@ def test_what_is_half_under_shows_more_than_half(scene_of, name):
             assert low + high > 0.0
 
 
-@each_scene
+@of_each_scene
 def test_the_dyke_has_a_gap_at_water_level(scene_of, name):
     ground = next(i for i in scene_of(name).instances if i.category == "ground")
     crest = ground.vertices[ground.vertices[:, 2] > 2.5]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, props_of
+from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
@@ -12,7 +12,7 @@ from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site, footprint
 
 SCENES = ["I_Harbor_0", "I_Harbor_1"]
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = each_scene(SCENES)
 _AFLOAT = {"freighter", "fishing_boat", "tugboat", "sailboat", "motor_yacht", "rowing_boat", "buoy"}
 
 
@@ -24,7 +24,7 @@ def land(scene: Scene) -> shapely.Geometry:
     return shapely.union_all(shapely.make_valid(shapely.polygons(corners[level][:, :, :2])), grid_size=0.01)
 
 
-@each_scene
+@of_each_scene
 def test_boats_float_clear_of_the_quays(scene_of, name):
     scene = scene_of(name)
     boats = [i for i in props_of(scene) if i.category in _AFLOAT]

@@ -17,6 +17,7 @@ from aerialdojo_gen.scenes.model import Scene
 SCENES = ["U_Stadium_0", "U_Stadium_1", "U_Park_0", "U_Park_1"]
 
 
+@pytest.mark.nightly
 def test_their_themes_are_shown_whole(scene_of):
     shown = Counter(p.category for name in SCENES for p in props_of(scene_of(name)))
     assets = layout_checks.ASSETS / "props"

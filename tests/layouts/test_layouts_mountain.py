@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue
+from support.layout_checks import catalogue, each_scene
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.layouts.natural.mountain.peaks import Ridge, above, massif, steep
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = each_scene(SCENES)
 
 
-@each_scene
+@of_each_scene
 def test_boulders_touch_the_ground(scene_of, name):
     scene = scene_of(name)
     ground = RayCaster(Scene(name, (scene["ground"],), scene.materials, scene.bounds))

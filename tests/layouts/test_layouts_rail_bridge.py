@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from support.layout_checks import catalogue, props_of
+from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.layouts.infrastructure.bridge.decks import Deck
@@ -19,7 +19,7 @@ def blank() -> Site:
     return Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
 
 
-@pytest.mark.parametrize("name", ["I_RailCorridor_0", "I_RailCorridor_1"])
+@each_scene(["I_RailCorridor_0", "I_RailCorridor_1"])
 def test_wheels_stand_on_rails(scene_of, name):
     scene = scene_of(name)
     tracks = tuple(i for i in scene.instances if i.category == "track")
@@ -33,7 +33,7 @@ def test_wheels_stand_on_rails(scene_of, name):
         assert on.mean() > 0.3, car.node
 
 
-@pytest.mark.parametrize("name", ["I_Bridge_0", "I_Bridge_1"])
+@each_scene(["I_Bridge_0", "I_Bridge_1"])
 def test_one_can_fly_under_the_bridge_and_not_through_its_road(scene_of, name):
     scene = scene_of(name)
     cast = RayCaster(scene)

@@ -14,10 +14,10 @@ from aerialdojo_gen.scenes.site import Site
 
 SCENES = [f"N_{kind}_{k}" for kind in ("Island", "Coast") for k in (0, 1)]
 BOATS = ("fishing_boat", "rowing_boat", "sailboat", "motor_yacht", "tugboat", "buoy")
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = look.each_scene(SCENES)
 
 
-@each_scene
+@of_each_scene
 def test_boats_lie_on_the_level_sea(scene_of, name):
     scene = scene_of(name)
     boats = [i for i in look.props_of(scene) if i.category in BOATS]

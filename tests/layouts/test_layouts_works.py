@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, props_of
+from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -16,14 +16,14 @@ from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
 SCENES = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
-each_scene = pytest.mark.parametrize("name", SCENES)
+of_each_scene = each_scene(SCENES)
 
 
 def blank(size: float = 60.0) -> Site:
     return Site("U_T_0", Recipe(layout="none", size_m=(size, size), ceiling_m=20), catalogue())
 
 
-@each_scene
+@of_each_scene
 def test_things_stand_at_many_heights(scene_of, name):
     scene = scene_of(name)
     targets = set(catalogue().targets)

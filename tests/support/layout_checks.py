@@ -1,11 +1,12 @@
 """What the tests of layouts share: scenes by name, and looks at them from close by."""
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 import shapely
 import trimesh
 
@@ -15,6 +16,20 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scenes.site import footprint
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
+# Scenes that `make test` builds, two of each family; `make nightly` builds all 42.
+DAILY = {
+    "D_Flood_0", "D_Flood_1", "I_Harbor_0", "I_Bridge_1", "N_Mountain_0", "N_Forest_0", "U_Mall_0", "U_Stadium_0",
+}  # fmt: skip
+
+
+def nightly_unless(daily: bool, value: str) -> object:
+    """Make a parameter of a test, with the mark `nightly` unless it is for every day."""
+    return pytest.param(value, marks=[] if daily else pytest.mark.nightly)
+
+
+def each_scene(names: Iterable[str]) -> pytest.MarkDecorator:
+    """Parametrize a test by `name` with scenes, those not in `DAILY` nightly."""
+    return pytest.mark.parametrize("name", [nightly_unless(name in DAILY, name) for name in names])
 
 
 @cache
