@@ -260,11 +260,6 @@ class Summary:
     overall: Score  # Mean of the families that are there
     deviation: Score  # Standard deviation over all scenes
 
-    @property
-    def missing_families(self) -> list[str]:
-        """Families without episodes, not part of the overall score."""
-        return [family for family in FAMILIES.values() if family not in self.families]
-
 
 def summarize(episodes: Episodes, profile: Profile) -> Summary:
     """Average a log by scene, family and overall."""

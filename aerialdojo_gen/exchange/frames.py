@@ -89,12 +89,6 @@ def world_to_habitat(xyz_m: ArrayLike) -> Floats:
     return np.stack([p[..., 0], p[..., 2], -p[..., 1]], axis=-1) + 0.0
 
 
-def habitat_to_world(xyz_m: ArrayLike) -> Floats:
-    """Turn positions of Habitat's frame into the world: the inverse of `world_to_habitat`."""
-    p = np.asarray(xyz_m, np.float64)
-    return np.stack([p[..., 0], -p[..., 2], p[..., 1]], axis=-1) + 0.0
-
-
 def yaw_to_habitat_quaternion_xyzw(yaw_rad: ArrayLike) -> Floats:
     """Attitudes, (..., 4) unit xyzw, of upright bodies in Habitat, where a body at rest looks along -z (north)."""
     half = wrap_angle_rad(np.asarray(yaw_rad, np.float64) - np.pi / 2) / 2

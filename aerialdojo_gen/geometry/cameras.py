@@ -161,26 +161,3 @@ def project(camera: Camera, world_from_camera: Floats, points: ArrayLike) -> tup
     with np.errstate(divide="ignore", invalid="ignore"):
         uv = camera.focal_px * local[..., :2] / depth[..., None]
     return uv + np.array([camera.width / 2.0, camera.height / 2.0]), depth
-
-
-def unproject(camera: Camera, world_from_camera: Floats, uv: ArrayLike, depth_m: ArrayLike) -> Floats:
-    """World points from pixels and planar depths: the inverse of `project`.
-
-    Parameters
-    ----------
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    uv : (..., 2) array_like
-        Pixels; (column + 0.5, row + 0.5) for a pixel's centre.
-    depth_m : (...) array_like
-        Planar depth, metres.
-
-    Returns
-    -------
-    (..., 3) float64
-        Metres, world frame.
-    """
-    pixels, depth = np.asarray(uv, dtype=np.float64), np.asarray(depth_m, dtype=np.float64)
-    plane = (pixels - np.array([camera.width / 2.0, camera.height / 2.0])) / camera.focal_px
-    local = np.concatenate([plane, np.ones((*plane.shape[:-1], 1))], axis=-1) * depth[..., None]
-    return np.asarray(local @ world_from_camera[:3, :3].T + world_from_camera[:3, 3])

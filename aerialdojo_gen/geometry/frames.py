@@ -39,19 +39,9 @@ def enu_to_ned(xyz_m: ArrayLike) -> Floats:
     return np.stack([p[..., 1], p[..., 0], -p[..., 2]], axis=-1)
 
 
-def ned_to_enu(ned_m: ArrayLike) -> Floats:
-    """Turn positions (..., 3) from north-east-down to east-north-up, metres: the inverse of `enu_to_ned`."""
-    return enu_to_ned(ned_m)
-
-
 def yaw_enu_to_ned(yaw_rad: ArrayLike) -> Floats:
     """Turn a yaw (radians, counter-clockwise from east) into a heading (clockwise from north) in (-π, π]."""
     return wrap_angle_rad(math.pi / 2.0 - np.asarray(yaw_rad, dtype=np.float64))
-
-
-def yaw_ned_to_enu(heading_rad: ArrayLike) -> Floats:
-    """Turn a heading (radians, clockwise from north) into a yaw (counter-clockwise from east) in (-π, π]."""
-    return yaw_enu_to_ned(heading_rad)
 
 
 def yaw_to_quaternion_xyzw(yaw_rad: ArrayLike) -> Floats:
