@@ -151,7 +151,7 @@ def evaluate_tables(data: Path) -> str:
         "markdown",
     ]
     command += ["--table", "results", "--table", "partition"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.strip() + "\n"
 
 
