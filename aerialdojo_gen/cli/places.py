@@ -46,10 +46,9 @@ def add_map(
     """Make scenes from a map: streets, buildings, trees and street furniture."""
     from aerialdojo_gen.imports import places
 
-    added = places.add_map(
-        name, extract, project, bbox=[_box(text) for text in bbox], tile_m=tiles, dem=dem, cell_m=cell,
-        attribution=attribution, seed=seed, ceiling_m=ceiling, drive_on=drive_on, force=force,
-    )  # fmt: skip
+    options = places.TownOptions(cell, attribution, seed, ceiling, drive_on)
+    boxes = [_box(text) for text in bbox]
+    added = places.add_map(name, extract, project, boxes, options, tile_m=tiles, dem=dem, force=force)
     _print_scenes(added, project)
 
 
@@ -79,11 +78,9 @@ def add_terrain(
     """Make an open landscape from a height model."""
     from aerialdojo_gen.imports import places
 
-    added = places.add_terrain(
-        name, dem, project, bbox=None if bbox is None else _box(bbox), size_m=size, cell_m=cell, water_m=water,
-        snow_m=snow, sand_m=sand, bare=bare, attribution=attribution, seed=seed, ceiling_m=ceiling, force=force,
-    )  # fmt: skip
-    _print_scenes([added], project)
+    box = None if bbox is None else _box(bbox)
+    options = places.ReliefOptions(box, size, cell, water, sand, snow, bare, seed, ceiling, attribution)
+    _print_scenes([places.add_terrain(name, dem, project, options, force=force)], project)
 
 
 def _box(text: str) -> tuple[float, float, float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
@@ -78,9 +78,12 @@ def add_scene(
 ) -> None:
     """Make a scene from your own mesh file."""
     from aerialdojo_gen.imports import command
+    from aerialdojo_gen.imports.import_mesh import MeshOptions
+    from aerialdojo_gen.imports.naming import Naming, read_names
 
+    naming = Naming() if names is None else read_names(names)
     if show:
-        print("\n".join(command.list_mesh(mesh, up=up, scale=scale, names=names, width=terminal_width())))
+        print("\n".join(command.list_mesh(mesh, up=up, scale=scale, naming=naming, width=terminal_width())))
         return
     if up is None:
         raise UsageError(
@@ -88,14 +91,13 @@ def add_scene(
         )
     if tiles is not None and annotations is not None:
         raise UsageError("--annotations are of one scene, --tiles make several: leave one of them out")
-    cut: dict[str, Any] = {"crop_m": crop, "box_m": box, "ceiling_m": ceiling, "names": names, "force": force}
-    cut |= {"light": light, "texture_px": texture_px}
     scale = 1.0 if scale is None else scale
+    options = MeshOptions(up, scale, crop, box, ceiling, light, naming, texture_px)
     if tiles is not None:
-        made = command.add_tiles(name, mesh, project, tiles, up=up, scale=scale, on_added=_describe, **cut)
+        made = command.add_tiles(name, mesh, project, tiles, options, force=force, on_added=_describe)
         print(f"{len(made):,} scenes in one frame")
     else:
-        made = [command.add_scene(name, mesh, project, up=up, scale=scale, annotations=annotations, **cut)]
+        made = [command.add_scene(name, mesh, project, options, annotations=annotations, force=force)]
         _describe(made[0])
     first = next((added for added in made if not added.annotations.exists()), None)
     if first is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +12,9 @@ from pathlib import Path
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief, check_regular
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import Repairs, SourceMesh, check_options, import_mesh, make_region
+from aerialdojo_gen.imports.import_mesh import MeshOptions, Repairs, SourceMesh, check_axes, import_mesh
 from aerialdojo_gen.imports.listing import describe_mesh
-from aerialdojo_gen.imports.naming import read_names
-from aerialdojo_gen.imports.pictures import TEXTURE_PX
+from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.tiles import make_tiles, tile_name
 from aerialdojo_gen.imports.toml_text import toml_value
 from aerialdojo_gen.pipeline.registry import STAGES
@@ -41,89 +40,51 @@ def add_scene(
     name: str,
     mesh: Path,
     project: Path,
+    options: MeshOptions,
     *,
-    up: str,
-    scale: float = 1.0,
     annotations: Path | None = None,
-    crop_m: tuple[float, float, float] | None = None,
-    box_m: tuple[float, float, float, float] | None = None,
-    ceiling_m: float | None = None,
-    names: Path | None = None,
-    light: str = "auto",
-    texture_px: int = TEXTURE_PX,
     force: bool = False,
 ) -> AddedScene:
     """Make a scene from a mesh file in a project folder."""
     check_free([name], project, force)
-    check_options(up, scale, light)
-    make_region(crop_m, box_m)
-    naming = None if names is None else read_names(names)
     text = None if annotations is None else _annotations(annotations, name)
     with _prefix_errors(mesh):
-        scene, repairs = import_mesh(
-            name, read_mesh(mesh, texture_px=texture_px), up=up, scale=scale, crop_m=crop_m, box_m=box_m,
-            ceiling_m=ceiling_m, naming=naming, light=light,
-        )  # fmt: skip
-    region_options = {"crop_m": crop_m, "box_m": box_m}
-    return _write_scene(
-        scene, repairs, project, _recipe(_file_digest(mesh), scene, repairs, up, scale, region_options), text
-    )
+        scene, repairs = import_mesh(name, read_mesh(mesh, texture_px=options.texture_px), options)
+    recipe = _recipe(_file_digest(mesh), scene, repairs, options, options.box_m)
+    return _write_scene(scene, repairs, project, recipe, text)
 
 
 def add_tiles(
-    name: str,
-    mesh: Path,
-    project: Path,
-    edge_m: float,
-    *,
-    up: str,
-    scale: float = 1.0,
-    crop_m: tuple[float, float, float] | None = None,
-    box_m: tuple[float, float, float, float] | None = None,
-    ceiling_m: float | None = None,
-    names: Path | None = None,
-    light: str = "auto",
-    texture_px: int = TEXTURE_PX,
-    force: bool = False,
+    name: str, mesh: Path, project: Path, edge_m: float, options: MeshOptions, *, force: bool = False,
     on_added: Callable[[AddedScene], None] = lambda added: None,
-) -> list[AddedScene]:
+) -> list[AddedScene]:  # fmt: skip
     """Make scenes of a large mesh, one per square of `edge_m` metres, in one frame; all or none are written."""
     check_scene_name(tile_name(name, 99, 99))
-    check_options(up, scale, light)
-    region = make_region(crop_m, box_m)
-    naming = None if names is None else read_names(names)
     with _prefix_errors(mesh):
-        source = SourceMesh.of(read_mesh(mesh, texture_px=texture_px), up, scale, naming)
-        if region is not None:
-            source = source.within(region)
+        source = SourceMesh.of(read_mesh(mesh, texture_px=options.texture_px), options)
+        if options.region is not None:
+            source = source.within(options.region)
         # Build all tiles before writing any, so that a failure leaves nothing behind.
-        tiles = list(make_tiles(name, source, edge_m, ceiling_m=ceiling_m, naming=naming, light=light))
+        tiles = list(make_tiles(name, source, edge_m, options))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
     check_free([tile.name for tile in tiles], project, force)
     source_digest, out = _file_digest(mesh), []
     for tile in tiles:
         (x0, y0), (x1, y1) = tile.region.low.tolist(), tile.region.high.tolist()
-        region_options = {"crop_m": crop_m, "box_m": (x0, y0, x1, y1)}
-        recipe = _recipe(source_digest, tile.scene, tile.repairs, up, scale, region_options)
+        recipe = _recipe(source_digest, tile.scene, tile.repairs, options, (x0, y0, x1, y1))
         out.append(_write_scene(tile.scene, tile.repairs, project, recipe, None))
         on_added(out[-1])
     return out
 
 
 def list_mesh(
-    mesh: Path,
-    *,
-    up: str | None = None,
-    scale: float | None = None,
-    names: Path | None = None,
-    width: int | None = None,
+    mesh: Path, *, up: str | None = None, scale: float | None = None, naming: Naming, width: int | None = None
 ) -> list[str]:
     """Describe the content of a mesh file, in lines for a terminal."""
-    check_options(up, scale)
-    naming = None if names is None else read_names(names)
+    check_axes(up, scale)
     with _prefix_errors(mesh):
-        return [f"{mesh.name}:", *describe_mesh(read_mesh(mesh), up=up, scale=scale, naming=naming, width=width)]
+        return [f"{mesh.name}:", *describe_mesh(read_mesh(mesh), up, scale, naming, width)]
 
 
 def check_free(names: Sequence[str], project: Path, force: bool) -> None:
@@ -183,21 +144,16 @@ def _file_digest(mesh: Path) -> tuple[str, str]:
 
 
 def _recipe(
-    source: tuple[str, str],
-    scene: Scene,
-    repairs: Repairs,
-    up: str,
-    scale: float,
-    region_options: Mapping[str, tuple[float, ...] | None],
+    source: tuple[str, str], scene: Scene, repairs: Repairs, options: MeshOptions, box_m: tuple[float, ...] | None
 ) -> str:
     lines = [
         "# Made by add-scene; the mesh lies beside this file, repaired, in metres.",
         "[imported]",
         f"source = {toml_value(source[0])}",
         f'source_sha256 = "{source[1]}"',
-        f'up = "{up}"',
-        f"scale = {scale}",
-        *(f"{key} = {list(part)}" for key, part in region_options.items() if part),
+        f'up = "{options.up}"',
+        f"scale = {options.scale}",
+        *(f"{key} = {list(part)}" for key, part in (("crop_m", options.crop_m), ("box_m", box_m)) if part),
         f"origin_m = {list(repairs.origin_m)}",
         f"ceiling_m = {scene.ceiling_m}",
         'sky = "#{:02x}{:02x}{:02x}"'.format(*scene.sky),

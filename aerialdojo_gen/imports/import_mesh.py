@@ -16,6 +16,7 @@ from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region, connected_bodies, unique_rows
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
 from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, clip_node, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.imports.surfaces import (
@@ -61,6 +62,45 @@ class Repairs:
             self.lines.append(f"{n:,} {text}")
 
 
+@dataclass(frozen=True)
+class MeshOptions:
+    """How a mesh becomes a scene; makes a `UsageError` of values that make no sense, before any mesh is read."""
+
+    up: str = "z"  # The mesh's axis that points up
+    scale: float = 1.0  # Metres per unit of the mesh
+    crop_m: tuple[float, float, float] | None = None  # Circle to keep: x, y, radius
+    box_m: tuple[float, float, float, float] | None = None  # Rectangle to keep: x0, y0, x1, y1
+    ceiling_m: float | None = None  # Where absent a little above the highest point
+    light: str = "auto"  # Of `LIGHTS`
+    naming: Naming = field(default_factory=Naming)
+    texture_px: int = TEXTURE_PX  # Maximum side of textures
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        check_axes(self.up, self.scale)
+        if self.light not in LIGHTS:
+            raise UsageError(f"--light {self.light[:20]!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
+        _ = self.region
+
+    @property
+    def region(self) -> Region | None:
+        """The region to keep; None for all."""
+        crop_m, box_m = self.crop_m, self.box_m
+        if crop_m is not None and box_m is not None:
+            raise UsageError("--crop and --box are mutually exclusive")
+        if not all(math.isfinite(v) and abs(v) < 1e7 for v in crop_m or box_m or ()):
+            raise UsageError("--crop and --box take finite numbers of metres")
+        if crop_m is not None:
+            if crop_m[2] <= 0:
+                raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
+            return Region.circle(*crop_m)
+        if box_m is None:
+            return None
+        if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
+            raise UsageError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
+        return Region.box(*box_m)
+
+
 @dataclass(frozen=True, eq=False)
 class SourceMesh:
     """A repaired foreign mesh in metres, z up, before clipping."""
@@ -70,18 +110,16 @@ class SourceMesh:
     repairs: Repairs  # Repairs so far
 
     @classmethod
-    def of(cls, nodes: Sequence[RawNode], up: str, scale: float, naming: Naming | None = None) -> SourceMesh:
-        """Reorient, scale and repair the nodes of a file; errors as in `import_mesh`."""
-        check_options(up, scale)
+    def of(cls, nodes: Sequence[RawNode], options: MeshOptions) -> SourceMesh:
+        """Reorient, scale and repair the nodes of a file."""
         repairs = Repairs()
-        bodies = [b for node in nodes for b in [_repair(_reorient(node, up, scale), repairs)] if len(b.faces)]
+        bodies = [b for node in nodes for b in [_repair(_reorient(node, options), repairs)] if len(b.faces)]
         if not bodies:
             raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
         # The repair lines must not depend on the reader's order of nodes.
         repairs.lines.sort()
         bodies = sort_by_position(bodies)
-        table_names = [naming.from_table(b.name).category if naming else "" for b in bodies]
-        domes = find_domes(bodies, table_names)
+        domes = find_domes(bodies, [options.naming.from_table(b.name).category for b in bodies])
         rest = [b for k, b in enumerate(bodies) if k not in domes]
         return cls(rest, [bodies[k] for k in domes], repairs)
 
@@ -122,65 +160,25 @@ def size_text(size: Floats) -> str:
     return f"{' by '.join(f'{s:,.0f}' if s >= 99.95 else f'{s:.3g}' for s in size.tolist())} m"
 
 
-def check_options(up: str | None, scale: float | None, light: str = "auto") -> None:
-    """Raise a `UsageError` for invalid options, before any mesh is read."""
+def check_axes(up: str | None, scale: float | None) -> None:
+    """Raise a `UsageError` for an invalid axis or scale."""
     if up not in (None, "y", "z"):
         raise UsageError(f"--up {up[:20]!r}: must be z or y, the mesh's axis that points up")
     if scale is not None and not (math.isfinite(scale) and scale > 0):
         raise UsageError(f"--scale {scale}: must be a number above 0")
-    if light not in LIGHTS:
-        raise UsageError(f"--light {light[:20]!r}: must be {', '.join(LIGHTS[:-1])} or {LIGHTS[-1]}")
 
 
-def import_mesh(
-    name: str,
-    nodes: Sequence[RawNode],
-    *,
-    up: str = "z",
-    scale: float = 1.0,
-    crop_m: tuple[float, float, float] | None = None,
-    box_m: tuple[float, float, float, float] | None = None,
-    ceiling_m: float | None = None,
-    naming: Naming | None = None,
-    light: str = "auto",
-) -> tuple[Scene, Repairs]:
+def import_mesh(name: str, nodes: Sequence[RawNode], options: MeshOptions | None = None) -> tuple[Scene, Repairs]:
     """Make a scene of a foreign mesh, with its origin at the centre on the ground; returns the scene and repairs."""
-    source = SourceMesh.of(nodes, up, scale, naming)
-    return make_scene(name, source, make_region(crop_m, box_m), ceiling_m=ceiling_m, naming=naming, light=light)
-
-
-def make_region(
-    crop_m: tuple[float, float, float] | None, box_m: tuple[float, float, float, float] | None
-) -> Region | None:
-    """Return the region to keep; UsageError if both are given, or one without area."""
-    if crop_m is not None and box_m is not None:
-        raise UsageError("--crop and --box are mutually exclusive")
-    numbers = crop_m or box_m or ()
-    if not all(math.isfinite(v) and abs(v) < 1e7 for v in numbers):
-        raise UsageError("--crop and --box take finite numbers of metres")
-    if crop_m is not None:
-        if crop_m[2] <= 0:
-            raise UsageError(f"--crop {crop_m[0]:g} {crop_m[1]:g} {crop_m[2]:g}: the radius must be above 0")
-        return Region.circle(*crop_m)
-    if box_m is not None:
-        if box_m[0] == box_m[2] or box_m[1] == box_m[3]:
-            raise UsageError("--box X0 Y0 X1 Y1: the two corners must differ in x and in y")
-        return Region.box(*box_m)
-    return None
+    options = options or MeshOptions()
+    return make_scene(name, SourceMesh.of(nodes, options), options, options.region)
 
 
 def make_scene(
-    name: str,
-    source: SourceMesh,
-    region: Region | None = None,
-    *,
-    ceiling_m: float | None = None,
-    naming: Naming | None = None,
-    origin_m: Floats | None = None,
-    light: str = "auto",
+    name: str, source: SourceMesh, options: MeshOptions, region: Region | None, origin_m: Floats | None = None
 ) -> tuple[Scene, Repairs]:
     """Make a scene of a mesh, or of the part in `region`; returns the scene and repairs."""
-    check_options(None, None, light)
+    light = options.light
     repairs = Repairs(list(source.repairs.lines))
     part = source if region is None else source.within(region)
     bodies = part.bodies
@@ -196,7 +194,7 @@ def make_scene(
     builder.measure_texture_scales([*bodies, *domes])
     parts = builder.materials
     built = [(b, made) for b in bodies for made in [_parts(b, builder, repairs)] if made]
-    instances = _make_instances(built, naming or Naming(), parts)
+    instances = _make_instances(built, options.naming, parts)
     if not instances:
         raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
     instances = [
@@ -214,7 +212,9 @@ def make_scene(
     if cover < _GROUND_COVER:
         instances.insert(0, ground_plane(low, high, 4 * _MARGIN_M, parts))
         repairs.lines.append(f"ground plane added (the mesh covers {cover:.0%} of its extent)")
-    top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    top = options.ceiling_m
+    if top is None:
+        top = max(float(high[2]) + _HEADROOM_M, float(low[2]) + _LOWEST_CEILING_M)
     bounds = np.array(
         [[low[0] - _MARGIN_M, low[1] - _MARGIN_M, low[2]], [high[0] + _MARGIN_M, high[1] + _MARGIN_M, top]]
     )
@@ -233,9 +233,9 @@ def _translate(bodies: Sequence[RawNode], by_m: Floats) -> list[RawNode]:
     return [b.with_vertices(b.vertices + by_m) for b in bodies]
 
 
-def _reorient(node: RawNode, up: str, scale: float) -> RawNode:
-    v = node.vertices * scale
-    if up == "y":
+def _reorient(node: RawNode, options: MeshOptions) -> RawNode:
+    v = node.vertices * options.scale
+    if options.up == "y":
         v = np.column_stack([v[:, 0], -v[:, 2], v[:, 1]])
     return node.with_vertices(v)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.imports.cutting import connected_bodies
-from aerialdojo_gen.imports.import_mesh import LARGEST_M, SourceMesh, describe_extent, size_text
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, MeshOptions, SourceMesh, describe_extent, size_text
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.mesh import areas
@@ -66,12 +66,12 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
     return Guess(up, sure, fit or _UNITS[:1])
 
 
-def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming | None) -> Guess:
+def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming) -> Guess:
     """Guess without sky domes, whose shape hides axis and scale."""
     guessed = guess(nodes)
     for up in (guessed.up, "z" if guessed.up == "y" else "y"):
         taken = scale or guessed.units[0][0]
-        source = SourceMesh.of(nodes, up, taken, naming)
+        source = SourceMesh.of(nodes, MeshOptions(up, taken, naming=naming))
         if source.domes:
             # Convert back to the file's axes and unit.
             v = [b.vertices / taken for b in source.bodies]
@@ -81,18 +81,12 @@ def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: N
 
 
 def describe_mesh(
-    nodes: Sequence[RawNode],
-    *,
-    up: str | None = None,
-    scale: float | None = None,
-    naming: Naming | None = None,
-    width: int | None = None,
+    nodes: Sequence[RawNode], up: str | None, scale: float | None, naming: Naming, width: int | None
 ) -> list[str]:
     """Describe the content of a file, in lines for a terminal."""
     guessed = _guess_within_domes(nodes, scale, naming)
     taken_up, taken_scale = up or guessed.up, scale or guessed.units[0][0]
-    source = SourceMesh.of(nodes, taken_up, taken_scale, naming)
-    naming = naming or Naming()
+    source = SourceMesh.of(nodes, MeshOptions(taken_up, taken_scale, naming=naming))
     triangles = sum(len(b.faces) for b in (*source.bodies, *source.domes))
     bodies = [(b, *connected_bodies(b.faces, len(b.vertices))) for b in source.bodies]
     pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)

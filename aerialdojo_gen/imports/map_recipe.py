@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import shapely
@@ -30,10 +31,25 @@ _MAX_ITEMS = 1000
 Heights = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class TownOptions:
+    """What of a town the map does not say."""
+
+    cell_m: float | None = None  # Of the ground
+    attribution: str = ""  # Of the ground's heights
+    seed: int = 0
+    ceiling_m: float | None = None
+    drive_on: str = "right"
+
+    def __post_init__(self) -> None:
+        """Check the side of the road."""
+        if self.drive_on not in ("right", "left"):
+            raise UsageError(f"--drive-on {self.drive_on[:20]!r}: right or left")
+
+
 def town_recipe(
-    found: Map, bbox: Bbox, source: str, *,
-    heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None = None,
-    extra_attribution: str = "", seed: int = 0, ceiling_m: float | None = None, drive_on: str = "right",
+    found: Map, bbox: Bbox, source: str, options: TownOptions,
+    heights: Callable[[LocalFrame, tuple[float, float]], Heights] | None,
 ) -> tuple[str, MapSummary]:  # fmt: skip
     """Write the recipe of a town; its origin is the centre of the bounding box (degrees)."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
@@ -59,7 +75,7 @@ def town_recipe(
     raised, lines = map_bridges.bridges(lines, areas, site, ground, summary)
     parameters: dict[str, Any] = {
         "ground": "paving:#98958d" if share > _PAVED else "grass",
-        "drive_on": drive_on,
+        "drive_on": options.drive_on,
         "rails": map_ground.rails(lines, window),
         "crossings": map_things.crossings(points, site),
         "signals": map_things.signals(points, site),
@@ -87,10 +103,12 @@ def town_recipe(
         rise = max(max(row) for row in table["rows_m"])
     tops = [b["top_m"] for one in buildings for b in one["bodies"]]
     top = max([*tops, *(max(b.heights_m) for b in raised)], default=0.0) + rise
-    ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M) if ceiling_m is None else ceiling_m
+    ceiling = options.ceiling_m
+    if ceiling is None:
+        ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M)
     head = {
-        "layout": "town", "seed": seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
-        "attribution": "; ".join(filter(None, (ATTRIBUTION, extra_attribution))), "origin": origin,
+        "layout": "town", "seed": options.seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
+        "attribution": "; ".join(filter(None, (ATTRIBUTION, options.attribution))), "origin": origin,
     }  # fmt: skip
     comments = (
         f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",
@@ -126,6 +144,3 @@ def _make_valid(shape: Any) -> Any:
     made = shapely.make_valid(shape)
     # Repairing an area may leave lines, which overlays do not accept.
     return shapely.MultiPolygon(polygons_of(made)) if shape.geom_type.endswith("Polygon") else made
-
-
-__all__ = ["Heights", "town_recipe"]

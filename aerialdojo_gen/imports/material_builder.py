@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.imports.cutting import unique_rows
 from aerialdojo_gen.imports.raw import RawNode, RawSurface
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import areas
@@ -146,13 +147,8 @@ def _split(
     if corners is None:
         return vertices[used], flat.reshape(-1, 3).astype(np.int32), None
     carried = corners.reshape(len(flat), -1) + np.float32(0.0)  # no negative zero
-    order = np.lexsort((*carried.T[::-1], flat))
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (flat[order[1:]] != flat[order[:-1]]) | (carried[order[1:]] != carried[order[:-1]]).any(axis=1)
-    index = np.empty(len(order), dtype=np.int32)
-    index[order] = np.cumsum(new) - 1
-    first = order[new]
-    return vertices[used[flat[first]]], index.reshape(-1, 3), carried[first]
+    first, index, _ = unique_rows(flat, *carried.T)
+    return vertices[used[flat[first]]], index.reshape(-1, 3).astype(np.int32), carried[first]
 
 
 def _material_name(material: Material) -> str:

@@ -10,11 +10,11 @@ from pathlib import Path
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import PIPELINE, check_free, write_pipeline
-from aerialdojo_gen.imports.dem import Dem, read_dem
+from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
-from aerialdojo_gen.imports.map_recipe import town_recipe
+from aerialdojo_gen.imports.map_recipe import TownOptions, town_recipe
 from aerialdojo_gen.imports.osm import read_maps
-from aerialdojo_gen.imports.relief import ground_sampler, relief_recipe
+from aerialdojo_gen.imports.relief import ReliefOptions, ground_sampler, relief_recipe
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
@@ -37,14 +37,11 @@ class AddedPlace:
 
 
 def add_map(
-    name: str, extract: Path, project: Path, *, bbox: Sequence[Bbox], tile_m: float | None = None,
-    dem: Path | None = None,
-    cell_m: float | None = None, attribution: str = "", seed: int = 0, ceiling_m: float | None = None,
-    drive_on: str = "right", force: bool = False,
+    name: str, extract: Path, project: Path, bbox: Sequence[Bbox], options: TownOptions | None = None, *,
+    tile_m: float | None = None, dem: Path | None = None, force: bool = False,
 ) -> list[AddedPlace]:  # fmt: skip
     """Make one town per bounding box (degrees, WGS 84) of an OpenStreetMap extract; each is test-built first."""
-    if drive_on not in ("right", "left"):
-        raise UsageError(f"--drive-on {drive_on[:20]!r}: right or left")
+    options = options or TownOptions()
     boxes = [check_bbox(box) for box in bbox]
     if not boxes:
         raise UsageError("--bbox WEST SOUTH EAST NORTH is needed: which part of the map, degrees")
@@ -56,33 +53,26 @@ def add_map(
         raise UsageError(f"{len(boxes):,} scenes requested, the maximum is {_MAX_SCENES}: use larger tiles")
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
     check_free(names, project, force)
-    model = None if dem is None else read_dem(dem)
-    heights = None if model is None else ground_sampler(model, cell_m)
-    texts = []
+    heights = None if dem is None else ground_sampler(read_dem(dem), options.cell_m)
     wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
+    texts = []
     for one, box, found in zip(names, boxes, maps, strict=True):
-        text, summary = town_recipe(
-            found, box, extract.name, heights=heights, extra_attribution=attribution, seed=seed, ceiling_m=ceiling_m,
-            drive_on=drive_on,
-        )  # fmt: skip
+        text, summary = town_recipe(found, box, extract.name, options, heights)
         texts.append((one, text, tuple(_summary_lines(dict(summary.counts)))))
     return [_write_place(one, text, project, notes) for one, text, notes in texts]
 
 
 def add_terrain(
-    name: str, dem: Path, project: Path, *, bbox: Bbox | None = None, size_m: tuple[float, float] | None = None,
-    cell_m: float | None = None, water_m: float | None = None, snow_m: float | None = None,
-    sand_m: float | None = None, bare: bool = False, attribution: str = "", seed: int = 0,
-    ceiling_m: float | None = None, force: bool = False,
-) -> AddedPlace:  # fmt: skip
+    name: str, dem: Path, project: Path, options: ReliefOptions | None = None, *, force: bool = False
+) -> AddedPlace:
     """Make open country from a height model, in a project folder."""
+    options = options or ReliefOptions()
     check_free([name], project, force)
-    model: Dem = read_dem(dem)
-    text, notes = relief_recipe(
-        model, bbox=None if bbox is None else check_bbox(bbox), size=size_m, cell_m=cell_m, water_m=water_m,
-        snow_m=snow_m, sand_m=sand_m, bare=bare, seed=seed, ceiling_m=ceiling_m, attribution=attribution,
-    )  # fmt: skip
+    model = read_dem(dem)
+    if options.bbox is not None:
+        check_bbox(options.bbox)
+    text, notes = relief_recipe(model, options)
     return _write_place(name, text, project, tuple(notes))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -79,33 +80,46 @@ def native_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
     return max(dem.dx * east, dem.dy * north)
 
 
-def relief_recipe(
-    dem: Dem, *, bbox: Bbox | None = None, size: tuple[float, float] | None = None, cell_m: float | None = None,
-    water_m: float | None = None, snow_m: float | None = None, sand_m: float | None = None, bare: bool = False,
-    seed: int = 0, ceiling_m: float | None = None, attribution: str = "",
-) -> tuple[str, list[str]]:  # fmt: skip
+@dataclass(frozen=True)
+class ReliefOptions:
+    """Which part of a height model becomes a scene, and what its surface is."""
+
+    bbox: Bbox | None = None
+    size_m: tuple[float, float] | None = None
+    cell_m: float | None = None
+    water_m: float | None = None  # Up to this height, in the model's heights
+    sand_m: float | None = None
+    snow_m: float | None = None  # Above this height
+    bare: bool = False  # Without plants, rocks and other things
+    seed: int = 0
+    ceiling_m: float | None = None
+    attribution: str = ""
+
+
+def relief_recipe(dem: Dem, options: ReliefOptions) -> tuple[str, list[str]]:
     """Write the recipe of a relief, and notes for the user."""
-    frame, middle, size = _place(dem, bbox, size)
+    frame, middle, size = _place(dem, options)
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(
             f"{dem.path.name}: {size[0]:,.0f} by {size[1]:,.0f} m, a scene has {SMALLEST_M:g} to {LARGEST_M:,.0f} m: "
             f"--size 400 400 crops to its centre, --bbox to a part; {describe_coverage(dem)}"
         )
-    cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
+    cell = round(choose_cell(size, options.cell_m, native_cell_m(dem, frame)), 4)
     size = whole_cells(size, cell)
     z = grid(dem, size, cell, frame, middle)
     datum = round(float(z.min()), 2)
     top = float(z.max()) - datum
-    marks = {"water_z_m": water_m, "snow_z_m": snow_m, "sand_z_m": sand_m}
+    marks = {"water_z_m": options.water_m, "snow_z_m": options.snow_m, "sand_z_m": options.sand_m}
     parameters: dict[str, Any] = {
         **{key: round(value - datum, 2) for key, value in marks.items() if value is not None},
-        **({"bare": True} if bare else {}),
+        **({"bare": True} if options.bare else {}),
         "heights": {"cell_m": cell, "rows_m": to_centimetres(z - datum)},
     }
     head = {
-        "layout": "relief", "seed": seed, "size_m": list(size),
-        "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if ceiling_m is None else ceiling_m,
-        **({"attribution": attribution} if attribution else {}), "origin": _origin(frame, middle, datum),
+        "layout": "relief", "seed": options.seed, "size_m": list(size),
+        "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if options.ceiling_m is None else options.ceiling_m,
+        **({"attribution": options.attribution} if options.attribution else {}),
+        "origin": _origin(frame, middle, datum),
     }  # fmt: skip
     notes = [
         f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
@@ -126,10 +140,9 @@ def relief_recipe(
     return recipe_text(head, parameters, comments), notes
 
 
-def _place(
-    dem: Dem, bbox: Bbox | None, size: tuple[float, float] | None
-) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
+def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
     """Return the frame, centre and extent of the scene, on earth or in the model's metres."""
+    bbox, size = options.bbox, options.size_m
     west, south, east, north = dem.extent
     middle = (west + east) / 2, (south + north) / 2
     if bbox is not None:

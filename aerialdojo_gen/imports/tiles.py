@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region
-from aerialdojo_gen.imports.import_mesh import LARGEST_M, SMALLEST_M, Repairs, SourceMesh, make_scene
-from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.import_mesh import LARGEST_M, SMALLEST_M, MeshOptions, Repairs, SourceMesh, make_scene
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -32,15 +31,7 @@ class Tile:
     repairs: Repairs  # Repairs; `origin_m` is the same for all tiles
 
 
-def make_tiles(
-    name: str,
-    source: SourceMesh,
-    edge_m: float,
-    *,
-    ceiling_m: float | None = None,
-    naming: Naming | None = None,
-    light: str = "auto",
-) -> Iterator[Tile]:
+def make_tiles(name: str, source: SourceMesh, edge_m: float, options: MeshOptions) -> Iterator[Tile]:
     """Cut a mesh into squares of `edge_m` metres, west to east and south to north; yields those with content."""
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
@@ -63,9 +54,7 @@ def make_tiles(
             if not near.any() or not _has_content(part, region, edge_m):
                 continue
             tile = tile_name(name, column, row)
-            scene, repairs = make_scene(
-                tile, part, region, ceiling_m=ceiling_m, naming=naming, origin_m=origin, light=light
-            )
+            scene, repairs = make_scene(tile, part, options, region, origin)
             yield Tile(tile, region, scene, repairs)
 
 

@@ -11,6 +11,7 @@ from support import maps
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.earth import format_bbox, size_m, tile_bboxes
+from aerialdojo_gen.imports.map_recipe import TownOptions
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -148,7 +149,9 @@ def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
     west, south, east, north = maps.box(90.0)
     dem = tmp_path / "hill.npz"
     np.savez(dem, heights_m=maps.heights(2.0, 90.0), bbox_deg=[west, south, east, north])
-    place = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()], dem=dem, attribution="A survey")[0]
+    place = add_map(
+        "Town", extract, tmp_path / "mine", bbox=[maps.box()], options=TownOptions(attribution="A survey"), dem=dem
+    )[0]
     datum = load_recipe(place.recipe).origin.z_m
     places = np.random.default_rng(5).uniform(-55, 55, size=(300, 2))
     z = ground_of(place.scene, places) + datum

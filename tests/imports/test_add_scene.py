@@ -16,7 +16,7 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import check_glb, read_mesh
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colours import colour_name
@@ -74,13 +74,13 @@ def test_names_and_colours_come_along(village):
 
 def test_axes_and_units():
     box = trimesh.creation.box((2000, 300, 1000))
-    scene, _ = import_mesh("Box", [raw(box)], up="y", scale=0.01)
+    scene, _ = import_mesh("Box", [raw(box)], MeshOptions(up="y", scale=0.01))
     (body,) = things(scene)
     np.testing.assert_allclose(body.bounds[1] - body.bounds[0], [20, 10, 3], atol=1e-4)
     with pytest.raises(UsageError, match=r"--up 'x'"):
-        import_mesh("Box", [raw(box)], up="x")
+        import_mesh("Box", [raw(box)], MeshOptions(up="x"))
     with pytest.raises(UsageError, match="--scale"):
-        import_mesh("Box", [raw(box)], scale=float("nan"))
+        import_mesh("Box", [raw(box)], MeshOptions(scale=float("nan")))
 
 
 def test_what_is_inside_out_is_turned_and_what_is_open_is_there_from_both_sides():
@@ -140,10 +140,10 @@ def test_an_extent_that_cannot_be_metres(edge, word):
 
 def test_a_part_can_be_kept(village):
     nodes = read_mesh(village / "village.glb")
-    scene, _ = import_mesh("Village", nodes, crop_m=(0.0, 0.0, 12.0))
+    scene, _ = import_mesh("Village", nodes, MeshOptions(crop_m=(0.0, 0.0, 12.0)))
     assert 1 < len(things(scene)) < 9
     with pytest.raises(AssetError, match="contains no part of the mesh"):
-        import_mesh("Village", nodes, crop_m=(900.0, 900.0, 5.0))
+        import_mesh("Village", nodes, MeshOptions(crop_m=(900.0, 900.0, 5.0)))
 
 
 def test_a_glb_that_asks_for_terabytes_is_refused_before_it_gets_them(tmp_path):
@@ -188,7 +188,7 @@ def test_no_mesh_at_all(tmp_path, name, content, message):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(AssetError, match=message) as error:
-        add_scene("Odd", path, tmp_path / "mine", up="z")
+        add_scene("Odd", path, tmp_path / "mine", MeshOptions())
     assert "\n" not in str(error.value)
     assert not (tmp_path / "mine" / "scenes" / "Odd.toml").exists()
 
@@ -216,26 +216,26 @@ def test_a_file_reads_nothing_outside_its_folder(tmp_path):
 
 
 def test_a_scene_is_added_once_and_whole(village, tmp_path):
-    added = add_scene("Village", village / "village.glb", tmp_path / "mine", up="z")
+    added = add_scene("Village", village / "village.glb", tmp_path / "mine", MeshOptions())
     assert read_glb(tmp_path / "mine" / "scenes" / "Village.glb").n_triangles == added.scene.n_triangles
     before = (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes()
     with pytest.raises(UsageError, match="--force"):
-        add_scene("Village", village / "village.stl", tmp_path / "mine", up="z")
+        add_scene("Village", village / "village.stl", tmp_path / "mine", MeshOptions())
     assert (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes() == before
-    add_scene("Village", village / "village.glb", tmp_path / "mine", up="z", force=True)
+    add_scene("Village", village / "village.glb", tmp_path / "mine", MeshOptions(), force=True)
     assert (tmp_path / "mine" / "scenes" / "Village.glb").read_bytes() == before
     with pytest.raises(StoreError, match="not a scene name"):
-        add_scene("../Village", village / "village.glb", tmp_path / "mine", up="z")
+        add_scene("../Village", village / "village.glb", tmp_path / "mine", MeshOptions())
     other = tmp_path / "other.json"
     other.write_text('{"scene": "Elsewhere", "landmarks": [], "objects": []}')
     with pytest.raises(AnnotationError, match="Elsewhere"):
-        add_scene("V2", village / "village.glb", tmp_path / "mine", up="z", annotations=other)
+        add_scene("V2", village / "village.glb", tmp_path / "mine", MeshOptions(), annotations=other)
 
 
 def planned(tmp_path, name, mesh, n_objects, **options):
     """Add a scene, draft its annotations, plan its tasks; gives the verdicts."""
     project, data = tmp_path / "mine", tmp_path / "data"
-    added = add_scene(name, mesh, project, **options)
+    added = add_scene(name, mesh, project, MeshOptions(**options))
     pipeline, roots = open_pipeline(added.pipeline, data)
     draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, options=DraftOptions(max_per_category=30))
     run_pipeline(added.pipeline, data, stages=["filter"], scenes=[name], workers=1)
@@ -246,7 +246,7 @@ def planned(tmp_path, name, mesh, n_objects, **options):
 def test_helsinki_up_to_planned_tasks(tmp_path):
     assert foreign.helsinki(tmp_path / "helsinki.glb") == 486
     with pytest.raises(AssetError, match=r"too large to plan in.*--crop"):
-        add_scene("Helsinki", tmp_path / "helsinki.glb", tmp_path / "mine", up="z")
+        add_scene("Helsinki", tmp_path / "helsinki.glb", tmp_path / "mine", MeshOptions())
     added, verdicts = planned(tmp_path, "Helsinki", tmp_path / "helsinki.glb", 8, up="z", crop_m=(628.0, 97.0, 110.0))
     assert {i.category for i in things(added.scene)} == {"building"}
     assert verdicts.num_rows > 50
@@ -255,7 +255,7 @@ def test_helsinki_up_to_planned_tasks(tmp_path):
 
 @pytest.mark.pipeline
 def test_the_monastery_up_to_planned_tasks(tmp_path):
-    whole, _ = import_mesh("Monastery", read_mesh(foreign.monastery()), up="y")
+    whole, _ = import_mesh("Monastery", read_mesh(foreign.monastery()), MeshOptions(up="y"))
     assert whole.n_triangles > 100_000
     # The middle of it: drafting asks every one of its 1,400 bodies for viewpoints, and 32 m of it take three minutes.
     added, verdicts = planned(tmp_path, "Monastery", foreign.monastery(), 4, up="y", crop_m=(-7.0, 1.0, 14.0))
@@ -303,6 +303,6 @@ def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(vil
         scene, _ = import_mesh("Village", read_mesh(file))
         assert len(things(scene)) == 8
         assert {i.category for i in things(scene)} <= {"clock_tower", "house"}
-        added = add_scene("Village", file, tmp_path / f"project{k}", up="z")
+        added = add_scene("Village", file, tmp_path / f"project{k}", MeshOptions())
         made.add((added.pipeline.parent / "scenes/Village.glb").read_bytes())
     assert len(made) == 1

@@ -15,6 +15,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
+from aerialdojo_gen.imports.relief import ReliefOptions
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
@@ -32,7 +33,7 @@ def hill(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def added(hill, tmp_path_factory):
-    return add_terrain("Hill", hill, tmp_path_factory.mktemp("mine"), water_m=98.5, snow_m=113.0)
+    return add_terrain("Hill", hill, tmp_path_factory.mktemp("mine"), ReliefOptions(water_m=98.5, snow_m=113.0))
 
 
 def ground_heights(scene, places):
@@ -98,7 +99,7 @@ def test_it_is_painted_by_slope_and_height_and_grows_what_such_ground_has(added)
 
 
 def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
-    again = add_terrain("Hill", hill, tmp_path / "other", water_m=98.5, snow_m=113.0)
+    again = add_terrain("Hill", hill, tmp_path / "other", ReliefOptions(water_m=98.5, snow_m=113.0))
     assert again.recipe.read_bytes() == added.recipe.read_bytes()
     rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
     for a, b in zip(rebuilt.instances, added.scene.instances, strict=True):
@@ -125,9 +126,12 @@ def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):
     # The zone's scale is 0.9996: two centimetres over 50 m, on a slope of less than 1.
     assert difference.max() < 0.03
     one = add_terrain(
-        "Degrees", degrees, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey"
+        "Degrees",
+        degrees,
+        tmp_path / "mine",
+        ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey"),
     )
-    two = add_terrain("Metres", metres, tmp_path / "mine", size_m=(80.0, 80.0), cell_m=4.0, bare=True)
+    two = add_terrain("Metres", metres, tmp_path / "mine", ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True))
     places = np.random.default_rng(2).uniform(-39, 39, size=(100, 2))
     za = ground_heights(one.scene, places) + read_dem_origin(one)
     zb = ground_heights(two.scene, places) + read_dem_origin(two)
@@ -141,7 +145,7 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
     rows = "\n".join(" ".join(f"{v:.3f}" for v in row) for row in z)
     path = tmp_path / "hole.asc"
     path.write_text(f"ncols 61\nnrows 61\nxllcenter -60\nyllcenter -60\ncellsize 2\nNODATA_value -9999\n{rows}\n")
-    place = add_terrain("Hole", path, tmp_path / "mine", bare=True)
+    place = add_terrain("Hole", path, tmp_path / "mine", ReliefOptions(bare=True))
     assert any("16 of 3,721 heights" in line for line in place.notes)
     known = maps.heights(2.0, 60.0)
     found = ground_heights(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + read_dem_origin(place)
@@ -178,7 +182,7 @@ FAULTS = {
 def test_a_fault_is_one_line(fault, tmp_path):
     make, options, said = FAULTS[fault]
     with pytest.raises((AssetError, UsageError)) as found:
-        add_terrain("X", make(tmp_path), tmp_path / "mine", **options)
+        add_terrain("X", make(tmp_path), tmp_path / "mine", ReliefOptions(**options))
     assert said in str(found.value)
     assert "\n" not in str(found.value)
     assert not (tmp_path / "mine" / "scenes").exists()
@@ -248,7 +252,7 @@ def test_numbers_that_are_none_are_one_line_or_no_height(head, numbers, tmp_path
 def test_a_files_name_cannot_write_into_the_recipe(hill, tmp_path):
     odd = tmp_path / "hill\nlayout = 'yard'\n.npz"
     shutil.copy(hill, odd)
-    place = add_terrain("Odd", odd, tmp_path / "mine", bare=True)
+    place = add_terrain("Odd", odd, tmp_path / "mine", ReliefOptions(bare=True))
     assert place.recipe.read_text().startswith("# Made by add-terrain of hill?layout = 'yard'?.npz: ")
 
 

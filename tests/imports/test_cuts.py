@@ -17,7 +17,7 @@ from support.hills import hills, standing, write_hills
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
-from aerialdojo_gen.imports.import_mesh import SourceMesh, import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, SourceMesh, import_mesh
 from aerialdojo_gen.imports.listing import guess
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.scenes.glb import read_glb
@@ -97,7 +97,7 @@ def test_a_crop_cuts_triangles_of_one_large_object_and_closes_its_houses():
         ({"crop_m": (70.0, 80.0, 40.0)}, Region.circle(70, 80, 40)),
         ({"box_m": (110.0, 131.5, 60.0, 44.0)}, Region.box(60, 44, 110, 131.5)),
     ):
-        scene, repairs = import_mesh("City", nodes, **options)
+        scene, repairs = import_mesh("City", nodes, MeshOptions(**options))
         origin = np.array(repairs.origin_m)
         for thing in scene.instances:
             if thing.category != "ground":
@@ -113,20 +113,20 @@ def test_a_crop_cuts_triangles_of_one_large_object_and_closes_its_houses():
 def test_a_part_without_anything_says_what_lies_where():
     nodes = city()
     with pytest.raises(AssetError, match=r"--crop 900 900 5: contains no part of the mesh: x is -5 to 185, y -5 to"):
-        import_mesh("City", nodes, crop_m=(900.0, 900.0, 5.0))
+        import_mesh("City", nodes, MeshOptions(crop_m=(900.0, 900.0, 5.0)))
     with pytest.raises(
         AssetError, match=r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
     ):
-        import_mesh("City", nodes, scale=50.0)
+        import_mesh("City", nodes, MeshOptions(scale=50.0))
     for wrong in ({"crop_m": (0.0, 0.0, -5.0)}, {"box_m": (0.0, 0.0, 0.0, 9.0)}, {"crop_m": (0.0, float("nan"), 5.0)},
                   {"crop_m": (0.0, 0.0, 9.0), "box_m": (0.0, 0.0, 9.0, 9.0)}):  # fmt: skip
         with pytest.raises(UsageError, match=r"--crop|--box"):
-            import_mesh("City", nodes, **wrong)
+            import_mesh("City", nodes, MeshOptions(**wrong))
 
 
 def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
     mesh = write_hills(hills(3, cells=30), [], tmp_path / "hills.glb")
-    made = add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, up="z")
+    made = add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, MeshOptions())
     names = [added.scene.name for added in made]
     assert names == [f"Valley-x{x}y{y}_1" for y in range(3) for x in range(3)]
     corners = {}
@@ -153,9 +153,9 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
             heights = np.interp(part[:, along], other[order, along], other[order, 2])
             np.testing.assert_allclose(part[:, 2], heights, atol=1e-3)
     with pytest.raises(UsageError, match="--force"):
-        add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, up="z")
+        add_tiles("Valley_1", mesh, tmp_path / "mine", 25.0, MeshOptions())
     with pytest.raises(UsageError, match=r"--tiles 1: the edge"):
-        add_tiles("Other", mesh, tmp_path / "mine", 1.0, up="z")
+        add_tiles("Other", mesh, tmp_path / "mine", 1.0, MeshOptions())
     assert not list((tmp_path / "mine/scenes").glob("Other*"))
 
 
@@ -246,9 +246,11 @@ def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_pat
     nodes = city(streets=4)
     mesh = trimesh.Trimesh(nodes[0].vertices + np.array([4.1e5, 6.6e6, 12.0]), nodes[0].faces, process=False)
     mesh.export(tmp_path / "city.ply", vertex_normal=False)
-    place = SourceMesh.of([nodes[0].with_vertices(np.asarray(mesh.vertices))], "z", 1.0)
+    place = SourceMesh.of([nodes[0].with_vertices(np.asarray(mesh.vertices))], MeshOptions())
     assert place.low == pytest.approx([4.1e5 - 5, 6.6e6 - 5, 11.0])
-    added = add_scene("Far", tmp_path / "city.ply", tmp_path / "mine", up="z", crop_m=(410060.0, 6600060.0, 40.0))
+    added = add_scene(
+        "Far", tmp_path / "city.ply", tmp_path / "mine", MeshOptions(crop_m=(410060.0, 6600060.0, 40.0))
+    )
     recipe = load_imported(tmp_path / "mine/scenes/Far.toml")
     assert recipe.origin_m == added.repairs.origin_m
     assert recipe.origin_m[1] == pytest.approx(6600060.0, abs=1.0)

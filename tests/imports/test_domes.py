@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.gl import GlRenderer
 from aerialdojo_gen.rendering.raycast import RayRenderer
@@ -27,7 +27,7 @@ def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(ren
     ball = trimesh.creation.icosphere(3, 300.0)
     halves = np.where(ball.triangles_center[:, :1] > 0, [[40, 90, 200]], [[230, 170, 90]]).astype(np.uint8)
     sky = RawNode("SkyDome", np.asarray(ball.vertices), np.asarray(ball.faces, np.int64), halves)
-    under, bare = (import_mesh("Dome", many, light="sun")[0] for many in ([*nodes, sky], nodes))
+    under, bare = (import_mesh("Dome", many, MeshOptions(light="sun"))[0] for many in ([*nodes, sky], nodes))
     assert len(under.backdrop) == 1
     poses = [look_at_pose(np.array([0.0, 0, 4]), np.array(at)) for at in ((20.0, 0, 8), (-20, 0, 8), (0, 10, 3))]
     with renderer(under) as camera:

@@ -9,7 +9,7 @@ from support import foreign, maps
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.files import read_into, unpack_nodes
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 
 # A tetrahedron, x east, y north, z up: four edges of different lengths meet in a corner, so that no mirror image and
 # no other turn of it has its corners in these places.
@@ -92,7 +92,7 @@ def corners_of(scene):
 )
 def test_an_import_is_turned_and_never_mirrored(tmp_path, suffix, up):
     write(tmp_path / f"body{suffix}", IN_FILE[up], up)
-    scene, _ = import_mesh("Body", read(tmp_path / f"body{suffix}"), up="y" if suffix == ".dae" else up)
+    scene, _ = import_mesh("Body", read(tmp_path / f"body{suffix}"), MeshOptions(up="y" if suffix == ".dae" else up))
     corners, mesh = corners_of(scene)
     np.testing.assert_allclose(corners, CORNERS[[0, 3, 2, 1]], atol=2e-3)
     assert mesh.volume == pytest.approx(30 * 20 * 10 / 6, rel=1e-3)
@@ -110,7 +110,7 @@ def test_a_picture_on_a_wall_is_read_from_left_to_right(tmp_path, suffix, up):
     visual = trimesh.visual.TextureVisuals(uv=uv, image=Image.fromarray(letter))
     mesh = trimesh.Trimesh(wall, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
     trimesh.Scene(mesh).export(tmp_path / f"wall{suffix}")
-    scene, _ = import_mesh("Wall", read(tmp_path / f"wall{suffix}"), up=up)
+    scene, _ = import_mesh("Wall", read(tmp_path / f"wall{suffix}"), MeshOptions(up=up))
     (body,) = [i for i in scene.instances if i.category != "ground"]
     seen = {}
     for part in body.parts:

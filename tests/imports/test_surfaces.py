@@ -19,7 +19,7 @@ from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.naming import Naming, NodeName
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, empty_corners
 from aerialdojo_gen.imports.split_components import split_components
@@ -80,8 +80,8 @@ def test_what_encloses_and_is_no_sky_stays():
         assert not scene.backdrop
     # A table has the last word, either way.
     sky, shed = (Naming((("X*", NodeName(category, {})),)) for category in ("sky", "greenhouse"))
-    assert import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], naming=sky)[0].backdrop
-    assert not import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], naming=shed)[0].backdrop
+    assert import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], MeshOptions(naming=sky))[0].backdrop
+    assert not import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], MeshOptions(naming=shed))[0].backdrop
 
 
 @settings(max_examples=8, deadline=None)
@@ -212,7 +212,7 @@ def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
     nodes += [RawNode("Hut.9", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), default_colours(1))]
     made = []
     for order in (list(range(len(nodes))), random.sample(range(len(nodes)), len(nodes))):
-        scene, repairs = import_mesh("Hills", [nodes[k] for k in order], crop_m=(12.0, 12.0, 10.0))
+        scene, repairs = import_mesh("Hills", [nodes[k] for k in order], MeshOptions(crop_m=(12.0, 12.0, 10.0)))
         write_glb(scene, folder / "x.glb")
         made.append(((folder / "x.glb").read_bytes(), repairs))
     assert made[0] == made[1]
@@ -253,7 +253,7 @@ def test_bad_files_are_one_line_with_the_mend_and_leave_nothing(tmp_path, capsys
     else:
         path.write_bytes(content)
     with pytest.raises(AssetError, match=message) as error:
-        add_scene("Odd", path, tmp_path / "mine", up="z")
+        add_scene("Odd", path, tmp_path / "mine", MeshOptions())
     assert str(error.value).startswith(str(path))
     assert "\n" not in str(error.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == [name]

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.files import read_into, read_mesh, unpack_nodes
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.pictures import SourceMaterial, decode_surfaces
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
@@ -51,7 +51,7 @@ def thing(scene: Scene, category: str):
 def yard(tmp_path_factory) -> Scene:
     folder = tmp_path_factory.mktemp("yard")
     nodes = nodes_of(textured.yard(folder / "yard.glb"), folder / "nodes.npz")
-    return stored(import_mesh("Yard", nodes, light="sun")[0], folder / "scene.glb")
+    return stored(import_mesh("Yard", nodes, MeshOptions(light="sun"))[0], folder / "scene.glb")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def board(tmp_path_factory) -> Scene:
     ground = np.array([[-30.0, -30, 0], [30, -30, 0], [30, 30, 0], [-30, 30, 0]])
     out.node("Ground", ground, textured.WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
     nodes = nodes_of(out.write(folder / "board.glb"), folder / "nodes.npz")
-    return stored(import_mesh("Board", nodes, light="baked")[0], folder / "scene.glb")
+    return stored(import_mesh("Board", nodes, MeshOptions(light="baked"))[0], folder / "scene.glb")
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -171,7 +171,7 @@ def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path
     digests = set()
     for k in range(2):
         path = textured.yard(tmp_path / f"{k}.glb")
-        scene, _ = import_mesh("Yard", nodes_of(path, tmp_path / f"{k}.npz"), light="auto")
+        scene, _ = import_mesh("Yard", nodes_of(path, tmp_path / f"{k}.npz"), MeshOptions(light="auto"))
         back = stored(scene, tmp_path / f"scene{k}.glb")
         digests.add(hashlib.sha256((tmp_path / f"scene{k}.glb").read_bytes()).hexdigest())
         write_glb(back, tmp_path / "again.glb")
@@ -369,7 +369,7 @@ def test_sizes_of_pictures_are_told_without_decoding():
 def test_only_known_lights_are_taken(tmp_path):
     nodes = read_mesh(textured.scan(tmp_path / "scan.obj", cells=8))
     with pytest.raises(UsageError, match="--light 'moon'"):
-        import_mesh("Scan", nodes, light="moon")
+        import_mesh("Scan", nodes, MeshOptions(light="moon"))
 
 
 _DAE = """<?xml version="1.0"?>

@@ -19,7 +19,7 @@ from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
-from aerialdojo_gen.imports.import_mesh import import_mesh
+from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
@@ -192,7 +192,7 @@ def surveyed(tmp_path_factory):
         root = folder / str(seed)
         root.mkdir()
         mesh = write_hills(field, boxes, root / "hills.glb", turned=bool(seed % 2))
-        added = add_scene(NAME, mesh, root / "mine", up="z")
+        added = add_scene(NAME, mesh, root / "mine", MeshOptions())
         pipeline, roots = open_pipeline(added.pipeline, root / "data")
         draft_scene(NAME, pipeline, roots, n_landmarks=2, n_objects=8, options=DraftOptions(max_per_category=30))
         run_pipeline(added.pipeline, root / "data", stages=["split"], scenes=[NAME], workers=1)

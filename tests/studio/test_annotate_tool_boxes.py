@@ -27,6 +27,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.import_mesh import MeshOptions
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.layouts.build import build_scene
@@ -51,7 +52,7 @@ def terrain(tmp_path_factory):
     k = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
     faces = np.concatenate([np.column_stack([k, k + 1, k + n + 1]), np.column_stack([k, k + n + 1, k + n])])
     trimesh.Trimesh(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces).export(folder / "scan.ply")
-    return add_scene("Scan", folder / "scan.ply", folder / "mine", up="z")
+    return add_scene("Scan", folder / "scan.ply", folder / "mine", MeshOptions())
 
 
 def areas(scene):

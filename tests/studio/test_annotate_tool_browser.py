@@ -21,6 +21,7 @@ from support.browser import until
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.import_mesh import MeshOptions
 from aerialdojo_gen.store import shards as store
 
 NAME = "Helsinki"
@@ -43,7 +44,7 @@ def scene(tmp_path_factory):
     """A block of Helsinki, as add-scene makes it of OpenStreetMap's buildings."""
     folder = tmp_path_factory.mktemp("helsinki")
     foreign.helsinki(folder / "helsinki.glb")
-    return add_scene(NAME, folder / "helsinki.glb", folder / "mine", up="z", crop_m=(628.0, 97.0, 70.0))
+    return add_scene(NAME, folder / "helsinki.glb", folder / "mine", MeshOptions(crop_m=(628.0, 97.0, 70.0)))
 
 
 def roof(house):
