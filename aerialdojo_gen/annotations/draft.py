@@ -32,8 +32,12 @@ _NO_DIRECTION = "at a landmark's position, or outside the bounds"
 
 @dataclass(frozen=True)
 class DraftOptions:
-    """Which instances may become objects, and how many per category."""
+    """Which instances may become landmarks and objects, and how many per category."""
 
+    landmarks: tuple[str, ...] = ()  # Nodes to use as landmarks
+    n_landmarks: int | None = None  # Default: the paper's, else 1 or 2
+    n_objects: int | str | None = None  # "auto" for up to 20; default: the paper's, else that
+    seed: int = 0
     reject: Callable[[str], str] | None = None
     centre_m: tuple[float, float] | None = None
     core_radius_m: float | None = None  # Radius of the core area, which limits the length of tasks; None: whole scene
@@ -46,15 +50,13 @@ class DraftOptions:
 class AnnotationDrafter:
     """Chooses and describes the objects of a scene."""
 
-    def __init__(
-        self, vocabulary: Vocabulary, landmarks: tuple[Landmark, ...], seed: int, options: DraftOptions
-    ) -> None:
-        self._vocabulary, self._scene, self._seed, self._options = vocabulary, vocabulary.scene, seed, options
+    def __init__(self, vocabulary: Vocabulary, landmarks: tuple[Landmark, ...], options: DraftOptions) -> None:
+        self._vocabulary, self._scene, self._seed, self._options = vocabulary, vocabulary.scene, options.seed, options
         self._kinds, self._nouns = vocabulary.kinds, vocabulary.nouns
         self.landmarks = landmarks
         self.rejections: Counter[str] = Counter()
         self.confusions: list[tuple[str, Sequence[str]]] = []
-        self._writer = DescriptionWriter(vocabulary, landmarks, seed)
+        self._writer = DescriptionWriter(vocabulary, landmarks, options.seed)
         ambiguity = self._writer.ambiguity
         candidates = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
         self.things = tuple(k for k in candidates if self._has_direction(k, ambiguity))
@@ -182,14 +184,11 @@ class AnnotationDrafter:
         why = self._options.reject(instance.node) if self._options.reject else ""
         if why:
             return why, ""
-        text = (
-            self._writer.describe(i, set(taken.values()))
-            if self._writer.is_true_name(i, self._nouns[i].short)
-            else None
-        )
-        if text is not None:
-            return "", text
         noun = self._nouns[i]
+        if self._writer.is_true_name(i, noun.short):
+            text = self._writer.describe(i, set(taken.values()))
+            if text is not None:
+                return "", text
         distractors = self._writer.ambiguity.distractors(i, f"Look for {noun.a()}.")
         self.confusions.append((instance.node, [self._scene.instances[j].node for j in distractors]))
         return _INDISTINGUISHABLE, ""

@@ -170,6 +170,10 @@ def annotate_draft(
     given = named_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))
     options = DraftOptions(
+        landmarks=tuple(landmark or ()),
+        n_landmarks=landmarks,
+        n_objects=int(objects) if objects and objects != "auto" else objects,
+        seed=seed,
         centre_m=centre,
         core_radius_m=within,
         core_share=core_share,
@@ -177,13 +181,8 @@ def annotate_draft(
         max_vegetation=max_plants,
         max_per_category=max_per_category,
     )
-    path = draft_scene(
-        scene, config, roots, n_landmarks=landmarks,
-        n_objects=int(objects) if objects and objects != "auto" else objects,
-        options=options, landmarks=tuple(landmark or ()), seed=seed, force=force, keep_objects=keep_objects,
-        reporter=Reporter(quiet=quiet),
-    )  # fmt: skip
-    print(path)
+    reporter = Reporter(quiet=quiet)
+    print(draft_scene(scene, config, roots, options, force=force, keep_objects=keep_objects, reporter=reporter))
 
 
 @app.command("gallery")

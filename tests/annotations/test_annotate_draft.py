@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def draft_annotations(scene, catalogue, n_landmarks, n_objects, seed, options=None):
     vocabulary = Vocabulary(scene, catalogue)
     landmarks = choose_landmarks(vocabulary, n_landmarks)
-    drafter = AnnotationDrafter(vocabulary, landmarks, seed, options or DraftOptions())
+    drafter = AnnotationDrafter(vocabulary, landmarks, dataclasses.replace(options or DraftOptions(), seed=seed))
     return Annotations(scene.name, landmarks, drafter.objects(n_objects))
 
 

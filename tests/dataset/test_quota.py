@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.cli.common import open_pipeline
@@ -210,10 +211,8 @@ def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
     data = tmp_path / "data"
     pipeline, roots = open_pipeline(project / "pipeline.toml", data)
     source = json.loads((ROOT / "annotations" / "smoke" / "U_Courtyard_0.json").read_text())
-    draft_scene(
-        "D_Flood_1", pipeline, roots, n_objects=4, landmarks=tuple(entry["node"] for entry in source["landmarks"]),
-        n_landmarks=len(source["landmarks"]),
-    )  # fmt: skip
+    landmarks = tuple(entry["node"] for entry in source["landmarks"])
+    draft_scene("D_Flood_1", pipeline, roots, DraftOptions(landmarks, len(landmarks), n_objects=4))
     with pytest.raises(PoolError, match=r"D_Flood_1: \d+ base tasks short"):
         run_pipeline(project / "pipeline.toml", data, stages=["split"], workers=1)
     assert store.shards(data, "verdicts", "D_Flood_1")

@@ -237,7 +237,7 @@ def planned(tmp_path, name, mesh, n_objects, **options):
     project, data = tmp_path / "mine", tmp_path / "data"
     added = add_scene(name, mesh, project, MeshOptions(**options))
     pipeline, roots = open_pipeline(added.pipeline, data)
-    draft_scene(name, pipeline, roots, n_landmarks=2, n_objects=n_objects, options=DraftOptions(max_per_category=30))
+    draft_scene(name, pipeline, roots, DraftOptions(n_landmarks=2, n_objects=n_objects, max_per_category=30))
     run_pipeline(added.pipeline, data, stages=["filter"], scenes=[name], workers=1)
     return added, store.read_scene(data, "verdicts", name)
 

@@ -194,7 +194,7 @@ def surveyed(tmp_path_factory):
         mesh = write_hills(field, boxes, root / "hills.glb", turned=bool(seed % 2))
         added = add_scene(NAME, mesh, root / "mine", MeshOptions())
         pipeline, roots = open_pipeline(added.pipeline, root / "data")
-        draft_scene(NAME, pipeline, roots, n_landmarks=2, n_objects=8, options=DraftOptions(max_per_category=30))
+        draft_scene(NAME, pipeline, roots, DraftOptions(n_landmarks=2, n_objects=8, max_per_category=30))
         run_pipeline(added.pipeline, root / "data", stages=["split"], scenes=[NAME], workers=1)
         found[seed] = (root / "data", pipeline, field, shift_of(field, boxes))
     return found

@@ -53,23 +53,21 @@ def draft_scene(
     name: str,
     pipeline: Pipeline,
     roots: ProjectPaths,
-    *,
-    n_landmarks: int | None = None,
-    n_objects: int | str | None = None,
     options: DraftOptions | None = None,
-    landmarks: tuple[str, ...] = (),
-    seed: int = 0,
+    *,
     force: bool = False,
     keep_objects: bool = False,
     reporter: Reporter | None = None,
 ) -> Path:
     """Draft a scene's annotations and write them to the annotations folder."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
+    options = options or DraftOptions()
     if keep_objects:
-        return _redraft(name, path, roots, seed)
+        return _redraft(name, path, roots, options.seed)
     if path.exists() and not force:
         raise UsageError(f"{path} exists: --force overwrites it, --keep-objects redrafts its descriptions")
     counts = paper_counts().get(name)
+    n_landmarks, n_objects = options.n_landmarks, options.n_objects
     exact = counts is not None and n_objects != AUTO
     most = n_objects if isinstance(n_objects, int) else counts[1] if counts and exact else _AUTO_OBJECTS
     catalogue = load_catalogue(roots.scene_assets)
@@ -79,13 +77,12 @@ def draft_scene(
     if not targets:
         raise _nothing_to_draft(name, f"; not taken: {len(scene.instances):,} {SCENERY}")
     chosen_landmarks = choose_landmarks(
-        vocabulary, n_landmarks or (counts[0] if counts else 2 if targets.total() >= _FEW_THINGS else 1), landmarks,
-        at_most=n_landmarks is None and counts is None,
+        vocabulary, n_landmarks or (counts[0] if counts else 2 if targets.total() >= _FEW_THINGS else 1),
+        options.landmarks, at_most=n_landmarks is None and counts is None,
     )  # fmt: skip
-    options = options or DraftOptions()
     if options.max_per_category is None and scene.imported:
         options = replace(options, max_per_category=max(MAX_PER_CATEGORY, math.ceil(most / len(targets))))
-    probe = AnnotationDrafter(vocabulary, chosen_landmarks, seed, options)
+    probe = AnnotationDrafter(vocabulary, chosen_landmarks, options)
     proposed = most if exact else min(most, probe.capacity())
     kinds = len({scene.instances[k].category for k in probe.things})
     if not proposed:
@@ -97,7 +94,7 @@ def draft_scene(
     # The bar counts objects found: most things are never tried, and the world is built before the first.
     rejecting = replace(options, reject=make_reject(scene, pipeline, roots))
     with reporter.bar("annotate-draft", proposed, unit="objects") as bar:
-        drafter = AnnotationDrafter(vocabulary, chosen_landmarks, seed, rejecting)
+        drafter = AnnotationDrafter(vocabulary, chosen_landmarks, rejecting)
         objects = drafter.objects(proposed, bar.advance)
     _check_enough(name, len(objects), proposed, drafter.rejection_summary(), exact=exact)
     write_annotations(Annotations(name, chosen_landmarks, objects), path)

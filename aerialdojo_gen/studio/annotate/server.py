@@ -128,17 +128,21 @@ def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
             body["changes"] = session.changes_since(_version(request.headers.get("if-match")))
         return JSONResponse(body, status_code=412 if isinstance(error, StaleError) else 409)
 
-    @app.get("/api/scene")
-    def scene() -> Response:
-        return Response(session.payload, media_type="application/octet-stream")
+    app.get("/api/facts")(session.facts)
+    app.get("/api/history")(session.history)
+    _add_document(app, session)
+    _add_scene(app, session)
+    app.mount("/annotate", StaticFiles(directory=STATIC, follow_symlink=False), name="annotate")
+    return app
 
-    @app.get("/api/facts")
-    def facts() -> dict[str, Any]:
-        return session.facts()
+
+def _add_document(app: FastAPI, session: AnnotationSession) -> None:
+    """Add the routes that read and change the annotations."""
+    storage = session.storage
 
     @app.get("/api/document")
     def document(request: Request, client: Annotated[str, Query(max_length=40)] = "") -> Response:
-        if _version(request.headers.get("if-none-match")) == session.storage.load().version:
+        if _version(request.headers.get("if-none-match")) == storage.load().version:
             return Response(status_code=304)
         return _with_version(session.document(client))
 
@@ -153,19 +157,36 @@ def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
 
     @app.post("/api/undo")
     def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.undo(_required(if_match), body.author))
+        return _with_version(session.saved(storage.undo(_required(if_match), body.author), body.author))
 
     @app.post("/api/redo")
     def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.redo(_required(if_match), body.author))
+        return _with_version(session.saved(storage.redo(_required(if_match), body.author), body.author))
 
     @app.post("/api/import")
     def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.replace(_required(if_match), body.author, body.text.encode("utf-8", "replace")))
+        raw = body.text.encode("utf-8", "replace")
+        return _with_version(session.saved(storage.replace(_required(if_match), body.author, raw), body.author))
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:
         return session.draft(body.operation)
+
+    @app.get("/api/export")
+    def export() -> Response:
+        return _download(session.export(), "application/json", storage.path.name)
+
+    @app.get("/api/coco")
+    def coco() -> Response:
+        return _download(coco_zip(session), "application/zip", f"{session.scene.name}-coco.zip")
+
+
+def _add_scene(app: FastAPI, session: AnnotationSession) -> None:
+    """Add the routes of the scene: its mesh, nodes, boxes, viewpoints and pictures."""
+
+    @app.get("/api/scene")
+    def scene() -> Response:
+        return Response(session.payload, media_type="application/octet-stream")
 
     @app.post("/api/pick")
     def pick(body: Ray) -> dict[str, Any] | None:
@@ -201,25 +222,9 @@ def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
     @app.get("/api/picture")
     def picture(x: float, y: float, z: float, yaw_deg: float) -> Response:
         place, yaw = np.array([x, y, z]), math.radians(yaw_deg)
-        low, high = session.scene.bounds
-        if not (np.isfinite([*place, yaw]).all() and (place >= low - 5).all() and (place <= high + 5).all()):
+        if not (math.isfinite(yaw) and _near(session, place)):
             raise AerialDojoError("no picture from outside the scene")
         return Response(session.anchors.view(place, yaw).png, media_type="image/png")
-
-    @app.get("/api/history")
-    def history() -> list[dict[str, Any]]:
-        return session.history()
-
-    @app.get("/api/export")
-    def export() -> Response:
-        return _download(session.export(), "application/json", session.storage.path.name)
-
-    @app.get("/api/coco")
-    def coco() -> Response:
-        return _download(coco_zip(session), "application/zip", f"{session.scene.name}-coco.zip")
-
-    app.mount("/annotate", StaticFiles(directory=STATIC, follow_symlink=False), name="annotate")
-    return app
 
 
 def _viewpoint_json(session: AnnotationSession, node: str, row: dict[str, Any], faults: list[str]) -> dict[str, Any]:

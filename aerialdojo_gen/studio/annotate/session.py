@@ -30,6 +30,8 @@ from aerialdojo_gen.studio.annotate.history import Record
 from aerialdojo_gen.studio.annotate.storage import Author, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
+_MOST_CHANGES = 200
+
 
 class AnnotationSession:
     """The operations behind the page's requests."""
@@ -114,21 +116,10 @@ class AnnotationSession:
             raise AerialDojoError(f"no node {fields['node']!r} in the scene")
         if fields.get("anchor") is not None and isinstance(operation, Change):
             self._check_anchor(operation.id, fields["anchor"])
-        return self._saved(self.storage.change(version, author, operation), author)
+        return self.saved(self.storage.change(version, author, operation), author)
 
-    def undo(self, version: str, author: Author) -> dict[str, Any]:
-        """Undo the author's last change."""
-        return self._saved(self.storage.undo(version, author), author)
-
-    def redo(self, version: str, author: Author) -> dict[str, Any]:
-        """Redo the author's last undone change."""
-        return self._saved(self.storage.redo(version, author), author)
-
-    def replace(self, version: str, author: Author, raw: bytes) -> dict[str, Any]:
-        """Import an annotation file."""
-        return self._saved(self.storage.replace(version, author, raw), author)
-
-    def _saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
+    def saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
+        """Return the annotations after a change of the storage."""
         state, record = done
         return self._document(state, author.client) | {"done": _to_json(record) if record else None}
 
@@ -138,11 +129,11 @@ class AnnotationSession:
             self.storage.history.refresh()
             return [_to_json(record) for record in self.storage.history.since(version)][-50:]
 
-    def history(self, most: int = 200) -> list[dict[str, Any]]:
+    def history(self) -> list[dict[str, Any]]:
         """Return the last changes, newest first."""
         with self._lock:
             self.storage.history.refresh()
-            return [_to_json(record) for record in reversed(self.storage.history.records[-most:])]
+            return [_to_json(record) for record in reversed(self.storage.history.records[-_MOST_CHANGES:])]
 
     # Picking, and anchors.
 

@@ -82,13 +82,9 @@ class Storage:
             raise AnnotationError(f"{self.path} cannot be read: {error.strerror}") from None
         version = hashlib.sha256(raw).hexdigest()
         if self._read is None or self._read.version != version:
-            self._read = State(self._parse(raw), raw.decode("utf-8"), version)
+            content = parse_whole(raw, self.scene, str(self.path)) if raw else Annotations(self.scene, (), ())
+            self._read = State(content, raw.decode("utf-8"), version)
         return self._read
-
-    def _parse(self, raw: bytes) -> Annotations:
-        if not raw:
-            return Annotations(self.scene, (), ())
-        return parse_whole(raw, self.scene, str(self.path))
 
     def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
         """Apply an operation and save it."""
