@@ -45,8 +45,9 @@ def add_map(
 ) -> None:
     """Make scenes from a map: streets, buildings, trees and street furniture."""
     from aerialdojo_gen.imports import places
+    from aerialdojo_gen.imports.map_recipe import TownOptions
 
-    options = places.TownOptions(cell, attribution, seed, ceiling, drive_on)
+    options = TownOptions(cell, attribution, seed, ceiling, drive_on)
     boxes = [_box(text) for text in bbox]
     added = places.add_map(name, extract, project, boxes, options, tile_m=tiles, dem=dem, force=force)
     _print_scenes(added, project)
@@ -77,9 +78,10 @@ def add_terrain(
 ) -> None:
     """Make an open landscape from a height model."""
     from aerialdojo_gen.imports import places
+    from aerialdojo_gen.imports.relief import ReliefOptions
 
     box = None if bbox is None else _box(bbox)
-    options = places.ReliefOptions(box, size, cell, water, sand, snow, bare, seed, ceiling, attribution)
+    options = ReliefOptions(box, size, cell, water, sand, snow, bare, seed, ceiling, attribution)
     _print_scenes([places.add_terrain(name, dem, project, options, force=force)], project)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,6 +65,14 @@ class Assessment:
     goal_off_at_start_m: float  # That at the first steps of episodes
     blocked_told: float | None
     free_told: float | None
+
+
+@dataclass(frozen=True)
+class TrainingLog:
+    """Who is told how a training goes."""
+
+    on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
+    on_epoch: Callable[[Epoch], None]
 
 
 def epoch_batches(
@@ -149,47 +157,50 @@ class Learner:
         self.optimiser.step()
 
     def learn(
-        self,
-        pool: Pool,
-        exploration: Pool | None,
-        kept_back: NDArray[np.bool_],
-        epochs: int,
-        learning_rate: float,
-        *,
-        after: Callable[[Epoch], None],
-        tick: Callable[[int, int, float, float], None],
-    ) -> None:
-        """Train through a phase's epochs, from where the progress is.
-
-        `kept_back`, (n,) bool, are not learned from.
-        """
+        self, pool: Pool, exploration: Pool | None, kept_back: NDArray[np.bool_], epochs: int, learning_rate: float,
+        log: TrainingLog,
+    ) -> None:  # fmt: skip
+        """Train through a phase's epochs, from where the progress is; `kept_back` (n,) are not learned from."""
         self.share_cores()
         anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
-        p, seed, most = self.progress, self.recipe.seed, self.recipe.train.batch_steps
         lengths = np.where(kept_back, 0, pool.lengths)
-        counts = [len(epoch_batches(lengths, most, seed, p.phase, e)) for e in range(epochs)]
-        total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         frames = self._frames(pool)
         self._about = [(pool, frames, anywhere)]
         if exploration is not None:
             self._about.append((exploration, self._frames(exploration), np.arange(exploration.n_steps)))
+
+        def batches(epoch: int) -> list[NDArray[np.int64]]:
+            return epoch_batches(lengths, self.recipe.train.batch_steps, self.recipe.seed, self.progress.phase, epoch)
+
+        self.run_epochs(
+            [len(batches(epoch)) for epoch in range(epochs)], batches, learning_rate, log,
+            step=lambda episodes, rate: self._step(pool, frames, episodes, rate),
+            assess=lambda: self.assess(pool, frames, kept_back),
+        )  # fmt: skip
+
+    def run_epochs(
+        self, counts: Sequence[int], batches: Callable[[int], list[NDArray[np.int64]]], learning_rate: float,
+        log: TrainingLog, *, step: Callable[[NDArray[np.int64], float], tuple[float, float, int]],
+        assess: Callable[[], Assessment | None] = lambda: None,
+    ) -> None:  # fmt: skip
+        """Go through epochs of so many batches each, from where the progress is.
+
+        `step` learns from a batch at a rate, and returns its mean loss, how many were right, and of how many.
+        """
+        p = self.progress
+        total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         started, first = time.monotonic(), done
-        while p.epoch < epochs:
+        while p.epoch < len(counts):
             self.network.train()
-            batches = epoch_batches(lengths, most, seed, p.phase, p.epoch)
-            for episodes in batches[p.batch :]:
-                rate = self.rate(done, total, learning_rate)
-                loss, right, n = self._step(pool, frames, episodes, rate, (p.phase, p.epoch, p.batch))
+            for batch in batches(p.epoch)[p.batch :]:
+                loss, right, n = step(batch, self.rate(done, total, learning_rate))
                 p.batch, done = p.batch + 1, done + 1
                 p.sums = [a + b for a, b in zip(p.sums, (loss * n, right, n), strict=True)]
-                tick(done, total, loss, right / n)
-            spent = time.monotonic() - started
-            left_s = spent / max(done - first, 1) * (total - done)
-            sums, number = p.sums, p.epoch
+                log.on_batch(done, total, loss, right / max(n, 1))
+            left_s = (time.monotonic() - started) / max(done - first, 1) * (total - done)
+            sums, number, n_all = p.sums, p.epoch, max(p.sums[2], 1.0)
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            steps = max(sums[2], 1.0)
-            kept = self.assess(pool, frames, kept_back)
-            after(Epoch(p.phase, number, sums[0] / steps, sums[1] / steps, kept, left_s))
+            log.on_epoch(Epoch(p.phase, number, sums[0] / n_all, sums[1] / n_all, assess(), left_s))
 
     def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessment | None:
         """See how well the network does on some episodes; None without any."""
@@ -290,11 +301,9 @@ class Learner:
             return self.torch.from_numpy(pool.frames(rows)).to(self.device)
         return frames[self.torch.from_numpy(rows).to(self.device)]
 
-    def _step(
-        self, pool: Pool, frames: Any, episodes: NDArray[np.int64], rate: float, place: tuple[int, int, int]
-    ) -> tuple[float, float, int]:
-        functional = self.torch.nn.functional
-        draw = rng.generator(self.recipe.seed, "learning goals", *place)
+    def _step(self, pool: Pool, frames: Any, episodes: NDArray[np.int64], rate: float) -> tuple[float, float, int]:
+        functional, p = self.torch.nn.functional, self.progress
+        draw = rng.generator(self.recipe.seed, "learning goals", p.phase, p.epoch, p.batch)
         batch = self._batch(pool, frames, episodes, draw)
         # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
         self.torch.manual_seed(int(draw.integers(2**31)))

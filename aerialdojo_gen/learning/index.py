@@ -17,6 +17,7 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.geometry.motion import replay
+from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -58,6 +59,12 @@ class Index:
         """Poses before every action of trajectory k, (steps, 4) float64, as the environment flies them."""
         return replay(self.start[k], self.actions_of(k)[:-1])
 
+    @property
+    def goal_texts(self) -> list[str]:
+        """Say each trajectory's goal in words."""
+        told = (self.told[name] for name in (*_TOLD, "description"))
+        return [goal_text(str(name), str(mark), str(way), said) for name, mark, way, said in zip(*told, strict=True)]
+
     @cached_property
     def digest(self) -> str:
         """SHA-256, hexadecimal, of all that a sample's labels come from."""
@@ -78,7 +85,7 @@ class Index:
             np.array([place[self.scenes[self.scene[k]]] for k in rows], np.int32),
             [self.nav_id[k] for k in rows],
             np.concatenate([*pieces, np.empty(0, np.int8)]),
-            np.concatenate([[0], np.cumsum([len(p) for p in pieces], dtype=np.int64)]).astype(np.int64),
+            _starts(pieces),
             self.start[rows], self.goal[rows], self.budget[rows],
             {name: [texts[k] for k in rows] for name, texts in self.told.items()},
         )  # fmt: skip
@@ -93,10 +100,10 @@ def read_index(root: DataRoot, selection: Selection, target_split: str | None = 
     for scene in sorted(pc.unique(chosen["scene"]).to_pylist()):
         here = chosen.filter(pc.equal(chosen["scene"], scene))
         parts.append(_scene(root, scene, here, target_split))
-    found = _joined([part for part in parts if len(part)])
-    if not len(found):
+    parts = [part for part in parts if len(part)]
+    if not parts:
         raise UsageError(f"no task of the selection has the target split {target_split!r}")
-    return found
+    return _joined(parts)
 
 
 def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None) -> Index:
@@ -121,7 +128,7 @@ def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None)
         np.zeros(len(ids), np.int32),
         ids,
         np.concatenate([*pieces, np.empty(0, np.int8)]),
-        np.concatenate([[0], np.cumsum([len(p) for p in pieces])]).astype(np.int64),
+        _starts(pieces),
         np.array([[wanted[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
         np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
         np.array([wanted[i]["action_budget"] for i in ids], np.int32),
@@ -161,12 +168,12 @@ def _of_target_split(root: DataRoot, scene: str, side: str) -> set[str]:
     return found
 
 
+def _starts(pieces: Sequence[NDArray[np.int8]]) -> NDArray[np.int64]:
+    return np.cumsum([0, *map(len, pieces)], dtype=np.int64)
+
+
 def _joined(parts: Sequence[Index]) -> Index:
-    if not parts:
-        nothing = np.empty(0, np.int32)
-        return Index((), nothing, [], np.empty(0, np.int8), np.zeros(1, np.int64), np.empty((0, 4)), np.empty((0, 3)),
-                     nothing, {})  # fmt: skip
-    shifts = np.cumsum([0, *(len(p.actions) for p in parts)])
+    shifts = _starts([p.actions for p in parts])
     return Index(
         tuple(p.scenes[0] for p in parts),
         np.concatenate([np.full(len(p), i, np.int32) for i, p in enumerate(parts)]),

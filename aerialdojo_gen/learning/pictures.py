@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
@@ -38,6 +39,13 @@ class Frames:
         return Frames(
             None if self.rgb is None else self.rgb[rows], None if self.depth_m is None else self.depth_m[rows]
         )
+
+    @classmethod
+    def join(cls, parts: Sequence[Frames]) -> Frames:
+        """Join poses, in their order."""
+        rgb = [p.rgb for p in parts if p.rgb is not None]
+        depth_m = [p.depth_m for p in parts if p.depth_m is not None]
+        return cls(np.concatenate(rgb) if rgb else None, np.concatenate(depth_m) if depth_m else None)
 
 
 class Source(Protocol):
@@ -94,10 +102,8 @@ class RecordedFrames:
             rows = np.flatnonzero(known)
             rows = rows[np.lexsort((steps[rows], trajectories[rows]))]
             parts.append((rows, self._read(trajectories[rows], steps[rows])))
-        if len(parts) == 1 and len(parts[0][0]) == len(trajectories) and not known.any():
-            return parts[0][1]
         back = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        return _joined([frames for _, frames in parts]).take(back)
+        return Frames.join([frames for _, frames in parts]).take(back)
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
@@ -163,9 +169,3 @@ def _smaller(image: NDArray[Any], sensors: Sensors, how: int) -> NDArray[Any]:
     if image.shape[:2] == (sensors.height, sensors.width):
         return image
     return np.asarray(cv2.resize(image, (sensors.width, sensors.height), interpolation=how))
-
-
-def _joined(parts: list[Frames]) -> Frames:
-    rgb = [p.rgb for p in parts if p.rgb is not None]
-    depth_m = [p.depth_m for p in parts if p.depth_m is not None]
-    return Frames(np.concatenate(rgb) if rgb else None, np.concatenate(depth_m) if depth_m else None)

@@ -6,10 +6,10 @@ import hashlib
 import importlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,15 @@ from aerialdojo_gen.learning.parts import DaggerRound, Part
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
-from aerialdojo_gen.learning.words import Vocabulary, goal_text, name_vocabulary
+from aerialdojo_gen.learning.words import Vocabulary, name_vocabulary
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Rate, Reporter, duration
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+
+if TYPE_CHECKING:
+    from aerialdojo_gen.learning.imitation import Assessment, Epoch, TrainingLog
 
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
 # Seconds between progress lines.
@@ -116,9 +119,8 @@ def train(
     drawn = Path(cache) if cache is not None else base / "policies" / "cache"
     make_folder(folder)
     with open_root(folder).lock():
-        return _Training(root, recipe, folder, drawn, device, workers, renderer, reporter or Reporter(True)).run(
-            restart
-        )
+        own = _Training(root, recipe, folder, drawn, device, workers, renderer, reporter or Reporter(True))
+        return own.run(restart)
 
 
 class _Training:
@@ -136,19 +138,11 @@ class _Training:
         self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
         self._selection = (Selection((d.split,)).splits, d.settings)
         self._index, named = self._read_index()
-        told = (self._index.told[name] for name in ("target_name", "landmark", "direction", "description"))
-        self._vocabulary = Vocabulary.of(goal_text(*words) for words in zip(*told, strict=True))
+        self._vocabulary = Vocabulary.of(self._index.goal_texts)
         shape = Shape(
-            len(self._vocabulary),
-            len(d.views),
-            d.size_px,
-            len(self._index.scenes),
-            m.channels,
-            m.features,
-            m.word_features,
-            m.hidden,
-            len(named),
-        )
+            words=len(self._vocabulary), views=len(d.views), size_px=d.size_px, scenes=len(self._index.scenes),
+            named=len(named), **dict(m),
+        )  # fmt: skip
         self._about = checkpoints.PolicyInfo(
             shape.to_dict(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
             named,
@@ -258,24 +252,20 @@ class _Training:
         if phase < 0 and self._exploration is not None:
             from aerialdojo_gen.learning.recognition import train_patch_classifier
 
-            train_patch_classifier(
-                self._learner, self._exploration, self._about.named,
-                after=self._after("sight", self._recipe.sight.epochs), tick=self._tick("sight"),
-            )  # fmt: skip
+            log = self._log("sight", self._recipe.sight.epochs)
+            train_patch_classifier(self._learner, self._exploration, self._about.named, log)
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = Pool(parts, self._index.scenes, self._vocabulary)
-        what = f"round {phase}" if phase else "imitation"
-        after = self._after(what, epochs)
-        self._learner.learn(
-            pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, after=after,
-            tick=self._tick(what),
-        )  # fmt: skip
+        log = self._log(f"round {phase}" if phase else "imitation", epochs)
+        self._learner.learn(pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, log)
 
-    def _tick(self, what: str) -> Callable[[int, int, float, float], None]:
+    def _log(self, what: str, epochs: int) -> TrainingLog:
+        from aerialdojo_gen.learning.imitation import TrainingLog
+
         rate = Rate()
 
-        def tick(done: int, total: int, loss: float, accuracy: float) -> None:
+        def on_batch(done: int, total: int, loss: float, accuracy: float) -> None:
             per_s = rate.per_s(done)
             now = time.monotonic()
             if self._tensorboard is not None:
@@ -290,19 +280,9 @@ class _Training:
             if now - self._kept >= self._recipe.train.checkpoint_s:
                 self._keep()
 
-        return tick
-
-    def _after(self, what: str, epochs: int) -> Callable[[Any], None]:
-        def after(epoch: Any) -> None:
+        def on_epoch(epoch: Epoch) -> None:
             k = epoch.kept_back
-            kept = (
-                ""
-                if k is None
-                else (
-                    f" (kept back: {k.accuracy:.1%}; goal off by {k.goal_off_at_start_m:.1f} m at the start, "
-                    f"{k.goal_off_m:.1f} m in all{_describe(k)})"
-                )
-            )
+            kept = "" if k is None else f" (kept back: {_describe(k)})"
             self._reporter.line(
                 f"{what}: epoch {epoch.number + 1} of {epochs}, loss {epoch.loss:.3f}, accuracy "
                 f"{epoch.accuracy:.1%}{kept}, {duration(epoch.left_s)} left"
@@ -313,7 +293,7 @@ class _Training:
                 file.write(json.dumps(row) + "\n")
             self._keep()
 
-        return after
+        return TrainingLog(on_batch, on_epoch)
 
     def _keep(self) -> None:
         progress = self._learner.progress.to_dict()
@@ -362,11 +342,13 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             return
 
 
-def _describe(kept: Any) -> str:
-    """Describe the accuracy on blocked and free actions."""
+def _describe(kept: Assessment) -> str:
+    """Describe the accuracy on what was not trained on."""
     shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
-    return f"; {' and '.join(known)} actions told" if known else ""
+    told = f"; {' and '.join(known)} actions told" if known else ""
+    off = f"{kept.goal_off_at_start_m:.1f} m at the start, {kept.goal_off_m:.1f} m in all"
+    return f"{kept.accuracy:.1%}; goal off by {off}{told}"
 
 
 def _tensorboard(folder: Path) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,13 +24,56 @@ from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
-from aerialdojo_gen.learning.words import PADDING, Vocabulary, goal_text
+from aerialdojo_gen.learning.words import PADDING, Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import VIEWS
 
 GOALS = ("text", "tokens", "image")
 SOURCES = ("render", "recordings", "auto")
+
+
+@dataclass(frozen=True)
+class SampleOptions:
+    """Which trajectories are samples, and what a sample has; where several names may stand, one may stand alone."""
+
+    setting: str | Sequence[str] = ()  # All where absent
+    scene: str | Sequence[str] = ()  # Names or globs; all where absent
+    target_split: str | None = None  # "train" or "test" of the split by objects, where the release has it
+    limit: int | None = None  # Draw so many trajectories by `seed`, spread over the scenes
+    seed: int = 0
+    views: str | Sequence[str] = ("front",)  # Of front, left, right, down
+    size: int | tuple[int, int] = 128  # Pixels: edge, or width and height
+    rgb: bool = True  # Which pictures; without both nothing is drawn
+    depth: bool = True
+    goal: str | Sequence[str] = "text"  # Of "text", "tokens", "image"
+    past: int | None = 0  # Steps before a sample's last; None for whole trajectories, each with a T of its own
+    # Every so many steps a sample ends, counted back from the Stop: with past = stride - 1 a step is in one sample.
+    stride: int = 1
+    privileged: str | Sequence[str] = ()  # Of "pose", "goal_distance_m", "actions"
+    # "render" draws pictures from the meshes; "recordings" takes the trajectories that have a recording, and reads
+    # that; "auto" reads where there is one and draws else. Recorded pictures are lossy and made smaller.
+    source: str = "render"
+    cache_gb: float = 0.0  # Keep pictures in so many gigabytes of the disk; 0 keeps none
+    cache_dir: str | Path | None = None  # Where; learning/ in $AERIALDOJO_CACHE where absent
+    # Of the tokens; the words of this selection where absent. Give a test set that of its training set.
+    vocabulary: Vocabulary | None = None
+    renderer: str = "auto"  # "gl", "pybullet" or "auto"
+    max_depth_m: float = 65.535  # Range of the depth camera
+
+    def __post_init__(self) -> None:
+        """Check what no list of names checks."""
+        if self.source not in SOURCES:
+            raise UsageError(unknown("no source", self.source, SOURCES))
+        if (self.past is not None and self.past < 0) or self.stride < 1 or self.cache_gb < 0:
+            raise UsageError("past and cache_gb are at least 0, stride at least 1")
+
+    @property
+    def sensors(self) -> Sensors:
+        """What the body sees."""
+        width, height = (self.size, self.size) if isinstance(self.size, int) else self.size
+        views = _chosen("view", self.views, VIEWS, keep=True)
+        return Sensors(views, self.rgb, self.depth, width, height, max_depth_m=self.max_depth_m)
 
 
 class Trajectories:
@@ -55,41 +99,9 @@ class Trajectories:
     ----------
     release : str, Path or DataRoot
         The data directory, in which ``release/`` lies, and beside it ``meshes/`` and ``media/``.
-    split, setting, scene : str or sequence of str
-        Which tasks; all settings and scenes where absent. Scenes may be globs.
-    target_split : str, optional
-        ``"train"`` or ``"test"`` of the split by objects, where the release has it.
-    limit : int, optional
-        Draw so many trajectories by `seed`, spread over the scenes.
-    views : str or sequence of str
-        Of front, left, right, down.
-    size : int or (int, int)
-        Pixels: edge, or width and height.
-    rgb, depth : bool
-        Which pictures; without both nothing is drawn.
-    goal : str or sequence of str
-        Of ``"text"``, ``"tokens"``, ``"image"``.
-    past : int or None
-        Steps before the last one of a sample; None for whole trajectories, each a sample with a T of its own.
-    stride : int
-        Every so many steps a sample ends, counted back from the Stop: with ``past = stride - 1`` a step is in one
-        sample.
-    privileged : str or sequence of str
-        Of ``"pose"``, ``"goal_distance_m"``, ``"actions"``.
-    source : str
-        ``"render"`` draws pictures from the meshes; ``"recordings"`` takes the trajectories that have a recording,
-        and reads that; ``"auto"`` reads where there is one and draws else. Recorded pictures are lossy and made
-        smaller: they do not equal drawn ones.
-    cache_gb : float
-        Keep pictures in so many gigabytes of the disk; 0 keeps none.
-    cache_dir : str or Path, optional
-        Where; ``learning/`` in ``$AERIALDOJO_CACHE`` where absent.
-    vocabulary : Vocabulary, optional
-        Of the tokens; the words of this selection where absent. Give a test set that of its training set.
-    renderer : str
-        ``"gl"``, ``"pybullet"`` or ``"auto"``.
-    max_depth_m : float
-        Range of the depth camera.
+    split : str or sequence of str
+    **options
+        The fields of `SampleOptions`.
 
     Attributes
     ----------
@@ -108,72 +120,50 @@ class Trajectories:
         There is no release, or a scene's mesh is missing.
     """
 
-    def __init__(
-        self,
-        release: Where,
-        split: str | Sequence[str] = "id_train",
-        *,
-        setting: str | Sequence[str] = (),
-        scene: str | Sequence[str] = (),
-        target_split: str | None = None,
-        limit: int | None = None,
-        seed: int = 0,
-        views: str | Sequence[str] = ("front",),
-        size: int | tuple[int, int] = 128,
-        rgb: bool = True,
-        depth: bool = True,
-        goal: str | Sequence[str] = "text",
-        past: int | None = 0,
-        stride: int = 1,
-        privileged: str | Sequence[str] = (),
-        source: str = "render",
-        cache_gb: float = 0.0,
-        cache_dir: str | Path | None = None,
-        vocabulary: Vocabulary | None = None,
-        renderer: str = "auto",
-        max_depth_m: float = 65.535,
-    ) -> None:
+    def __init__(self, release: Where, split: str | Sequence[str] = "id_train", **options: Any) -> None:
+        own = SampleOptions(**options)
         self._root = open_root(release)
-        self.goal, self.privileged = (
-            _chosen("goal", goal, GOALS),
-            _chosen("privileged column", privileged, PRIVILEGED),
-        )
-        if source not in SOURCES:
-            raise UsageError(unknown("no source", source, SOURCES))
-        if (past is not None and past < 0) or stride < 1 or cache_gb < 0:
-            raise UsageError("past and cache_gb are at least 0, stride at least 1")
-        width, height = (size, size) if isinstance(size, int) else size
-        self.sensors = Sensors(
-            _chosen("view", views, VIEWS, keep=True), rgb, depth, width, height, max_depth_m=max_depth_m
-        )
+        self.goal = _chosen("goal", own.goal, GOALS)
+        self.privileged = _chosen("privileged column", own.privileged, PRIVILEGED)
+        self.sensors, self.past, self.stride = own.sensors, own.past, own.stride
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
-        chosen = Selection(_names(split), _names(setting), modalities, _names(scene), None, seed)
-        index = read_index(self._root, chosen, target_split)
-        if limit is not None:
-            index = index.take(sample_evenly(index, limit, seed))
-        # A scene without a mesh is named before the first epoch, not within it.
-        meshes = {name: mesh_of(self._root, name)[1] for name in index.scenes} if not self.sensors.blind else {}
-        self._source: Source | None = None
-        if not self.sensors.blind:
-            self._source = RenderedFrames(self._root, index, self.sensors, renderer)
-        if source != "render" and not self.sensors.blind:
-            index = self._with_recordings(index, source, renderer)
-        self.index, self.past, self.stride = index, past, stride
-        self._labels = Labels(self._root, index, self.privileged)
-        ends = np.ones(len(index), np.int64) if past is None else (index.steps - 1) // stride + 1
+        chosen = Selection(_names(split), _names(own.setting), modalities, _names(own.scene), None, own.seed)
+        self.index = read_index(self._root, chosen, own.target_split)
+        if own.limit is not None:
+            self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
+        self._source = None if self.sensors.blind else self._open_source(own)
+        self._labels = Labels(self._root, self.index, self.privileged)
+        steps = self.index.steps
+        ends = np.ones(len(steps), np.int64) if own.past is None else (steps - 1) // own.stride + 1
         self._first = np.concatenate([[0], np.cumsum(ends)])
-        self._texts = [goal_text(*said) for said in zip(
-            *(index.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
-        )]  # fmt: skip
-        self.vocabulary = vocabulary or Vocabulary.of(self._texts)
+        self._texts = self.index.goal_texts
+        self.vocabulary = own.vocabulary or Vocabulary.of(self._texts)
         self.fingerprint = self._fingerprint()
-        if cache_gb and not self.sensors.blind:
-            base = Path(cache_dir) if cache_dir is not None else cache_folder() / "learning"
-            assert self._source is not None
-            self._source = CachedFrames(
-                self._source, index, self.sensors, CacheOptions(base, int(cache_gb * 1e9), source, renderer), meshes
-            )
+
+    def _open_source(self, own: SampleOptions) -> Source:
+        """Open where pictures come from; of recordings alone only the trajectories that have one are kept."""
+        # A scene without a mesh is named before the first epoch, not within it.
+        meshes = {name: mesh_of(self._root, name)[1] for name in self.index.scenes}
+        source: Source = RenderedFrames(self._root, self.index, self.sensors, own.renderer)
+        if own.source != "render":
+            recorded = RecordedFrames(self._root, self.index, self.sensors, source)
+            if own.source == "recordings":
+                has = np.flatnonzero([recorded.has(k) for k in range(len(self.index))])
+                if not len(has):
+                    raise UsageError(
+                        f"none of the {len(self.index):,} trajectories has a recording of the views asked for: run "
+                        f"{command('render')}, or choose source='render'"
+                    )
+                self.index = self.index.take(has)
+                drawn = RenderedFrames(self._root, self.index, self.sensors, own.renderer)
+                recorded = RecordedFrames(self._root, self.index, self.sensors, drawn)
+            source = recorded
+        if not own.cache_gb:
+            return source
+        base = Path(own.cache_dir) if own.cache_dir is not None else cache_folder() / "learning"
+        store = CacheOptions(base, int(own.cache_gb * 1e9), own.source, own.renderer)
+        return CachedFrames(source, self.index, self.sensors, store, meshes)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -271,27 +261,7 @@ class Trajectories:
         parts = [
             self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])
         ]  # fmt: skip
-        joined = parts[0] if len(parts) == 1 else Frames(
-            np.concatenate([p.rgb for p in parts]) if self.sensors.rgb else None,
-            np.concatenate([p.depth_m for p in parts]) if self.sensors.depth else None,
-        )  # fmt: skip
-        return joined.take(np.asarray(back, np.int64).ravel())
-
-    def _with_recordings(self, index: Index, source: str, renderer: str) -> Index:
-        drawn: Source = RenderedFrames(self._root, index, self.sensors, renderer)
-        recorded = RecordedFrames(self._root, index, self.sensors, drawn)
-        if source == "recordings":
-            has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
-            if not len(has):
-                raise UsageError(
-                    f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
-                    f"{command('render')}, or choose source='render'"
-                )
-            index = index.take(has)
-            drawn = RenderedFrames(self._root, index, self.sensors, renderer)
-            recorded = RecordedFrames(self._root, index, self.sensors, drawn)
-        self._source = recorded
-        return index
+        return Frames.join(parts).take(np.asarray(back, np.int64).ravel())
 
     def _fingerprint(self) -> str:
         s = self.sensors
