@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.names import nearest
+from aerialdojo_gen.base.safe_parse import JsonPath
 from aerialdojo_gen.scenes.model import Scene
 
 # Not allowed in names and descriptions: node names, decimals, number pairs, measured lengths.
@@ -26,6 +27,7 @@ _UNSPOKEN = re.compile(
 )
 _SENTENCES = 3
 _WORDS = 60
+_SPACES = "has leading, trailing or double spaces"
 
 
 def check_source(
@@ -39,186 +41,165 @@ def check_source(
     """Check an annotation file against its scene and return all faults, in line order."""
     faults = list(source.faults)
     if source.document.value is not None:
-        if source.scene and source.scene != scene.name:
-            faults.append(source.document.fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}"))
-        faults += _counts(source, counts)
-        faults += _unique(source)
-        for i, landmark in source.landmarks.items():
-            faults += _landmark(source, scene, ("landmarks", i), landmark)
-        noun_checker, surface = NounChecker(names), Surface(scene)
-        for i, entry in source.objects.items():
-            faults += _object(source, scene, names, ("objects", i), entry)
-            faults += _nouns(source, scene, noun_checker, ("objects", i), entry)
-            faults += _looks(source, scene, looks or {}, surface, ("objects", i), entry)
-        faults += _geometry(source, scene, names, geometry or SceneGeometry(scene))
+        faults += _Checker(source, scene, names, geometry or SceneGeometry(scene), looks or {}).faults(counts)
     return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
 
 
-def _counts(source: Source, counts: tuple[int, int] | None) -> Iterable[Fault]:
-    raw = source.document.value
-    for key, expected in zip(("landmarks", "objects"), counts or (), strict=False):
-        found = len(raw[key]) if isinstance(raw, dict) and isinstance(raw.get(key), list) else 0
-        if found != expected:
-            yield source.document.fault((key,), f"there are {found}; the paper's inventory has {expected}")
+class _Checker:
+    """The checks of one file; each yields its faults."""
+
+    def __init__(
+        self, source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry, looks: Looks
+    ) -> None:
+        self._source, self._scene, self._names, self._geometry, self._looks = source, scene, names, geometry, looks
+        self._fault, self._raw = source.document.fault, source.document.value
+        self._known = sorted({*names, *(instance.category for instance in scene.instances)})
+        self._nouns, self._surface = NounChecker(names), Surface(scene)
+
+    def faults(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
+        source, scene = self._source, self._scene
+        if source.scene and source.scene != scene.name:
+            yield self._fault(("scene",), f"is {source.scene!r}, the scene is {scene.name!r}")
+        for key, expected in zip(("landmarks", "objects"), counts or (), strict=False):
+            found = len(self._raw[key]) if isinstance(self._raw, dict) and isinstance(self._raw.get(key), list) else 0
+            if found != expected:
+                yield self._fault((key,), f"there are {found}; the paper's inventory has {expected}")
+        yield from self._unique()
+        for i, landmark in source.landmarks.items():
+            yield from self._entry(("landmarks", i), landmark)
+        for i, entry in source.objects.items():
+            yield from self._entry(("objects", i), entry)
+            yield from self._object(("objects", i), entry)
+            # The categories of imported scenes are guesses.
+            if not scene.imported and entry.node in scene:
+                yield from self._appearance(("objects", i), entry)
+        yield from self._places()
+
+    def _unique(self) -> Iterator[Fault]:
+        landmarks, objects = self._source.landmarks, self._source.objects
+        entries: tuple[tuple[str, Mapping[int, Landmark | Object], tuple[str, ...]], ...] = (
+            ("landmarks", landmarks, ("id", "name", "node")),
+            ("objects", objects, ("id", "node")),
+        )
+        for kind, members, keys in entries:
+            for key in keys:
+                first: dict[object, int] = {}
+                for i, entry in members.items():
+                    value = getattr(entry, key)
+                    value = value.strip().lower() if key == "name" else value
+                    if value in first:
+                        yield self._fault((kind, i, key), f"{value!r} is the {key} of {kind}[{first[value]}] already")
+                    first.setdefault(value, i)
+        landmark_nodes = {entry.node: i for i, entry in landmarks.items()}
+        for i, item in objects.items():
+            if item.node in landmark_nodes:
+                text = f"{item.node!r} is landmarks[{landmark_nodes[item.node]}]: an object must be a different node"
+                yield self._fault(("objects", i, "node"), text)
+
+    def _entry(self, path: JsonPath, entry: Landmark | Object) -> Iterator[Fault]:
+        name, node, scene = entry.name, entry.node, self._scene
+        if not name.strip():
+            yield self._fault((*path, "name"), "is empty")
+        elif name != " ".join(name.split()):
+            yield self._fault((*path, "name"), _SPACES)
+        elif _UNSPOKEN.search(name):
+            yield self._fault((*path, "name"), f"{name!r} must be plain words, without node names or numbers")
+        if node not in scene:
+            text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
+            yield self._fault((*path, "node"), text)
+        elif not _inside(scene, scene[node].centroid):
+            yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
+
+    def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
+        scene, category = self._scene, entry.category
+        for text in _description_faults(entry.description):
+            yield self._fault((*path, "description"), text)
+        if category not in self._known:
+            yield self._fault((*path, "category"), f"no category {category!r}{nearest(category, self._known, 2)}")
+        elif not scene.imported and entry.node in scene and scene[entry.node].category != category:
+            text = f"is {category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
+            yield self._fault((*path, "category"), text)
+        if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
+            yield self._fault((*path, "anchor", "position_m"), "outside the scene's bounds")
+
+    def _appearance(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
+        thing, materials = self._scene[entry.node], self._scene.materials
+        for key in ("name", "description"):
+            for message in self._nouns.contradictions(getattr(entry, key), thing):
+                yield self._fault((*path, key), message)
+        for message in false_phrases(entry.description, thing, self._looks, materials, self._surface):
+            yield self._fault((*path, "description"), message)
+        for key in ("name", "description"):
+            for message in false_colours(getattr(entry, key), thing, materials):
+                yield self._fault((*path, key), message)
+
+    def _places(self) -> Iterator[Fault]:
+        """Check directions and descriptions against the mesh; only if all landmarks are valid."""
+        source, scene, geometry = self._source, self._scene, self._geometry
+        nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
+        raw = self._raw.get("landmarks") if isinstance(self._raw, dict) else None
+        if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
+            return
+        if not all(node in scene for node in nodes):
+            return
+        if not nodes:
+            if source.objects:
+                yield self._fault(("landmarks",), "there is none: objects need one to be located by")
+            return
+        named = {entry.name: entry.node for entry in source.landmarks.values()}
+        ambiguity = make_ambiguity(scene, self._names, named, nodes, geometry)
+        described: dict[tuple[object, ...], int] = {}
+        for k, entry in source.objects.items():
+            if entry.node not in scene or entry.node in nodes:
+                continue
+            i = geometry.index[entry.node]
+            bearing = nearest_landmark(geometry.centres[i], geometry.centres[list(ambiguity.landmarks)])
+            if bearing is None:
+                text = "is exactly at its nearest landmark's position, so it has no direction"
+                yield self._fault(("objects", k, "node"), text)
+                continue
+            for key in ("name", "description"):
+                for false_claim in ambiguity.false_claims(i, getattr(entry, key)):
+                    yield self._fault(("objects", k, key), false_claim)
+            path = ("objects", k, "description")
+            same = (entry.name.lower(), bearing, entry.description.lower())
+            if same in described:
+                text = f"name, landmark, direction and description are those of objects[{described[same]}]"
+                yield self._fault(path, text)
+            described.setdefault(same, k)
+            if not entry.description.strip():
+                continue
+            if others := self._listed(ambiguity.distractors(i, entry.description)):
+                text = f"ambiguous: it fits {others} as well, {bearing.direction} of the same landmark; "
+                yield self._fault(path, f"{text}describe how it differs or what stands near it")
+            elif others := self._listed(ambiguity.first_sentence_distractors(i, entry.name, entry.description)):
+                text = f"its first sentence fits {others} as well: add what distinguishes it to the first sentence"
+                yield self._fault(path, text)
+
+    def _listed(self, instances: Sequence[int]) -> str:
+        nodes = ", ".join(self._scene.instances[j].node for j in instances[:3])
+        return nodes + ("..." if len(instances) > 3 else "")
 
 
-def _unique(source: Source) -> Iterable[Fault]:
-    entries: tuple[tuple[str, Mapping[int, Landmark | Object], tuple[str, ...]], ...] = (
-        ("landmarks", source.landmarks, ("id", "name", "node")),
-        ("objects", source.objects, ("id", "node")),
-    )
-    for kind, members, keys in entries:
-        for key in keys:
-            first: dict[object, int] = {}
-            for i, entry in members.items():
-                value = getattr(entry, key)
-                value = value.strip().lower() if key == "name" else value
-                if value in first:
-                    text = f"{value!r} is the {key} of {kind}[{first[value]}] already"
-                    yield source.document.fault((kind, i, key), text)
-                first.setdefault(value, i)
-    landmark_nodes = {entry.node: i for i, entry in source.landmarks.items()}
-    for i, item in source.objects.items():
-        if item.node in landmark_nodes:
-            text = f"{item.node!r} is landmarks[{landmark_nodes[item.node]}]: an object must be a different node"
-            yield source.document.fault(("objects", i, "node"), text)
-
-
-def _landmark(source: Source, scene: Scene, path: tuple[str | int, ...], entry: Landmark) -> Iterable[Fault]:
-    yield from _name(source, path, entry.name)
-    yield from _node(source, scene, path, entry.node)
-
-
-def _object(
-    source: Source, scene: Scene, names: Mapping[str, str], path: tuple[str | int, ...], entry: Object
-) -> Iterable[Fault]:
-    yield from _name(source, path, entry.name)
-    yield from _node(source, scene, path, entry.node)
-    yield from _description(source, (*path, "description"), entry.description)
-    known = sorted({*names, *(instance.category for instance in scene.instances)})
-    if entry.category not in known:
-        text = f"no category {entry.category!r}{nearest(entry.category, known, 2)}"
-        yield source.document.fault((*path, "category"), text)
-    elif not scene.imported and entry.node in scene and scene[entry.node].category != entry.category:
-        text = f"is {entry.category!r}, the node {entry.node!r} is a {scene[entry.node].category!r}"
-        yield source.document.fault((*path, "category"), text)
-    if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
-        yield source.document.fault((*path, "anchor", "position_m"), "outside the scene's bounds")
-
-
-def _nouns(
-    source: Source, scene: Scene, noun_checker: NounChecker, path: tuple[str | int, ...], entry: Object
-) -> Iterable[Fault]:
-    """Check the nouns of name and description; not for imported scenes, whose categories are guesses."""
-    if scene.imported or entry.node not in scene:
-        return
-    for key in ("name", "description"):
-        for message in noun_checker.contradictions(getattr(entry, key), scene[entry.node]):
-            yield source.document.fault((*path, key), message)
-
-
-def _looks(
-    source: Source, scene: Scene, looks: Looks, surface: Surface, path: tuple[str | int, ...], entry: Object
-) -> Iterable[Fault]:
-    if scene.imported or entry.node not in scene:
-        return
-    thing = scene[entry.node]
-    for message in false_phrases(entry.description, thing, looks, scene.materials, surface):
-        yield source.document.fault((*path, "description"), message)
-    for key in ("name", "description"):
-        for message in false_colours(getattr(entry, key), thing, scene.materials):
-            yield source.document.fault((*path, key), message)
-
-
-def _name(source: Source, path: tuple[str | int, ...], name: str) -> Iterable[Fault]:
-    if not name.strip():
-        yield source.document.fault((*path, "name"), "is empty")
-    elif name != " ".join(name.split()):
-        yield source.document.fault((*path, "name"), "has leading, trailing or double spaces")
-    elif _UNSPOKEN.search(name):
-        yield source.document.fault((*path, "name"), f"{name!r} must be plain words, without node names or numbers")
-
-
-def _node(source: Source, scene: Scene, path: tuple[str | int, ...], node: str) -> Iterable[Fault]:
-    if node not in scene:
-        text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
-        yield source.document.fault((*path, "node"), text)
-    elif not _inside(scene, scene[node].centroid):
-        yield source.document.fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
-
-
-def _description(source: Source, path: tuple[str | int, ...], text: str) -> Iterable[Fault]:
+def _description_faults(text: str) -> Iterator[str]:
     if not text.strip():
-        yield source.document.fault(path, "is empty")
+        yield "is empty"
         return
     if text != " ".join(text.split()):
-        yield source.document.fault(path, "has leading, trailing or double spaces")
+        yield _SPACES
     unspoken = _UNSPOKEN.search(text)
     if unspoken:
-        yield source.document.fault(path, f"{unspoken.group()!r}: coordinates and node names are not allowed")
+        yield f"{unspoken.group()!r}: coordinates and node names are not allowed"
     if text.strip()[-1] not in ".!?":
-        yield source.document.fault(path, "must end with a full stop")
+        yield "must end with a full stop"
     if len(re.findall(r"[.!?](?:\s|$)", text)) > _SENTENCES:
-        yield source.document.fault(path, f"has more than {_SENTENCES} sentences")
+        yield f"has more than {_SENTENCES} sentences"
     if len(text.split()) > _WORDS:
-        yield source.document.fault(path, f"has more than {_WORDS} words")
+        yield f"has more than {_WORDS} words"
 
 
 def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
     return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
-
-
-def _geometry(source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry) -> Iterable[Fault]:
-    """Check directions and descriptions against the mesh; only if all landmarks are valid."""
-    nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
-    raw = source.document.value.get("landmarks") if isinstance(source.document.value, dict) else None
-    if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
-        return
-    if not all(node in scene for node in nodes):
-        return
-    if not nodes:
-        if source.objects:
-            yield source.document.fault(("landmarks",), "there is none: objects need one to be located by")
-        return
-    ambiguity = make_ambiguity(scene, names, {e.name: e.node for e in source.landmarks.values()}, nodes, geometry)
-    described: dict[tuple[object, ...], int] = {}
-    for k, entry in source.objects.items():
-        if entry.node not in scene or entry.node in nodes:
-            continue
-        i = geometry.index[entry.node]
-        bearing = nearest_landmark(geometry.centres[i], geometry.centres[list(ambiguity.landmarks)])
-        if bearing is None:
-            text = "is exactly at its nearest landmark's position, so it has no direction"
-            yield source.document.fault(("objects", k, "node"), text)
-            continue
-        for key in ("name", "description"):
-            for false_claim in ambiguity.false_claims(i, getattr(entry, key)):
-                yield source.document.fault(("objects", k, key), false_claim)
-        same = (entry.name.lower(), bearing, entry.description.lower())
-        if same in described:
-            text = f"name, landmark, direction and description are those of objects[{described[same]}]"
-            yield source.document.fault(("objects", k, "description"), text)
-        described.setdefault(same, k)
-        distractors = ambiguity.distractors(i, entry.description) if entry.description.strip() else []
-        if distractors:
-            others = ", ".join(scene.instances[j].node for j in distractors[:3]) + (
-                "..." if len(distractors) > 3 else ""
-            )
-            text = (
-                f"ambiguous: it fits {others} as well, {bearing.direction} of the same landmark; "
-                "describe how it differs or what stands near it"
-            )
-            yield source.document.fault(("objects", k, "description"), text)
-            continue
-        twins = (
-            ambiguity.first_sentence_distractors(i, entry.name, entry.description)
-            if entry.description.strip()
-            else []
-        )
-        if twins:
-            others = ", ".join(scene.instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
-            text = f"its first sentence fits {others} as well: add what distinguishes it to the first sentence"
-            yield source.document.fault(("objects", k, "description"), text)
 
 
 def make_ambiguity(
