@@ -106,7 +106,8 @@ class Ambiguity:
         """
         reading: Reading = self.lexicon.read(text, i)
         instance = self.geometry.scene.instances[i]
-        wrong = [f"it is called {value!r}, and the mesh is not" for value in self._false_values(i, reading.named)]
+        denied = [value for value in reading.named if self.lexicon.denied(i, value)]
+        wrong = [f"it is called {value!r}, and the mesh is not" for value in denied]
         wrong += [
             f"{claim.text!r} is not so of {instance.node}"
             for claim in reading.claims
@@ -118,6 +119,3 @@ class Ambiguity:
             elif why := self._place_fault(i, place):
                 wrong.append(f"{place!r} is not so of {instance.node}: {why}")
         return wrong
-
-    def _false_values(self, i: int, values: Sequence[str]) -> list[str]:
-        return [value for value in values if self.lexicon.denied(i, value)]

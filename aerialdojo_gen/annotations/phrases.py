@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from aerialdojo_gen.annotations.claims import spoken
 from aerialdojo_gen.base.errors import AnnotationError
@@ -61,26 +62,17 @@ class Words:
 
 
 @cache
-def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str]]:
-    tables: dict[str, dict[str, object]] = {}
-    for path in _files():
+def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str], frozenset[str]]:
+    """Read the entries by category, the phrases of values, and the colours."""
+    tables: dict[str, Any] = {}
+    for path in sorted((Path(__file__).parent / "phrases").glob("*.toml")):
         for name, entry in read_toml(path, AnnotationError).items():
             if name in tables:
                 raise AnnotationError(f"{path}: [{name}] stands in another file of its folder already")
             tables[name] = entry
-    tables.pop("colours")
+    colours = frozenset(tables.pop("colours"))
     values = {key: str(value) for key, value in tables.pop("values").items()}
-    return tables, values
-
-
-def _files() -> list[Path]:
-    return sorted((Path(__file__).parent / "phrases").glob("*.toml"))
-
-
-@cache
-def _colours() -> frozenset[str]:
-    path = Path(__file__).parent / "phrases" / "common.toml"
-    return frozenset(read_toml(path, AnnotationError)["colours"])
+    return tables, values, colours
 
 
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
@@ -161,12 +153,12 @@ def place_of(instance: Instance) -> str:
 
 def _phrase_value(key: str, value: str) -> str:
     """Phrase one value: with the prefix ``+`` if it goes before the noun, else after it."""
-    table = _tables()[1]
+    _, table, colours = _tables()
     pattern = table.get(f"{key}={value}") or table.get(f"{key}=*", "")
     if pattern:
         return pattern.replace("{a}", _with_article(value)).replace("{up}", value.upper()).replace("{}", value)
     words = value.split()
-    if key in ("size", "material", "shape") or (key == "colour" and words[-1] in _colours()):
+    if key in ("size", "material", "shape") or (key == "colour" and words[-1] in colours):
         return "+" + value
     if words[0] in _OPENERS or words[0] in ("in", "on", "under", "without", "with", "of", "full"):
         return value

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, lacks
 from aerialdojo_gen.imports.pictures import TEXTURE_PX, SourceMaterial, decode_surfaces
-from aerialdojo_gen.imports.raw import RawNode, empty_corners, merge_nodes
+from aerialdojo_gen.imports.raw import GREY, RawNode, empty_corners, merge_nodes
 
 
 def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = TEXTURE_PX) -> list[RawNode]:
@@ -42,7 +42,7 @@ def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = T
             if not len(faces):
                 continue
             surface = index[scene.meshes[k].material_index] if index else -1
-            colour = surfaces[surface].colour if index else (168, 164, 156)
+            colour = surfaces[surface].colour if index else GREY
             turned = faces[:, ::-1] if np.linalg.det(world[:3, :3]) < 0 else faces
             bodies.append(RawNode(
                 node.name, vertices @ world[:3, :3].T + world[:3, 3], turned,

@@ -20,9 +20,9 @@ from aerialdojo_gen.base.environment_errors import is_out_of_memory
 from aerialdojo_gen.base.errors import AssetError, check_regular
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.imports.gltf import read_gltf
-from aerialdojo_gen.imports.mesh_materials import mesh_materials
+from aerialdojo_gen.imports.mesh_materials import add_materials
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, RawSurface, merge_nodes
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, merge_nodes
 from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, SiblingFiles, exit_status, mismatch, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -104,24 +104,21 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
         path, file_type=suffix[1:], resolver=siblings, process=False, split_objects=True, group_material=True,
         maintain_order=False,
     )  # fmt: skip
-    shown = []
+    named = _objects_of(path) if suffix == ".obj" else {}
+    nodes, shown = [], []
     for name in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[name]
         body = scene.geometry[geometry]
         if isinstance(body, trimesh.Trimesh):
             vertices = trimesh.transform_points(np.asarray(body.vertices, dtype=np.float64), transform)
-            shown.append((str(name), body, vertices))
-    materials = mesh_materials([body for _, body, _ in shown], siblings, texture_px)
-    named = _objects_of(path) if suffix == ".obj" else {}
-    nodes: dict[str, list[RawNode]] = {}
-    for (name, body, vertices), material in zip(shown, materials, strict=True):
-        label = "" if suffix in (".stl", ".ply") else _object_of(name, named, path)
-        faces = np.asarray(body.faces, dtype=np.int64)
-        made = RawNode(
-            label, vertices, faces, material.colours, material.surface, material.corners, material.surfaces
-        )
-        nodes.setdefault(label, []).append(made)
-    return [bodies[0] if len(bodies) == 1 else merge_nodes(bodies[0].name, bodies) for bodies in nodes.values()]
+            faces = np.asarray(body.faces, dtype=np.int64)
+            label = "" if suffix in (".stl", ".ply") else _object_of(str(name), named, path)
+            shown.append(body)
+            nodes.append(RawNode(label, vertices, faces, default_colours(len(faces))))
+    several: dict[str, list[RawNode]] = {}
+    for node in add_materials(nodes, shown, siblings, texture_px):
+        several.setdefault(node.name, []).append(node)
+    return [bodies[0] if len(bodies) == 1 else merge_nodes(name, bodies) for name, bodies in several.items()]
 
 
 def _objects_of(path: Path) -> dict[str, str]:

@@ -255,13 +255,9 @@ def _repair(node: RawNode, repairs: Repairs) -> RawNode:
         first, same, _ = unique_rows(*np.round(vertices / _WELD_M).T)
         vertices, faces = vertices[first], same[faces.reshape(-1)]
     faces = faces.reshape(-1, 3).astype(np.int64)
-    solid = _areas(vertices, faces) > _MIN_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
+    solid = areas(vertices, faces.astype(np.int32)) > _MIN_AREA_M2 if len(faces) else np.zeros(0, dtype=bool)
     repairs.add(int((~solid).sum()), f"triangles of {node.name or 'the mesh'} without area dropped")
     return node.with_vertices(vertices, faces).select_faces(solid)
-
-
-def _areas(vertices: Floats, faces: NDArray[np.int64]) -> Floats:
-    return areas(vertices, faces.astype(np.int32))
 
 
 def _bounds(bodies: Sequence[RawNode]) -> tuple[Floats, Floats]:

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapely.geometry import LineString, Point, Polygon
 from shapely.ops import linemerge, substring
 
@@ -153,23 +155,18 @@ class _RoadNetwork:
 
 def _clusters(ways: Sequence[Feature]) -> list[tuple[Feature, ...]]:
     """Group ways that share a bridge: same layer, consecutive or parallel."""
+    if not ways:
+        return []
     ways = sorted(ways, key=lambda f: (_layer(f.tags), f.key, sorted(f.tags.items())))
-    group = list(range(len(ways)))
-
-    def root(k: int) -> int:
-        while group[k] != k:
-            k = group[k]
-        return k
-
-    for i, a in enumerate(ways):
-        for j in range(i):
-            if _layer(a.tags) == _layer(ways[j].tags) and _same_bridge(a.shape, ways[j].shape):
-                low, high = sorted((root(i), root(j)))
-                group[high] = low
-    found: dict[int, list[Feature]] = {}
-    for k, way in enumerate(ways):
-        found.setdefault(root(k), []).append(way)
-    return [tuple(members) for _, members in sorted(found.items())]
+    together = [
+        (i, j) for i, a in enumerate(ways) for j, b in enumerate(ways[:i])
+        if _layer(a.tags) == _layer(b.tags) and _same_bridge(a.shape, b.shape)
+    ]  # fmt: skip
+    ends = np.array(together, dtype=np.int64).reshape(-1, 2).T
+    graph = coo_array((np.ones(len(together)), ends), shape=(len(ways), len(ways)))
+    # Components are numbered in the order of their first ways.
+    n, number = connected_components(graph, directed=False)
+    return [tuple(way for way, k in zip(ways, number, strict=True) if k == group) for group in range(n)]
 
 
 def _same_bridge(a: LineString, b: LineString) -> bool:
@@ -343,6 +340,3 @@ def _level(bridge: Bridge, ground: Ground) -> bool:
         if a + (b - a) * share - ground(p.x, p.y) > 1.0:
             return False
     return True
-
-
-__all__ = ["BRIDGE", "Bridge", "bridges"]

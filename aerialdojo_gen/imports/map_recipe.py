@@ -71,7 +71,7 @@ def town_recipe(
     table = None if heights is None else heights(frame, (width, depth))
     if table is not None:
         origin["z_m"] = table.pop("z_m")
-    ground = _level if table is None else _terrain(table, (width, depth))
+    ground = _ground(table, (width, depth))
     raised, lines = map_bridges.bridges(lines, areas, site, ground, summary)
     parameters: dict[str, Any] = {
         "ground": "paving:#98958d" if share > _PAVED else "grass",
@@ -82,7 +82,8 @@ def town_recipe(
         "areas": map_ground.areas(areas, lines, window, summary),
         "roads": map_ground.streets(lines, window, summary),
         "bridges": [
-            b.to_recipe() | _rails_table(map_ground.rails(lines, window, str(k))) for k, b in enumerate(raised)
+            b.to_recipe() | ({"rails": rails} if (rails := map_ground.rails(lines, window, str(k))) else {})
+            for k, b in enumerate(raised)
         ],
         "buildings": buildings,
         "barriers": map_ground.barriers(lines, inner),
@@ -117,15 +118,10 @@ def town_recipe(
     return recipe_text(head, parameters, comments), summary
 
 
-def _rails_table(rails: list[Any]) -> dict[str, Any]:
-    return {"rails": rails} if rails else {}
-
-
-def _level(x: float, y: float) -> float:
-    return 0.0
-
-
-def _terrain(table: Heights, size: tuple[float, float]) -> Callable[[float, float], float]:
+def _ground(table: Heights | None, size: tuple[float, float]) -> Callable[[float, float], float]:
+    """Return the height of the ground at a point, metres."""
+    if table is None:
+        return lambda x, y: 0.0
     terrain = HeightTable.model_validate(table).terrain(size)
     return lambda x, y: float(terrain.z(x, y))
 

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerialdojo_gen.imports.pictures import SourceMaterial, decode_surfaces
-from aerialdojo_gen.imports.raw import RawSurface, default_colours, empty_corners
+from aerialdojo_gen.imports.raw import RawNode, RawSurface, empty_corners
 from aerialdojo_gen.imports.untrusted import SiblingFiles
 
 
-@dataclass(frozen=True, eq=False)
-class FaceMaterials:
-    """Appearance of a mesh's faces; see `aerialdojo_gen.imports.raw.RawNode`."""
-
-    colours: NDArray[np.uint8]
-    surface: NDArray[np.int32] | None
-    corners: NDArray[np.float32] | None
-    surfaces: tuple[RawSurface, ...]
-
-
-def mesh_materials(bodies: Sequence[Any], siblings: SiblingFiles, texture_px: int) -> list[FaceMaterials]:
-    """Convert the materials of the meshes of one file."""
+def add_materials(
+    nodes: Sequence[RawNode], bodies: Sequence[Any], siblings: SiblingFiles, texture_px: int
+) -> list[RawNode]:
+    """Give nodes the materials of the meshes of one file."""
     materials: dict[int, Any] = {}
     for body in bodies:
         material = getattr(body.visual, "material", None)
@@ -40,28 +31,27 @@ def mesh_materials(bodies: Sequence[Any], siblings: SiblingFiles, texture_px: in
     surfaces, index = decode_surfaces([_source_material(m, maps, siblings) for m in materials.values()], texture_px)
     surfaces += missing
     place = dict(zip(materials, index, strict=True))
-    return [_face_materials(body, place, surfaces) for body in bodies]
+    return [_paint(node, body, place, surfaces) for node, body in zip(nodes, bodies, strict=True)]
 
 
-def _face_materials(body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> FaceMaterials:
-    n, visual = len(body.faces), body.visual
+def _paint(node: RawNode, body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> RawNode:
+    n, visual, node = len(body.faces), body.visual, replace(node, surfaces=surfaces)
     if visual.kind == "face":
-        return FaceMaterials(np.asarray(visual.face_colors[:, :3], dtype=np.uint8), None, None, surfaces)
+        return replace(node, colours=np.asarray(visual.face_colors[:, :3], dtype=np.uint8))
+    corners = empty_corners(n)
     if visual.kind == "vertex":
-        corners = empty_corners(n)
         own = np.asarray(visual.vertex_colors[:, :3], dtype=np.float32)[body.faces]
         corners[..., 2:] = own
-        return FaceMaterials(np.rint(own.mean(axis=1)).astype(np.uint8), None, corners, surfaces)
+        return replace(node, colours=np.rint(own.mean(axis=1)).astype(np.uint8), corners=corners)
     material = getattr(visual, "material", None)
     if material is None:
-        return FaceMaterials(default_colours(n), None, None, surfaces)
+        return node
     k = place[id(material)]
-    corners = empty_corners(n)
     uv = getattr(visual, "uv", None)
     if uv is not None and len(uv) == len(body.vertices) and surfaces[k].texture is not None:
         corners[..., :2] = np.nan_to_num(np.asarray(uv, dtype=np.float32)[:, :2])[body.faces]
     colours = np.tile(np.array(surfaces[k].colour, dtype=np.uint8), (n, 1))
-    return FaceMaterials(colours, np.full(n, k, dtype=np.int32), corners, surfaces)
+    return replace(node, colours=colours, surface=np.full(n, k, dtype=np.int32), corners=corners)
 
 
 def _source_material(material: Any, maps: dict[str, dict[str, str]], siblings: SiblingFiles) -> SourceMaterial:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.imports.raw import RawNode, default_colours
+from aerialdojo_gen.imports.raw import GREY, RawNode, default_colours
 
 _MAIN, _EDITOR, _OBJECT, _MESH = 0x4D4D, 0x3D3D, 0x4000, 0x4100
 _VERTICES, _FACES, _FACE_MATERIAL = 0x4110, 0x4120, 0x4130
@@ -60,7 +60,7 @@ def _text(data: bytes, start: int, end: int) -> tuple[str, int]:
 
 
 def _material(data: bytes, start: int, end: int) -> tuple[str, tuple[int, int, int]]:
-    name, colour = "", (168, 164, 156)
+    name, colour = "", GREY
     for kind, a, b in _chunks(data, start, end):
         if kind == _MATERIAL_NAME:
             name = _text(data, a, b)[0]
@@ -90,7 +90,7 @@ def _mesh(data: bytes, name: str, start: int, end: int, colours: dict[str, tuple
             for inner, first, last in _chunks(data, a + 2 + 8 * len(records), b):
                 if inner == _FACE_MATERIAL:
                     material, body = _text(data, first, last)
-                    painted[_records(data, body, last, "<u2", 1)[:, 0]] = colours.get(material, (168, 164, 156))
+                    painted[_records(data, body, last, "<u2", 1)[:, 0]] = colours.get(material, GREY)
     if len(faces) and int(faces.max()) >= len(vertices):
         raise ValueError("a face beyond the vertices")
     return RawNode(name, vertices, faces, painted)

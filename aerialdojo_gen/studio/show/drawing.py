@@ -235,9 +235,7 @@ def _scale_bar(axes: Axes, extent: tuple[float, float, float, float], share: flo
     power = 10.0 ** math.floor(math.log10(wish))
     length = max(step * power for step in (1, 2, 5) if step * power <= wish)
     x, y = extent[0] + share * (extent[1] - extent[0]), extent[2] + 0.05 * (extent[3] - extent[2])
-    axes.plot(
-        [x, x + length], [y, y], color="white", lw=3, path_effects=[withStroke(linewidth=5, foreground="black")]
-    )
+    axes.plot([x, x + length], [y, y], color="white", lw=3, path_effects=_HALO_OF_BAR)
     axes.annotate(
         f"{length:g} m", (x + length / 2, y), (0, 5), textcoords="offset points", ha="center", fontsize=9,
         color="white", path_effects=_HALO,

@@ -20,7 +20,7 @@ from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.studio.view.contents import route_detail, route_points, scene_index
+from aerialdojo_gen.studio.view.contents import route_points, scene_index
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _T = TypeVar("_T")
@@ -30,34 +30,27 @@ _WIDTH_PX, _HEIGHT_PX, _FOV_DEG = 480, 300, 60.0
 THUMB_PX = 224
 
 
-class SceneData:
+class SceneData(ReleasedScene):
     """The data of one scene, computed lazily."""
-
-    def __init__(self, released: ReleasedScene) -> None:
-        self.released = released
 
     @cached_property
     def payload(self) -> bytes:
         """The mesh for the browser; AssetError if it is missing or does not match."""
-        return scene_payload(self.released.model)
+        return scene_payload(self.model)
 
     @cached_property
     def index(self) -> dict[str, Any]:
         """What the page lists and filters."""
-        return scene_index(self.released)
+        return scene_index(self)
 
     @cached_property
     def points(self) -> bytes:
         """The points of all routes."""
-        return route_points(self.released)
-
-    def detail(self, nav_id: str) -> dict[str, Any]:
-        """Return one route in detail; UsageError if there is none."""
-        return route_detail(self.released, nav_id)
+        return route_points(self)
 
     def image(self, object_id: int) -> bytes:
         """Return the reference image of an object, PNG; UsageError if it has none."""
-        image: bytes | None = self.released.object(object_id)["reference_image"]
+        image: bytes | None = self.object(object_id)["reference_image"]
         if image is None:
             raise UsageError(f"object {object_id} has no reference image")
         return image
@@ -90,7 +83,7 @@ class SceneCache:
 
     def _load(self, name: str) -> SceneData:
         with self._lock:
-            data = self._open.pop(name, None) or SceneData(ReleasedScene(self.root, name))
+            data = self._open.pop(name, None) or SceneData(self.root, name)
             self._open[name] = data
             while len(self._open) > _MAX_OPEN:
                 self._open.popitem(last=False)
@@ -119,7 +112,7 @@ class SceneCache:
         # One at a time: the start page requests many, and other requests must not wait for all of them.
         with self._render_lock:
             if name not in self._pictures:
-                self._pictures[name] = self.run(name, lambda data: _picture(data.released.model))
+                self._pictures[name] = self.run(name, lambda data: _picture(data.model))
             return self._pictures[name]
 
 

@@ -12,6 +12,7 @@ from aerialdojo_gen.dataset.release import open_release
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.studio.view.contents import route_detail
 from aerialdojo_gen.studio.view.scenes import SceneCache
 from aerialdojo_gen.studio.view.tasks import TaskList
 from aerialdojo_gen.studio.web.serving import STATIC, local_app
@@ -76,7 +77,7 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
 
     @app.get("/scenes/{name}/api/routes/{nav_id}")
     def get_route(name: str, nav_id: str) -> dict[str, Any]:
-        return cache.run(name, lambda scene: scene.detail(nav_id))
+        return cache.run(name, lambda scene: route_detail(scene, nav_id))
 
     @app.get("/scenes/{name}/api/objects/{object_id}/image", response_model=None)
     def get_image(name: str, object_id: int) -> Response:
