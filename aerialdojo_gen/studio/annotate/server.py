@@ -138,11 +138,10 @@ def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
 
 def _add_document(app: FastAPI, session: AnnotationSession) -> None:
     """Add the routes that read and change the annotations."""
-    storage = session.storage
 
     @app.get("/api/document")
     def document(request: Request, client: Annotated[str, Query(max_length=40)] = "") -> Response:
-        if _version(request.headers.get("if-none-match")) == storage.load().version:
+        if _version(request.headers.get("if-none-match")) == session.storage.load().version:
             return Response(status_code=304)
         return _with_version(session.document(client))
 
@@ -157,16 +156,18 @@ def _add_document(app: FastAPI, session: AnnotationSession) -> None:
 
     @app.post("/api/undo")
     def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.saved(storage.undo(_required(if_match), body.author), body.author))
+        return _with_version(session.saved(session.storage.undo(_required(if_match), body.author), body.author))
 
     @app.post("/api/redo")
     def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.saved(storage.redo(_required(if_match), body.author), body.author))
+        return _with_version(session.saved(session.storage.redo(_required(if_match), body.author), body.author))
 
     @app.post("/api/import")
     def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
         raw = body.text.encode("utf-8", "replace")
-        return _with_version(session.saved(storage.replace(_required(if_match), body.author, raw), body.author))
+        return _with_version(
+            session.saved(session.storage.replace(_required(if_match), body.author, raw), body.author)
+        )
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:
@@ -174,7 +175,7 @@ def _add_document(app: FastAPI, session: AnnotationSession) -> None:
 
     @app.get("/api/export")
     def export() -> Response:
-        return _download(session.export(), "application/json", storage.path.name)
+        return _download(session.export(), "application/json", session.storage.path.name)
 
     @app.get("/api/coco")
     def coco() -> Response:
