@@ -197,7 +197,7 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
         nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, default_colours(len(faces))))
     adopted, _ = import_mesh("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
-    drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), 0, DraftOptions(max_per_category=30))
+    drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), DraftOptions(max_per_category=30))
     chosen = []
     made = drafter.objects(9, lambda: chosen.append(1))
     assert len(chosen) == len(made) < 9
