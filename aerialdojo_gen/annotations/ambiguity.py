@@ -54,7 +54,8 @@ class Ambiguity:
         self.landmarks = tuple(landmarks)
 
     @cached_property
-    def _bearings(self) -> list[Bearing | None]:
+    def bearings(self) -> list[Bearing | None]:
+        """Nearest landmark and direction of every instance."""
         places = self.geometry.centres[list(self.landmarks)]
         return [nearest_landmark(centre, places) for centre in self.geometry.centres]
 
@@ -62,17 +63,13 @@ class Ambiguity:
     def _groups(self) -> dict[tuple[str, Bearing | None], list[int]]:
         groups: dict[tuple[str, Bearing | None], list[int]] = {}
         for i, instance in enumerate(self.geometry.scene.instances):
-            groups.setdefault((instance.category, self._bearings[i]), []).append(i)
+            groups.setdefault((instance.category, self.bearings[i]), []).append(i)
         return groups
-
-    def bearing(self, i: int) -> Bearing | None:
-        """Nearest landmark and direction of an instance."""
-        return self._bearings[i]
 
     def candidates(self, i: int) -> list[int]:
         """Other instances of the same category, landmark and direction."""
         category = self.geometry.scene.instances[i].category
-        return [j for j in self._groups[category, self._bearings[i]] if j != i]
+        return [j for j in self._groups[category, self.bearings[i]] if j != i]
 
     def distractors(self, i: int, description: str) -> list[int]:
         """Instances that a description of `i` fits as well."""

@@ -107,29 +107,27 @@ _TESTS: Mapping[str, Callable[[SceneGeometry, int, int, float], bool]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass
 class Reading:
     """The result of parsing a text."""
 
-    values: tuple[str, ...]  # Attribute values asserted of the subject, anywhere
-    named: tuple[str, ...]  # Those directly before the subject's own name
-    claims: tuple[Claim, ...]  # Relations asserted of the subject
-    subjects: tuple[str, ...] = ()  # Names of things outside any relation: what the text calls the subject
-    places: tuple[str, ...] = ()  # Phrases of place, lower case, bound to conditions or not
+    values: list[str] = field(default_factory=list)  # Attribute values asserted of the subject, anywhere
+    named: list[str] = field(default_factory=list)  # Those directly before the subject's own name
+    claims: list[Claim] = field(default_factory=list)  # Relations asserted of the subject
+    # Names of things outside any relation: what the text calls the subject.
+    subjects: list[str] = field(default_factory=list)
+    places: list[str] = field(default_factory=list)  # Phrases of place, lower case, bound to conditions or not
 
 
 @dataclass
-class _State:
+class _State(Reading):
+    """A reading under way."""
+
     relation: str = ""
     words: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)
-    values: list[str] = field(default_factory=list)
-    named: list[str] = field(default_factory=list)
     first: frozenset[int] | None = None
     adjacent: bool = False
-    claims: list[Claim] = field(default_factory=list)
-    subjects: list[str] = field(default_factory=list)
-    places: list[str] = field(default_factory=list)
 
     def end_clause(self) -> None:
         # After "beside a bench with ..." the values belong to the bench, not to the subject.
@@ -223,9 +221,7 @@ class Lexicon:
             state.adjacent = kind == "value" or (state.adjacent and tokens[at] == "and")
             at += length
         state.end_clause()
-        return Reading(
-            tuple(state.values), tuple(state.named), tuple(state.claims), tuple(state.subjects), tuple(state.places)
-        )
+        return state
 
     def _match(self, tokens: list[str], at: int) -> tuple[int, str, str]:
         for length in range(min(self._longest, len(tokens) - at), 0, -1):

@@ -142,7 +142,7 @@ class AnnotationDrafter:
     def _has_direction(self, i: int, ambiguity: Ambiguity) -> bool:
         middle = self._scene.instances[i].centroid
         inside = np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])
-        return bool(inside) and ambiguity.bearing(i) is not None
+        return bool(inside) and ambiguity.bearings[i] is not None
 
     def _is_elevated(self, i: int) -> bool:
         return float(self._scene.instances[i].bounds[0, 2]) >= _ELEVATED_M

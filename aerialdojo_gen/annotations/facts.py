@@ -110,7 +110,7 @@ class FactFinder:
         meant = len(claims) == 1 and all(j in members for j, members in zip(things, claims[0].things, strict=False))
         if not meant or reading.values or not claims[0].holds(self._geometry, i, _TIGHT):
             return []
-        return [Fact(text, claims, weight, frozenset(things))]
+        return [Fact(text, tuple(claims), weight, frozenset(things))]
 
     def _phrase(self, relation: str, rng: np.random.Generator) -> str:
         forms = RELATIONS[relation]

@@ -16,11 +16,11 @@ from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_t
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
+from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M
 from aerialdojo_gen.imports.toml_text import recipe_text
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.layouts.places.parts.heights import Heights as HeightTable
 
-SMALLEST_M, LARGEST_M = 20.0, 1000.0
 # Streets extend beyond the border, to hide their ends.
 _BEYOND_M = 15.0
 _HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0

@@ -36,10 +36,6 @@ class Progress:
     batch: int = 0
     sums: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values."""
-        return {"phase": self.phase, "epoch": self.epoch, "batch": self.batch, "sums": self.sums}
-
 
 @dataclass(frozen=True)
 class Epoch:

@@ -49,7 +49,7 @@ class Labels:
             out["action"][i, here] = actions[at]
             out["previous_action"][i, here] = np.concatenate([[NO_ACTION], actions[:-1]])[at]
             out["remaining_actions"][i, here] = index.budget[k] - at
-            out["odometry"][i, here] = _odometry(poses)[at]
+            out["odometry"][i, here] = odometry(poses)[at]
             if "pose" in self.privileged:
                 out["pose"][i, here] = poses[at]
             if self.privileged and self.privileged != ("pose",):
@@ -67,7 +67,7 @@ class Labels:
             out["action_cost_to_go_m"][i, here] = cost
 
 
-def _odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
     c, s = np.cos(poses[0, 3]), np.sin(poses[0, 3])
     away = poses[:, :3] - poses[0, :3]

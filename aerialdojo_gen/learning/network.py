@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -89,10 +89,6 @@ class Shape:
     word_features: int
     hidden: int
     named: int = 0  # Words that pictures are searched for; without any there is nothing that searches
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values."""
-        return asdict(self)
 
 
 class PolicyOutput(NamedTuple):

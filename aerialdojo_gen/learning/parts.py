@@ -16,7 +16,7 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.labels import Labels
+from aerialdojo_gen.learning.labels import odometry
 from aerialdojo_gen.learning.pictures import clip_depth
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
@@ -84,16 +84,12 @@ class Part:
 def references(part: Part) -> Steps:
     """Replay the references and render every step."""
     index = part.index()
-    labels = Labels(part.data, index, ())
-    poses = np.concatenate([index.poses_of(k) for k in range(len(index))])
-    told = [
-        labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_)) for k, n in enumerate(index.steps)
-    ]
-    joined = {name: np.concatenate([one[name][0] for one in told]) for name in told[0]}
+    flown = [index.poses_of(k) for k in range(len(index))]
+    poses = np.concatenate(flown)
     goals = np.repeat(index.goal, index.steps, axis=0)
     return Steps(
-        frames=pictures(part, poses), first=index.first, label=joined["action"],
-        odometry=joined["odometry"],
+        frames=pictures(part, poses), first=index.first, label=index.actions.astype(np.int64),
+        odometry=np.concatenate([odometry(own) for own in flown]).astype(np.float32),
         offset=offsets(poses, goals), pose=poses.astype(np.float32), blocked=blocked_at(part, poses),
         **goals_of(part, index),
     )  # fmt: skip

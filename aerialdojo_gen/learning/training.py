@@ -144,7 +144,7 @@ class _Training:
             named=len(named), **dict(m),
         )  # fmt: skip
         self._about = checkpoints.PolicyInfo(
-            shape.to_dict(), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
+            asdict(shape), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
             named,
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
@@ -189,7 +189,7 @@ class _Training:
                 learner.begin(phase)
             self._learn(parts, phase)
             weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
-            checkpoints.write(self._weights(phase), weights, self._about, learner.progress.to_dict())
+            checkpoints.write(self._weights(phase), weights, self._about, asdict(learner.progress))
             self._keep()
         last = self._folder / "policy.safetensors"
         tensors, about, state = checkpoints.read(self._weights(recipe.dagger.rounds))
@@ -296,7 +296,7 @@ class _Training:
         return TrainingLog(on_batch, on_epoch)
 
     def _keep(self) -> None:
-        progress = self._learner.progress.to_dict()
+        progress = asdict(self._learner.progress)
         checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
         self._kept = time.monotonic()
 

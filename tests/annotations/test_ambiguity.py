@@ -80,7 +80,7 @@ def test_colours_of_other_things_are_not_the_subjects():
     check = _street_check()
     i = _at(check, "delivery_van_000")
     reading = check.lexicon.read("In the yard, next to a yellow mailbox, stands a red delivery van.", i)
-    assert reading.named == ("red",)
+    assert reading.named == ["red"]
     assert set(reading.values) == {"in the yard", "red"}
     (claim,) = reading.claims
     assert claim.relation == "beside"

@@ -46,7 +46,8 @@ class TokenGate:
             return
         headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
         address = (scope.get("client") or ("", 0))[0]
-        wait = self._wait(address)
+        guesses = self._guesses.get(address)
+        wait = 0.0 if guesses is None else guesses.wait(time.monotonic())
         if wait > 0.0 and address not in self._known:
             after = [(b"retry-after", str(int(wait) + 1).encode())]
             await _respond(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
@@ -71,11 +72,6 @@ class TokenGate:
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
-
-    def _wait(self, address: str) -> float:
-        """Seconds until an address may try again."""
-        guesses = self._guesses.get(address)
-        return 0.0 if guesses is None else guesses.wait(time.monotonic())
 
     def _record_guess(self, address: str, given: str) -> None:
         guesses = self._guesses.pop(address, None) or _Guesses()

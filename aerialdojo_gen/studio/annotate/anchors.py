@@ -60,11 +60,6 @@ class AnchorService:
         """Columns and rows of the pictures."""
         return self._pictures.width, self._pictures.height
 
-    @property
-    def n_pixels(self) -> int:
-        """Pixels of a picture."""
-        return self._pictures.width * self._pictures.height
-
     def close(self) -> None:
         """Drop what is waiting to be done."""
         self._worker.shutdown(wait=False, cancel_futures=True)

@@ -240,7 +240,7 @@ def _viewpoint_json(session: AnnotationSession, node: str, row: dict[str, Any], 
         "visible_fraction": row["visible_fraction"],
         "score": row["score"],
         "box_px": box,
-        "share": (view.pixels.get(node, 0) / session.anchors.n_pixels) if view else 0.0,
+        "share": (view.pixels.get(node, 0) / math.prod(session.anchors.size)) if view else 0.0,
         "faults": faults,
     }
 

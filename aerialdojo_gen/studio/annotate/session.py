@@ -121,19 +121,20 @@ class AnnotationSession:
     def saved(self, done: tuple[State, Record | None], author: Author) -> dict[str, Any]:
         """Return the annotations after a change of the storage."""
         state, record = done
-        return self._document(state, author.client) | {"done": _to_json(record) if record else None}
+        return self._document(state, author.client) | {"done": record.model_dump(mode="json") if record else None}
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
         """Return the changes after a version."""
         with self._lock:
             self.storage.history.refresh()
-            return [_to_json(record) for record in self.storage.history.since(version)][-50:]
+            return [record.model_dump(mode="json") for record in self.storage.history.since(version)][-50:]
 
     def history(self) -> list[dict[str, Any]]:
         """Return the last changes, newest first."""
         with self._lock:
             self.storage.history.refresh()
-            return [_to_json(record) for record in reversed(self.storage.history.records[-_MOST_CHANGES:])]
+            last = reversed(self.storage.history.records[-_MOST_CHANGES:])
+            return [record.model_dump(mode="json") for record in last]
 
     # Picking, and anchors.
 
@@ -218,12 +219,6 @@ class AnnotationSession:
         """Return the annotation file, byte for byte, or an empty one."""
         state = self.storage.load()
         return (state.text or format_annotations(state.annotations)).encode("utf-8")
-
-
-def _to_json(record: Record) -> dict[str, Any]:
-    return record.model_dump(
-        mode="json", include={"time", "who", "client", "action", "what", "before", "after", "edits"}
-    )
 
 
 def open_session(name: str, pipeline: Pipeline, roots: ProjectPaths) -> AnnotationSession:

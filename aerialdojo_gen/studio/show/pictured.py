@@ -18,6 +18,7 @@ from aerialdojo_gen.store import schemas
 from aerialdojo_gen.studio.show.frames import Frame, frames_along
 
 Floats = NDArray[np.float64]
+_TOLD = ("modality", "target_name", "landmark", "direction", "description")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,17 +56,9 @@ class PicturedTask:
     def goal(self) -> str:
         """The goal text that an agent gets."""
         row = self.instance
-        return goal_text(
-            Goal(
-                row["modality"],
-                row["target_name"],
-                row["landmark"],
-                row["direction"],
-                row["description"],
-                self.reference if row["modality"] == "image" else None,
-                Rules(row["action_budget"]),
-            )
-        )
+        kind, name, landmark, direction, more = (row[key] for key in _TOLD)
+        image = self.reference if kind == "image" else None
+        return goal_text(Goal(kind, name, landmark, direction, more, image, Rules(row["action_budget"])))
 
     @property
     def terminal_goal(self) -> str:
