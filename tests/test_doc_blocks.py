@@ -135,12 +135,7 @@ def test_blocks_are_told_apart(tmp_path):
         ("indented", 23, True),
     ]  # fmt: skip
     assert list(commands(found[3])) == ["make docs"]
-    assert list(commands(found[0])) == [
-        "make smoke",
-        "aerialdojo-gen plan --scene 'U_*'",
-        "pip x",
-        "make lint",
-    ]
+    assert list(commands(found[0])) == ["make smoke", "aerialdojo-gen plan --scene 'U_*'", "pip x", "make lint"]
     assert found[1].text == "x = 1\n\n    y = 2\n"
 
 

@@ -201,15 +201,7 @@ def serve() -> None:
 
 
 class Bench:
-    """Where cases are tried: a finished data directory, and what undisturbed runs make of it.
-
-    Parameters
-    ----------
-    folder : Path
-        Scratch space.
-    base : Path
-        The data directory of a run of pipelines/smoke.toml.
-    """
+    """Where cases are tried: a finished data directory, and what undisturbed runs make of it."""
 
     def __init__(self, folder: Path, base: Path) -> None:
         self._folder = folder
@@ -274,18 +266,7 @@ class Bench:
         self._whole[name] = files_of(data)
 
     def case(self, name: str, rng: random.Random, aimed: bool) -> str:
-        """Kill a command and repeat it.
-
-        Returns
-        -------
-        str
-            ``"killed"``, or ``"finished"`` where it came to its end before the kill.
-
-        Raises
-        ------
-        AssertionError
-            Files are missing, of other bytes, or left over; or a command failed.
-        """
+        """Kill a command and repeat it; say whether it was ``"killed"`` or ``"finished"`` before the kill."""
         self.undisturbed(name)
         data = self._copy(name, rng)
         arguments = KINDS[name].arguments(data, rng.choice((1, 1, 1, 2)))
@@ -359,15 +340,7 @@ def main() -> None:
         base: Path | None = asked.base
         if base is None:
             base = Path(folder) / "smoke"
-            command = [
-                sys.executable,
-                "-m",
-                "aerialdojo_gen.cli",
-                "run",
-                "pipelines/smoke.toml",
-                "--data",
-                str(base),
-            ]
+            command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", "--data", str(base)]
             subprocess.run(command, cwd=ROOT, check=True)
         bench = Bench(Path(folder), base)
         became: Counter[tuple[str, str]] = Counter()

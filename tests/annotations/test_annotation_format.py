@@ -30,13 +30,7 @@ _annotations = st.builds(
     landmarks=st.lists(st.builds(Landmark, id=_id, name=_text, node=_text), max_size=3).map(tuple),
     objects=st.lists(
         st.builds(
-            Object,
-            id=_id,
-            name=_text,
-            category=_text,
-            description=_text,
-            node=_text,
-            anchor=st.none() | _anchor,
+            Object, id=_id, name=_text, category=_text, description=_text, node=_text, anchor=st.none() | _anchor
         ),
         max_size=3,
     ).map(tuple),

@@ -92,10 +92,7 @@ def test_overrides_replace_only_what_is_given(tmp_path):
             "[task]\nbase = { min_length_m = 40, max_length_m = 30, action_budget = 90 }\n",
             "min_length_m = 40 must be less than max_length_m = 30",
         ),
-        (
-            "[task]\nbase = { min_length_m = 5, max_length_m = 30, action_budget = 200 }\n",
-            "action_budget falls in",
-        ),
+        ("[task]\nbase = { min_length_m = 5, max_length_m = 30, action_budget = 200 }\n", "action_budget falls in"),
     ],
 )
 def test_sections_that_contradict_each_other(tmp_path, text, message):

@@ -107,6 +107,7 @@ def test_too_little_address_space_is_said_in_one_line(smoke, tmp_path, mib):
     assert call("--help", limits=limits).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_in_an_error_says_that_the_same_command_continues(tmp_path):
     data = tmp_path / "data"
     data.mkdir()

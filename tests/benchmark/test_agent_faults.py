@@ -181,16 +181,7 @@ def test_a_renderer_that_fails_is_opened_anew_or_logged(smoke: Path, tmp_path: P
 
 
 def test_the_command_tells_a_faulty_agent_in_one_line(smoke: Path, tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        "evaluate",
-        "--data",
-        str(smoke),
-        "--out",
-        str(tmp_path),
-    ]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(tmp_path)]
     command += ["--agent", f"{HERE}:Faulty", "--option", "how=reset", "--limit", "4", "--workers", "2"]
     env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=env)
@@ -227,16 +218,7 @@ def test_an_agents_own_file_is_named_and_its_traceback_shown_on_demand(
     smoke: Path, tmp_path: Path, how: str, line: int, workers: int
 ) -> None:
     (tmp_path / "own_agent.py").write_text(OWN_CODE)
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        "evaluate",
-        "--data",
-        str(smoke),
-        "--out",
-        str(tmp_path),
-    ]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(tmp_path)]
     command += ["--agent", "own_agent:Agent", "--option", f"how={how}", "--limit", "2", "--workers", str(workers)]
     env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     brief, full = (

@@ -327,17 +327,7 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
 
 
 def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        "evaluate",
-        "--data",
-        smoke,
-        "--out",
-        tmp_path,
-        "--agent",
-    ]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", smoke, "--out", tmp_path, "--agent"]
     command += ["oracle", "--limit", "5", "--workers", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -105,10 +105,7 @@ def assert_named(message, start, place):
         ({"roofs": [["nan", -6, 0, 0, 4]]}, "roofs.0.0: Input should be a valid number"),
         ({"paths": [[0, 0, "inf", 9]]}, "paths.0.2: Input should be a valid number"),
         ({"roofs": [[-6, False, 0, 0, 4]]}, "roofs.0.1: Input should be a valid number"),
-        (
-            {"roofs": [[-6, -1e-300, 0, 0, 4]]},
-            "roofs.0: a rectangle must be 0.05 m wide and deep or more",
-        ),
+        ({"roofs": [[-6, -1e-300, 0, 0, 4]]}, "roofs.0: a rectangle must be 0.05 m wide and deep or more"),
         ({"roofs": [[-6, -6, 0, 0, 0.1]]}, "roofs.0.4: Input should be greater than or equal to 0.3"),
         ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: consecutive points of a line must be at least 0.05 m"),
         (

@@ -80,13 +80,7 @@ BAD = [
     ("aerialvln", "reference_path.1.2", NAN, "reference_path[1]", "nan is no finite number"),
     ("aerialvln", "goals", [], "goals", "is empty"),
     ("aerialvln", "goals.0", 7, "goals[0]", "expected an object, found 7"),
-    (
-        "aerialvln",
-        "instruction.instruction_text",
-        None,
-        "instruction.instruction_text",
-        "expected a text",
-    ),
+    ("aerialvln", "instruction.instruction_text", None, "instruction.instruction_text", "expected a text"),
     ("aerialvln", "episode_id", "A0", "id", "A0 stands twice"),
     ("openfly", "action.1", -1, "action[1]", "unknown action -1"),
     ("openfly", "pos.2", [1, 2, 3, 4], "pos[2]", "expected 3 numbers, found 4"),
@@ -187,12 +181,7 @@ LAYOUT_BAD = [
         "start_pose.start_quaternion_xyzw",
         "expected 4 numbers, found 3",
     ),
-    (
-        "start_pose.start_quaternionr",
-        [1, 0, 0, 0],
-        "start_pose.start_quaternionr",
-        "is not start_quaternion_xyzw",
-    ),
+    ("start_pose.start_quaternionr", [1, 0, 0, 0], "start_pose.start_quaternionr", "is not start_quaternion_xyzw"),
     ("info.complexity", "high", "info.complexity", "expected"),
 ]
 
@@ -339,10 +328,7 @@ def test_what_is_no_task_file_is_said_in_one_line(tmp_path):
         ([str(tmp_path / "empty"), "--format", "uav-on"], "is no file"),
         ([str(tmp_path / "empty"), "--format", "aerialdojo"], "has no Task.json below it"),
         ([str(good), "--format", "habitat"], "no format 'habitat': there are " + ", ".join(FORMATS)),
-        (
-            [str(good), "--format", "cityavos", "--frame", "ned", "--angles", "turns"],
-            "angles are radians",
-        ),
+        ([str(good), "--format", "cityavos", "--frame", "ned", "--angles", "turns"], "angles are radians"),
     ):
         failed = runner.invoke(app, ["import-benchmark", *arguments, "--data", str(tmp_path)])
         assert isinstance(failed.exception, UsageError), failed.output

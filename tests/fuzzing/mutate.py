@@ -44,17 +44,7 @@ TEXTS: tuple[str, ...] = (
 
 
 def mutant(name: str, raw: bytes, rng: Rng) -> bytes:
-    """Make a mutant of a file.
-
-    Parameters
-    ----------
-    name : str
-        Of the file: its suffix says what stands in it.
-    raw : bytes
-        A valid file.
-    rng : numpy.random.Generator
-        Draws what is done to it.
-    """
+    """Make a mutant of a valid file, whose suffix says what stands in it."""
     structured = _STRUCTURED.get(name.rpartition(".")[2])
     if structured is not None and rng.random() < 0.7:
         out = structured(raw, rng)

@@ -136,6 +136,7 @@ def test_a_task_whose_process_was_lost_is_done_again_elsewhere(ray_pool, tmp_pat
 
 
 @pytest.mark.ray
+@pytest.mark.nightly
 def test_a_task_that_loses_every_process_is_one_line(ray_pool, tmp_path):
     with pytest.raises(AerialDojoError, match="chore 1: its process was lost 4 times") as raised:
         list(ray_pool.map(chores.die_once, tasks(tmp_path, 2, {1: "always"})))
@@ -202,8 +203,14 @@ def wait_for_both(process, folder):
 
 
 @pytest.mark.parametrize(
-    ("executor", "stopped"), [("local", False), ("local", True), pytest.param("ray", False, marks=pytest.mark.ray)]
+    ("executor", "stopped"),
+    [
+        ("local", False),
+        ("local", True),
+        pytest.param("ray", False, marks=[pytest.mark.ray, pytest.mark.nightly]),
+    ],
 )
+@pytest.mark.kill
 def test_ctrl_c_ends_all_processes(executor, stopped, tmp_path):
     process, folder = start(tmp_path, executor, "sleep")
     wait_for_both(process, folder)

@@ -53,6 +53,7 @@ def call(checkout, *args):
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_a_new_stage_is_a_module_a_schema_and_a_row(checkout):
     assert "Count a scene's things by category." in call(checkout, "--help")
     tally = ("tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml")

@@ -174,12 +174,7 @@ moves = st.one_of(
 
 
 @settings(max_examples=300)
-@given(
-    st.lists(moves, max_size=40),
-    st.floats(0, 1),
-    st.floats(-math.pi / 2, math.pi / 2),
-    st.floats(0, 2 * math.pi),
-)
+@given(st.lists(moves, max_size=40), st.floats(0, 1), st.floats(-math.pi / 2, math.pi / 2), st.floats(0, 2 * math.pi))
 def test_no_route_of_the_action_set_is_shorter_than_the_bound(route, approach, elevation, azimuth):
     p, length = np.zeros(3), approach
     for kind, step, heading in route:

@@ -100,7 +100,7 @@ def workers_alive():
 
 
 @pytest.mark.ray
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_driver_that_is_killed_and_started_again_goes_on_to_the_same_bytes(project, smoke, nodes, tmp_path):
     data = tmp_path / "data"
     process = start(project, nodes, data)
@@ -125,7 +125,10 @@ def test_a_driver_that_is_killed_and_started_again_goes_on_to_the_same_bytes(pro
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("tables", "begun"),
-    [(["plans"], "plans/*/part-*.parquet"), (["recordings", "frames", "media"], f"{AREA}/*/new*")],
+    [
+        (["plans"], "plans/*/part-*.parquet"),
+        pytest.param(["recordings", "frames", "media"], f"{AREA}/*/new*", marks=pytest.mark.nightly),
+    ],
 )
 def test_a_node_that_is_lost_in_the_middle_costs_nothing_but_time(project, smoke, nodes, tmp_path, tables, begun):
     data = shutil.copytree(smoke, tmp_path / "data")
@@ -143,7 +146,7 @@ def test_a_node_that_is_lost_in_the_middle_costs_nothing_but_time(project, smoke
 
 
 @pytest.mark.ray
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_evaluate_and_validate_say_on_a_cluster_what_they_say_here(project, smoke, nodes, tmp_path):
     settings = ["--agent", "random", "--limit", "12", "--run", "r", "--quiet"]
     here, there = tmp_path / "here", tmp_path / "there"

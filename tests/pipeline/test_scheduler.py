@@ -71,18 +71,7 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
 
 def run(project, data, pipeline, *args, verb="run"):
     where = [str(pipeline)] if verb == "run" else ["--pipeline", str(pipeline)]
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        verb,
-        *where,
-        "--data",
-        str(data),
-        "--workers",
-        "1",
-        *args,
-    ]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), "--workers", "1", *args]
     return subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
 
 

@@ -60,10 +60,7 @@ def clip(tmp_path_factory):
             "text",
             [value("input_ids", TensorProto.INT64, ["n", "length"])],
             [value("text_embeds", TensorProto.FLOAT, ["n", 3])],
-            [
-                numpy_helper.from_array(meaning, "meaning"),
-                numpy_helper.from_array(np.array([1], np.int64), "axes"),
-            ],
+            [numpy_helper.from_array(meaning, "meaning"), numpy_helper.from_array(np.array([1], np.int64), "axes")],
         ),
     )
     from tokenizers import Tokenizer, models, pre_tokenizers

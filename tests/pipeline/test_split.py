@@ -120,10 +120,7 @@ def data(tmp_path_factory):
         spec = store.LAYOUT[table].spec
         store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
     roots = ProjectPaths(data, data, data, data)
-    for name, run, config in (
-        ("filter", filter_stage.run, FilterConfig()),
-        ("split", split.run, SplitConfig()),
-    ):
+    for name, run, config in (("filter", filter_stage.run, FilterConfig()), ("split", split.run, SplitConfig())):
         output = run(Job(name, SCENE, 0, 1, 0, Embodiment(), roots), config)
         for table, rows in output.tables.items():
             store.write_shard(data, table, SCENE, 0, rows)

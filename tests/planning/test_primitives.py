@@ -6,14 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.frames import wrap_turned_rad
-from aerialdojo_gen.geometry.motion import (
-    DISPLACEMENTS,
-    N_HEADINGS,
-    TURNS,
-    nearest_heading,
-    replay,
-    route_length_m,
-)
+from aerialdojo_gen.geometry.motion import DISPLACEMENTS, N_HEADINGS, TURNS, nearest_heading, replay, route_length_m
 from aerialdojo_gen.store import schemas
 
 action = st.integers(0, 16)

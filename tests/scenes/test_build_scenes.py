@@ -137,6 +137,7 @@ def test_file_holds_the_built_scene_exactly(assets, tmp_path):
         assert np.array_equal(a.faces, b.faces)
 
 
+@pytest.mark.slow
 def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
     script = (
         "import sys, hashlib, pathlib\n"

@@ -92,6 +92,7 @@ def test_so_many_are_kept_and_the_one_not_asked_for_longest_goes(meshes, keep):
         assert open_contexts() == (contexts[0],)
 
 
+@pytest.mark.slow
 def test_a_scene_and_all_that_is_built_on_it_are_gone_before_the_next_one_is_read(meshes, monkeypatch):
     """A worker's memory is that of one scene, however many it works on."""
     held, alive_while_reading = [], []

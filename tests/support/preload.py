@@ -151,14 +151,7 @@ def library() -> Path:
 def killing_environment(n: int, *, exchange: bool = True, group: bool = False) -> dict[str, str]:
     """Environment in which a program is killed at its n-th call that changes a name or syncs; never for 0.
 
-    Parameters
-    ----------
-    n : int
-        Which call, from 1 on.
-    exchange : bool
-        False: as on a system that cannot exchange two names.
-    group : bool
-        Kill the whole process group.
+    Without `exchange` two names cannot be exchanged; `group` kills the whole process group.
     """
     environment = os.environ | {"LD_PRELOAD": str(library()), "PRELOAD_KILL_AT": str(n)}
     if not exchange:
