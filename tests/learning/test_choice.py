@@ -51,7 +51,7 @@ def flown(root, network, sensors, index, k, led):
     return episode.success(3.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
     root = open_root(smoke)
     done = train(smoke, RECIPE, out=tmp_path / "out", cache=tmp_path / "cache", device="cpu", workers=1)

@@ -1,13 +1,8 @@
 """What objects look like: learned before the rest and apart from it, and put to use where a place is not known."""
 
-import json
-import signal
-import subprocess
-import sys
-import time
-
 import numpy as np
 import pytest
+from support.trainings import assert_same_training, history, kill_at_first_checkpoint
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules
@@ -75,12 +70,8 @@ def trained(smoke, cache, tmp_path_factory):
     return make
 
 
-def history(policy):
-    return [json.loads(line) for line in (policy.parent / "history.jsonl").read_text().splitlines()]
-
-
 def test_patches_are_told_by_the_names_of_what_they_show(smoke, trained):
-    rows = [row for row in history(trained(12)) if row["phase"] == -1]
+    rows = [row for row in history(trained(12).parent) if row["phase"] == -1]
     assert [row["epoch"] for row in rows] == list(range(12))
     assert rows[-1]["accuracy"] > max(0.6, rows[0]["accuracy"] + 0.1)
     _, about, _ = checkpoints.read(trained(12))
@@ -101,26 +92,11 @@ def test_what_is_seen_is_learned_apart_from_all_else(trained):
 def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache, trained, tmp_path):
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT % 12)
-    command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(out),
-        "--cache", str(cache), "--workers", "1",
-    ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-        until = time.monotonic() + 300
-        while not (out / "checkpoint.safetensors").is_file() and process.poll() is None:
-            assert time.monotonic() < until
-            time.sleep(0.02)
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-    assert process.returncode == -signal.SIGKILL
+    kill_at_first_checkpoint(file, smoke, out, cache)
     assert checkpoints.read(out / "checkpoint.safetensors")[2]["phase"] == -1
     assert not (out / "sight.safetensors").exists()
-    whole = trained(12)
     done = train(smoke, load_recipe(file), out=out, cache=cache, workers=1)
-    one, two = (checkpoints.read(path)[0] for path in (whole, done.policy))
-    assert one.keys() == two.keys()
-    assert all(torch.equal(one[name], two[name]) for name in one)
-    assert [row["loss"] for row in history(done.policy)] == [row["loss"] for row in history(whole)]
+    assert_same_training(trained(12), done.policy)
 
 
 class CountedSearch(Search):
@@ -145,9 +121,8 @@ def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, t
     monkeypatch.setattr(CountedSearch, "looked", 0)
     monkeypatch.setattr(CountedSearch, "led", 0)
     chosen = Selection(("id_train",), limit=4)
-    evaluate(
-        smoke, Evaluation("lost", "policy", {"weights": str(trained(12))}, chosen), out=tmp_path, workers=1
-    )  # fmt: skip
+    evaluation = Evaluation("lost", "policy", {"weights": str(trained(12))}, chosen)
+    evaluate(smoke, evaluation, out=tmp_path, workers=1)
     rows = [
         row for scene in read_index(open_root(smoke), chosen).scenes
         for row in store.read_scene(tmp_path, "episodes", scene, ["n_actions", "termination"], "lost").to_pylist()

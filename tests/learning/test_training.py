@@ -3,16 +3,16 @@
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
+import tomllib
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.flying import town
+from support.trainings import assert_same_training, history, kill_at_first_checkpoint
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
@@ -46,24 +46,33 @@ from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
 from aerialdojo_gen.learning.training import train  # noqa: E402
 
 POLICY = "policy"
-SMALL = {
-    "name": "small",
-    "data": {"split": "id_train", "limit": 8, "size_px": 32, "validation_share": 0.0, "settings": []},
-    "model": {"channels": [16, 16, 32], "features": 64, "word_features": 32, "hidden": 128},
-    "train": {
-        "epochs": 80,
-        "batch_steps": 64,
-        "learning_rate": 4e-3,
-        "warmup_batches": 5,
-        "checkpoint_s": 1e-3,
-        "looks": 16,
-    },
-    "dagger": {"rounds": 0},
-}
+TEXT = """
+name = "small"
+[data]
+split = "id_train"
+limit = 8
+size_px = 32
+validation_share = 0.0
+settings = []
+[model]
+channels = [16, 16, 32]
+features = 64
+word_features = 32
+hidden = 128
+[train]
+epochs = 6
+batch_steps = 64
+learning_rate = 4e-3
+warmup_batches = 5
+checkpoint_s = 1e-3
+looks = 16
+[dagger]
+rounds = 0
+"""
 
 
 def recipe(**changed):
-    given = {key: dict(value) if isinstance(value, dict) else value for key, value in SMALL.items()}
+    given = tomllib.loads(TEXT)
     for key, value in changed.items():
         given[key] = {**given[key], **value} if isinstance(value, dict) else value
     return Recipe.model_validate(given)
@@ -76,13 +85,9 @@ def cache(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def learned(smoke, cache, tmp_path_factory):
-    """A policy that has learned eight trajectories by heart."""
+    """A policy that saw eight trajectories six times."""
     out = tmp_path_factory.mktemp("policy")
     return train(smoke, recipe(), out=out, cache=cache, device="cpu", workers=1)
-
-
-def history(folder):
-    return [json.loads(line) for line in (folder / "history.jsonl").read_text().splitlines()]
 
 
 def the_eight(smoke):
@@ -91,7 +96,16 @@ def the_eight(smoke):
     return set(index.take(sample_evenly(index, 8, 0)).nav_id)
 
 
-def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_path):
+def test_a_short_training_fits_better_at_its_end(learned):
+    rows = history(learned.policy.parent)
+    assert [row["epoch"] for row in rows] == list(range(6))
+    assert rows[-1]["loss"] < 0.8 * rows[0]["loss"]
+
+
+@pytest.mark.nightly
+def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_path):
+    by_heart = recipe(train={"epochs": 80})
+    learned = train(smoke, by_heart, out=tmp_path / "out", cache=cache, device="cpu", workers=1)
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
     assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
@@ -108,37 +122,13 @@ def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, learned, tmp_p
 
 def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, learned, tmp_path):
     """A kill between two batches, at a checkpoint of every batch: what is left is learned, and nothing twice."""
-    whole = tmp_path / "whole"
-    short = recipe(train={"epochs": 6})
-    train(smoke, short, out=whole, cache=cache, device="cpu", workers=1)
-    file = tmp_path / "short.toml"
-    file.write_text(
-        'name = "small"\n[data]\nlimit = 8\nsize_px = 32\nvalidation_share = 0.0\nsettings = []\n'
-        "[model]\nchannels = [16, 16, 32]\nfeatures = 64\nword_features = 32\nhidden = 128\n"
-        "[train]\nepochs = 6\nbatch_steps = 64\nlearning_rate = 4e-3\nwarmup_batches = 5\ncheckpoint_s = 1e-3\n"
-        "looks = 16\n[dagger]\nrounds = 0\n"
-    )
-    assert load_recipe(file) == short
-    broken = tmp_path / "broken"
-    command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(file), "--data", str(smoke), "--out", str(broken),
-        "--cache", str(cache), "--device", "cpu", "--workers", "1",
-    ]  # fmt: skip
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-        until = time.monotonic() + 300
-        while not (broken / "checkpoint.safetensors").is_file() and process.poll() is None:
-            assert time.monotonic() < until
-            time.sleep(0.02)
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-    assert process.returncode == -signal.SIGKILL
+    file, broken = tmp_path / "short.toml", tmp_path / "broken"
+    file.write_text(TEXT)
+    assert load_recipe(file) == recipe()
+    kill_at_first_checkpoint(file, smoke, broken, cache)
     assert not (broken / "policy.safetensors").exists()
-    train(smoke, short, out=broken, cache=cache, device="cpu", workers=1)
-    one, two = (checkpoints.read(folder / "policy.safetensors")[0] for folder in (whole, broken))
-    assert one.keys() == two.keys()
-    assert all(torch.equal(one[name], two[name]) for name in one)
-    rows = [[row["loss"] for row in history(folder)] for folder in (whole, broken)]
-    assert rows[0] == rows[1]
+    train(smoke, recipe(), out=broken, cache=cache, device="cpu", workers=1)
+    assert_same_training(learned.policy, broken / "policy.safetensors")
 
 
 def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_path):
@@ -251,6 +241,7 @@ def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(s
         assert len(np.unique(looks.frames.reshape(40, -1), axis=0)) > 30
 
 
+@pytest.mark.nightly
 def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
     """With them places and headings are known better, at looks that no network was trained on."""
     root = open_root(smoke)
@@ -258,11 +249,8 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
     loss = {0: 0.0, 300: 0.0}
     # Two trainings each: what one gains differs by seed, between 0.1 and 0.5 as measured.
     for looks, seed in [(0, 0), (0, 1), (300, 0), (300, 1)]:
-        own = recipe(
-            seed=seed,
-            data={"looks": looks, "limit": None},
-            train={"epochs": 12, "looks": 128, "batch_steps": 256},
-        )
+        thorough = {"epochs": 12, "looks": 128, "batch_steps": 256}
+        own = recipe(seed=seed, data={"looks": looks, "limit": None}, train=thorough)
         done = train(smoke, own, out=tmp_path / f"{looks}-{seed}", cache=cache, device="cpu", workers=1)
         tensors, about, _ = checkpoints.read(done.policy)
         network = network_of(about, tensors, str(done.policy)).eval()

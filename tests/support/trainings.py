@@ -1,0 +1,40 @@
+"""Trainings that are killed and gone on with."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+
+def history(folder):
+    return [json.loads(line) for line in (folder / "history.jsonl").read_text().splitlines()]
+
+
+def kill_at_first_checkpoint(recipe, data, out, cache):
+    """Start `train` in a process of its own, and kill it as soon as there is a checkpoint."""
+    command = [
+        sys.executable, "-m", "aerialdojo_gen.cli", "train", str(recipe), "--data", str(data), "--out", str(out),
+        "--cache", str(cache), "--device", "cpu", "--workers", "1",
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        until = time.monotonic() + 300
+        while not (out / "checkpoint.safetensors").is_file() and process.poll() is None:
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    assert process.returncode == -signal.SIGKILL
+
+
+def assert_same_training(one, two):
+    """Two policies have the same weights to the bit, and came by them through the same losses."""
+    import torch
+
+    from aerialdojo_gen.learning import checkpoints
+
+    first, second = (checkpoints.read(path)[0] for path in (one, two))
+    assert first.keys() == second.keys()
+    assert all(torch.equal(first[name], second[name]) for name in first)
+    losses = [[row["loss"] for row in history(path.parent)] for path in (one, two)]
+    assert losses[0] == losses[1]
