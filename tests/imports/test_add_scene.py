@@ -253,7 +253,7 @@ def test_helsinki_up_to_planned_tasks(tmp_path):
     assert pc.sum(verdicts["keep"]).as_py() > 10
 
 
-@pytest.mark.pipeline
+@pytest.mark.nightly
 def test_the_monastery_up_to_planned_tasks(tmp_path):
     whole, _ = import_mesh("Monastery", read_mesh(foreign.monastery()), MeshOptions(up="y"))
     assert whole.n_triangles > 100_000
