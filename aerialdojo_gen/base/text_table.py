@@ -1,4 +1,4 @@
-"""Tables for a terminal, all of one look: a title, heads, a rule, rows; figures to the right, words to the left.
+"""Tables, all of one look on a terminal: a title, heads, a rule, rows; figures to the right, words to the left.
 
 What is wider than the terminal goes on below: words are wrapped in their column, and columns that do not fit beside
 each other follow in a block of their own under the same first column.
@@ -17,6 +17,8 @@ _WIDTH = 80
 _NARROWEST = 40
 # A column of words is not made narrower than this, if it is that wide at all.
 _LEAST_WORDS = 24
+
+BEST, SECOND = "best", "second"
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class TextTable:
     title: str = ""  # What it shows; empty for none
     notes: Sequence[str] = ()  # What must be known to read it
     sections: Mapping[int, str] = field(default_factory=dict)
+    marks: Mapping[tuple[int, int], str] = field(default_factory=dict)  # `BEST` or `SECOND`, by row and cell
+
+    @property
+    def groups(self) -> list[tuple[str, tuple[str, ...]]]:
+        """Neighbouring columns under one heading: it, and the headings of the columns."""
+        found = itertools.groupby(self.columns, key=lambda column: column.group)
+        return [(group, tuple(column.head for column in part)) for group, part in found]
 
     def lines(self, width: int | None = None) -> list[str]:
         """Write the table."""

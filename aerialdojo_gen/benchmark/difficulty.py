@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.benchmark.grid import Table
-from aerialdojo_gen.benchmark.metrics import Bools, Profile
+from aerialdojo_gen.benchmark.metrics import Strings
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.tables import masks_table
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
 
@@ -89,14 +87,6 @@ _SPECS = (
 
 
 @dataclass(frozen=True)
-class Part:
-    """Some of the episodes of every run."""
-
-    head: str  # Heading of its column
-    masks: tuple[Bools, ...]  # tuple of (n,) bool; which of them, a run each
-
-
-@dataclass(frozen=True)
 class Breakdown:
     """Episodes broken down by a column."""
 
@@ -104,7 +94,8 @@ class Breakdown:
     name: str  # The column, or two of them
     title: str  # Of its table
     note: str
-    parts: tuple[Part, ...]  # Those that have episodes
+    parts: tuple[str, ...]  # Headings of those that have episodes
+    labels: tuple[Strings, ...]  # Which part every episode belongs to, (n,) a run; empty for none
 
 
 @dataclass(frozen=True)
@@ -135,28 +126,14 @@ def find_breakdowns(root: DataRoot, runs: Sequence[Run]) -> Breakdowns:
         if any(v is None for v in values):
             missing.append(b.name)
             continue
-        parts = (Part(head, tuple(_mask(v or [], belongs) for v in values)) for head, belongs in b.parts.items())
-        filled = tuple(part for part in parts if any(mask.any() for mask in part.masks))
-        found.append(Breakdown(b.kind, b.name, b.title, b.note, filled))
+        labels = tuple(np.array([_label(value, b.parts) for value in v or []], dtype=np.str_) for v in values)
+        filled = tuple(head for head in b.parts if any((own == head).any() for own in labels))
+        found.append(Breakdown(b.kind, b.name, b.title, b.note, filled, labels))
     return Breakdowns(tuple(found), tuple(missing))
 
 
-def breakdown_tables(breakdowns: Breakdowns, kind: str, runs: Sequence[Run], profile: Profile) -> list[Table]:
-    """Make a table per breakdown of a kind that has at least two parts with episodes."""
-    tables = []
-    for breakdown in breakdowns.found:
-        if breakdown.kind == kind:
-            counts = [tuple(int(mask.sum()) for mask in part.masks) for part in breakdown.parts]
-            alike = all(len(set(count)) == 1 for count in counts)
-            sizes = "; ".join(f"{part.head}: {n[0]:,}" for part, n in zip(breakdown.parts, counts, strict=True))
-            note = " ".join(filter(None, (breakdown.note, f"Episodes – {sizes}." if alike else "")))
-            pairs = [(part.head, part.masks) for part in breakdown.parts]
-            tables.append(masks_table(breakdown.title, runs, profile, pairs, note))
-    return [table for table in tables if table is not None]
-
-
-def _mask(values: Sequence[Any], belongs: Callable[[Any], bool]) -> Bools:
-    return np.array([value is not None and belongs(value) for value in values], dtype=np.bool_)
+def _label(value: Any, parts: _Parts) -> str:
+    return "" if value is None else next((head for head, belongs in parts.items() if belongs(value)), "")
 
 
 def _values(run: Run, breakdown: _BreakdownSpec, released: _ReleasedTasks) -> list[Any] | None:

@@ -15,7 +15,7 @@ from scipy import stats
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.metrics import METRICS, Episodes, Floats, Profile, summarize
+from aerialdojo_gen.benchmark.metrics import METRICS, Episodes, Floats, Profile, Summary, summarize
 
 RESAMPLES = 9_999
 LEVEL = 0.95
@@ -45,19 +45,17 @@ def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float
     return ends[0], ends[1]
 
 
-def scene_scores(episodes: Episodes, profile: Profile) -> dict[str, dict[str, Floats]]:
-    """Score scenes: family, then scene, to the `METRICS` as (6,) float64."""
-    summary = summarize(episodes, profile)
-    family_of = dict(zip(episodes.scene.tolist(), episodes.family.tolist(), strict=True))
-    found: dict[str, dict[str, Floats]] = {family: {} for family in summary.families}
-    for name, score in summary.scenes.items():
-        found[family_of[name]][name] = np.array([getattr(score, metric) for metric in METRICS])
-    return found
+def scene_scores(summary: Summary) -> list[Floats]:
+    """Return the `METRICS` of every family's scenes, (scenes, 6) float64."""
+    return [
+        np.array([score[1:] for name, score in summary.scenes.items() if summary.family_of[name] == family])
+        for family in summary.families
+    ]
 
 
-def score_intervals(episodes: Episodes, profile: Profile) -> tuple[tuple[float, float], ...]:
+def score_intervals(summary: Summary) -> tuple[tuple[float, float], ...]:
     """Return the 95 % interval of every overall metric, in the order of `METRICS`; NaN where it is not known."""
-    low, high = bootstrap([np.stack([*part.values()]) for part in scene_scores(episodes, profile).values()])
+    low, high = bootstrap(scene_scores(summary))
     return tuple(zip(low.tolist(), high.tolist(), strict=True))
 
 
@@ -84,12 +82,13 @@ def paired(
     """Compare two logs of the same tasks, row by row; the permutation test is exact where there are few exchanges."""
     if not len(first):
         raise UsageError("the runs have no task in common: a paired test needs runs on the same tasks")
-    one, other = scene_scores(first, profile), scene_scores(second, profile)
-    families = [np.stack([other[family][name] - one[family][name] for name in part]) for family, part in one.items()]
+    summaries = [summarize(episodes, profile) for episodes in (first, second)]
+    one, other = (scene_scores(summary) for summary in summaries)
+    families = [y - x for x, y in zip(one, other, strict=True)]
     low, high = bootstrap(families, resamples)
     # A scene's share of the overall mean: its family's among the families, its own within its family.
     weight = np.concatenate([np.full(len(part), 1.0 / (len(part) * len(families))) for part in families])
-    a, b = (np.concatenate([np.stack([*p.values()]) for p in scores.values()]) for scores in (one, other))
+    a, b = np.concatenate(one), np.concatenate(other)
 
     def weighted(x: Any, y: Any, axis: int) -> Any:
         # Rounded: sums in another order differ in their last digits, and would count as other differences.
@@ -108,7 +107,7 @@ def paired(
     only_first, only_second = (int(np.sum(x & ~y)) for x, y in (success, success[::-1]))
     torn = only_first + only_second
     exact = float(stats.binomtest(only_first, torn).pvalue) if torn else 1.0
-    means = [np.array([getattr(summarize(e, profile).overall, m) for m in METRICS]) for e in (first, second)]
+    means = [np.array(summary.overall[1:]) for summary in summaries]
     return Paired(
         means[0], means[1], means[1] - means[0], low, high, p, len(first), len(a), only_first, only_second, exact
     )  # fmt: skip

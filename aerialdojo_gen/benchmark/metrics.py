@@ -7,9 +7,9 @@ families (paper, section on evaluation); ± is the standard deviation over scene
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -35,6 +35,11 @@ class Profile:
     planar: bool = False  # Whether distances are taken in the plane, height left out
     straight_reference: bool = False
     about: str = ""  # Where the rule comes from, one line
+
+    @property
+    def own(self) -> bool:
+        """Whether it is the benchmark's own rule, at any radius."""
+        return self.name.startswith("aerialdojo")
 
 
 PROFILES = {
@@ -64,6 +69,15 @@ def profile_named(name: str) -> Profile:
     if name not in PROFILES:
         raise UsageError(unknown("no profile", name, PROFILES))
     return PROFILES[name]
+
+
+def at_radius(profile: Profile, radius_m: float) -> Profile:
+    """Return a success rule with another radius, named by it."""
+    if radius_m == profile.radius_m:
+        return profile
+    name = "aerialdojo" if profile.own else profile.name
+    about = f"{profile.name} at {radius_m:g} m"
+    return replace(profile, name=f"{name}-{radius_m:g}m", radius_m=radius_m, about=about)
 
 
 Floats = NDArray[np.float64]
@@ -202,8 +216,7 @@ def may_succeed(episodes: Episodes, profile: Profile) -> Bools:
     return may
 
 
-@dataclass(frozen=True)
-class Score:
+class Score(NamedTuple):
     """Means over some episodes, or means of such means."""
 
     episodes: int  # Number of episodes
@@ -215,37 +228,53 @@ class Score:
     cr: float
 
 
-METRICS = ("sr", "sr_view", "osr", "spl", "dts_m", "cr")
+@dataclass(frozen=True)
+class Measure:
+    """What is averaged over episodes."""
+
+    name: str  # Field of `Score`
+    head: str  # Heading of its column
+    of: Callable[[Outcomes], NDArray[Any]]  # Its value of every episode
+    direction: int = 1  # 1 if higher is better, -1 if lower is
+    metres: bool = False  # Else a share
+
+
+MEASURES = {
+    measure.name: measure
+    for measure in (
+        Measure("sr", "SR ↑", lambda judged: judged.success),
+        Measure("sr_view", "SR-view ↑", lambda judged: judged.success_view),
+        Measure("osr", "OSR ↑", lambda judged: judged.oracle_success),
+        Measure("spl", "SPL ↑", lambda judged: judged.spl),
+        Measure("dts_m", "DTS ↓", lambda judged: judged.distance_m, -1, metres=True),
+        Measure("cr", "CR ↓", lambda judged: judged.collision, -1),
+    )
+}
+METRICS = tuple(MEASURES)
 # The paper's own.
 PAPER_METRICS = tuple(metric for metric in METRICS if metric != "sr_view")
 
 
-def score(judged: Outcomes, mask: Bools | slice = slice(None)) -> Score:
-    """Average outcomes over episodes; every value is NaN where there are none."""
-    columns = (
-        judged.success,
-        judged.success_view,
-        judged.oracle_success,
-        judged.spl,
-        judged.distance_m,
-        judged.collision,
-    )
-    chosen = [np.asarray(column[mask], dtype=np.float64) for column in columns]
-    n = len(chosen[0])
-    return Score(n, *(math.fsum(c) / n if n else math.nan for c in chosen))
+def values_of(judged: Outcomes) -> Floats:
+    """Return the `METRICS` of every episode, (n, 6) float64."""
+    return np.stack([np.asarray(measure.of(judged), np.float64) for measure in MEASURES.values()], axis=1)
+
+
+def score(values: Floats) -> Score:
+    """Average the `METRICS` of episodes, (n, 6); NaN where there are none."""
+    n = len(values)
+    return Score(n, *(math.fsum(column) / n if n else math.nan for column in values.T))
 
 
 def mean_score(scores: Sequence[Score]) -> Score:
     """Average scores, each with the same weight; every value is NaN where there are none."""
-    return Score(
-        sum(s.episodes for s in scores),
-        *(math.fsum(getattr(s, m) for s in scores) / len(scores) if scores else math.nan for m in METRICS),
-    )
+    means = score(np.array([s[1:] for s in scores], dtype=np.float64).reshape(-1, len(METRICS)))
+    return means._replace(episodes=sum(s.episodes for s in scores))
 
 
 def deviation(scores: Sequence[Score]) -> Score:
     """Standard deviation of scores (n - 1 in the denominator); NaN for fewer than two."""
-    values = np.array([[getattr(s, m) for m in METRICS] for s in scores])
+    values = np.array([s[1:] for s in scores])
     spread = values.std(axis=0, ddof=1) if len(scores) > 1 else np.full(len(METRICS), math.nan)
     return Score(sum(s.episodes for s in scores), *(float(v) for v in spread))
 
@@ -254,38 +283,30 @@ def deviation(scores: Sequence[Score]) -> Score:
 class Summary:
     """Scores of a log under a profile."""
 
-    profile: Profile  # The rule
     scenes: dict[str, Score]  # By scene, in the order of names
+    family_of: dict[str, str]  # By scene
     families: dict[str, Score]  # Means over a family's scenes; families without episodes are left out
     overall: Score  # Mean of the families that are there
     deviation: Score  # Standard deviation over all scenes
 
 
+def summarize_values(values: Floats, scene: Strings, family: Strings) -> Summary:
+    """Average the `METRICS` of episodes, (n, 6), by scene, family and overall."""
+    masks = {name: scene == name for name in sorted(set(scene.tolist()))}
+    scenes = {name: score(values[mask]) for name, mask in masks.items()}
+    family_of = {name: str(family[mask][0]) for name, mask in masks.items()}
+    order = [*FAMILIES.values(), *sorted(set(family_of.values()) - set(FAMILIES.values()))]
+    families = {
+        name: mean_score([scenes[member] for member, own in family_of.items() if own == name])
+        for name in order
+        if name in family_of.values()
+    }
+    return Summary(scenes, family_of, families, mean_score([*families.values()]), deviation([*scenes.values()]))
+
+
 def summarize(episodes: Episodes, profile: Profile) -> Summary:
     """Average a log by scene, family and overall."""
-    judged = outcomes(episodes, profile)
-    scenes: dict[str, Score] = {}
-    members: dict[str, list[Score]] = {}
-    for name in sorted(set(episodes.scene.tolist())):
-        mask = episodes.scene == name
-        scenes[name] = score(judged, mask)
-        members.setdefault(str(episodes.family[mask][0]), []).append(scenes[name])
-    order = [*FAMILIES.values(), *sorted(members.keys() - set(FAMILIES.values()))]
-    families = {family: mean_score(members[family]) for family in order if family in members}
-    return Summary(profile, scenes, families, mean_score(list(families.values())), deviation(list(scenes.values())))
-
-
-def weighted_score(episodes: Episodes, profile: Profile) -> Score:
-    """Average a log over all its episodes, each with the same weight: the paper's appendix C's other population."""
-    return score(outcomes(episodes, profile))
-
-
-def slices(episodes: Episodes, column: str, order: Sequence[str]) -> Iterator[tuple[str, Episodes]]:
-    """Yield the parts of a log by a column's value (``setting``, ``scene_type``, …), those that have episodes."""
-    values = getattr(episodes, column)
-    for value in order:
-        if (values == value).any():
-            yield value, episodes.where(values == value)
+    return summarize_values(values_of(outcomes(episodes, profile)), episodes.scene, episodes.family)
 
 
 def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tuple[Floats, Floats]:

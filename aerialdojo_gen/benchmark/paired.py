@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.grid import HEADS, NONE, Measure, Table
+from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.benchmark.intervals import Paired, paired
-from aerialdojo_gen.benchmark.metrics import METRICS, Profile, outcomes
+from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views, outcomes
 from aerialdojo_gen.benchmark.runs import Run
-from aerialdojo_gen.benchmark.tables import profile_head, shown_measures
+from aerialdojo_gen.benchmark.tables import NONE, profile_head, text
 
 
-def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Table]:
+def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[TextTable]:
     """Compare the second run with the first, on the tasks that both have flown, a table a profile."""
     if len(runs) != 2:
         named = ", ".join(run.name for run in runs)
@@ -37,33 +37,34 @@ def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
     return cut[0], cut[1]
 
 
-def _table(first: Run, second: Run, profile: Profile) -> Table:
+def _table(first: Run, second: Run, profile: Profile) -> TextTable:
     success = (outcomes(first.episodes, profile).success, outcomes(second.episodes, profile).success)
     result = paired(first.episodes, second.episodes, success, profile)
-    shown = {m.metric for m in shown_measures((first, second), profile)}
-    rows = [(HEADS[m], _cells(result, k, m)) for k, m in enumerate(METRICS) if m in shown]
+    known = any(knows_views(run.episodes, profile) for run in (first, second))
+    rows = [(MEASURES[m].head, _cells(result, k, m)) for k, m in enumerate(METRICS) if known or m != "sr_view"]
     notes = [
         f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within "
         "their family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
         f"Solved by {first.label} alone: {result.only_first:,}; by {second.label} alone: {result.only_second:,} "
         f"(McNemar's exact p {_p(result.p_mcnemar)}, which takes episodes for independent).",
     ]
-    groups = (
-        ("", (first.label, second.label)),
-        (f"{second.label} − {first.label}", ("difference", "95 % interval", "p")),
-    )
+    gap = f"{second.label} − {first.label}"
+    columns = [
+        Column(first.label),
+        Column(second.label),
+        *(Column(h, gap) for h in ("difference", "95 % interval", "p")),
+    ]
     title = f"{second.label} against {first.label}, {profile_head(profile)}"
-    return Table(title, "measure", groups, tuple(rows), tuple(notes))
+    return TextTable("measure", columns, rows, title, notes)
 
 
 def _cells(result: Paired, k: int, metric: str) -> tuple[str, ...]:
-    plain, signed = Measure("", metric), Measure("", metric, signed=True)
     low, high = float(result.low[k]), float(result.high[k])
     return (
-        plain.text(float(result.first[k])),
-        plain.text(float(result.second[k])),
-        signed.text(float(result.difference[k])),
-        NONE if math.isnan(low) else f"[{signed.text(low)}, {signed.text(high)}]",
+        text(metric, float(result.first[k])),
+        text(metric, float(result.second[k])),
+        text(metric, float(result.difference[k]), signed=True),
+        NONE if math.isnan(low) else f"[{text(metric, low, signed=True)}, {text(metric, high, signed=True)}]",
         _p(float(result.p[k])),
     )
 

@@ -13,15 +13,16 @@ from typing import Any
 import jinja2
 import markupsafe
 
+from aerialdojo_gen.base.table_formats import as_latex, as_markdown
 from aerialdojo_gen.base.terminal import shown_in_page
+from aerialdojo_gen.base.text_table import TextTable
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.benchmark.contents import ReportRequest, named_tables
 from aerialdojo_gen.benchmark.figures import encode_figure, family_radars, metric_radars, radius_curve
-from aerialdojo_gen.benchmark.grid import Table, as_latex, as_markdown
+from aerialdojo_gen.benchmark.registry import in_setting, named_tables
 from aerialdojo_gen.benchmark.replay import Replay
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
-from aerialdojo_gen.benchmark.tables import in_setting
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store.atomic import atomic_file
 
 # Long tables, folded away on the page.
@@ -39,11 +40,10 @@ def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -
         "radius": radius_curve(request.runs, request.profiles[0]),
     }
     figures = {(name, kind): encode_figure(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
-    scored = request.runs, request.profiles, request.paper_results, request.breakdowns
     files = {
         "report.html": html(request, replays, {name: figures[name, "svg"] for name in drawn}, named).encode(),
-        "metrics.csv": as_csv(*scored).encode(),
-        "metrics.json": as_json(*scored).encode(),
+        "metrics.csv": as_csv(request).encode(),
+        "metrics.json": as_json(request).encode(),
         "tables.md": ("\n\n".join(map(as_markdown, tables)) + "\n").encode(),
         "tables.tex": ("\n\n".join(map(as_latex, tables)) + "\n").encode(),
         **{f"{name}.{kind}": data for (name, kind), data in figures.items()},
@@ -61,7 +61,7 @@ def _of_the_radar(runs: Sequence[Run]) -> tuple[Sequence[Run], str]:
 
 
 def html(
-    request: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[Table]]
+    request: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[TextTable]]
 ) -> str:
     """Write the page."""
     folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
@@ -130,7 +130,7 @@ def _arrow(r: float) -> str:
     return f"M {r} 0 L {-0.7 * r} {0.6 * r} L {-0.35 * r} 0 L {-0.7 * r} {-0.6 * r} Z"
 
 
-def _starts(table: Table) -> set[int]:
+def _starts(table: TextTable) -> set[int]:
     """Return the columns that begin a group."""
     return {0, *accumulate(len(names) for _, names in table.groups)}
 

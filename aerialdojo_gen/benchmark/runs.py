@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +18,6 @@ from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-from aerialdojo_gen.store.schemas import TERMINATIONS
 
 STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
 
@@ -123,44 +121,6 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
         )
         for (name, table), agent, more, call in zip(tables.items(), agents, told, called, strict=True)
     ]
-
-
-@dataclass(frozen=True)
-class EpisodeOutcomes:
-    """Endings, actions and service usage of a run's episodes."""
-
-    episodes: int  # Their number
-    ended: dict[str, float]  # Share of the episodes by how they ended: stop, collision, budget
-    actions: float  # Mean number of actions
-    refused: int  # Moves out of the flight volume; answers that named no action
-    invalid: int
-    requests: int | None  # Of an outside service, all episodes together; None where it does not say
-    input_tokens: int | None
-    output_tokens: int | None
-    cost_usd: float | None  # None where prices are not known
-
-
-def episode_outcomes(run: Run) -> EpisodeOutcomes:
-    """Count endings, actions and service usage of a run's episodes."""
-    n = len(run.episodes)
-    ends = run.table["termination"].to_pylist()
-
-    def total(name: str) -> int | None:
-        # Unknown if any episode's is.
-        return None if run.table[name].null_count else int(pc.sum(run.table[name]).as_py() or 0)
-
-    costs = run.table["cost_usd"]
-    return EpisodeOutcomes(
-        n,
-        {how: ends.count(how) / n for how in TERMINATIONS},
-        float(run.episodes.n_actions.mean()),
-        total("n_refused") or 0,
-        total("n_invalid") or 0,
-        total("n_requests"),
-        total("input_tokens"),
-        total("output_tokens"),
-        None if costs.null_count else math.fsum(costs.to_pylist()),
-    )
 
 
 _BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == BASELINES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -92,42 +93,42 @@ def report(
 ) -> None:  # fmt: skip
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.base.paper_figures import results
-    from aerialdojo_gen.benchmark import contents, score_rows
+    from aerialdojo_gen.benchmark import registry, score_rows
     from aerialdojo_gen.benchmark.episodes import runs as runs_there
-    from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, profile_named
+    from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, at_radius, profile_named
     from aerialdojo_gen.benchmark.paired import paired_tables
-    from aerialdojo_gen.benchmark.radii import DEFAULT_RADII_M, at_radius
     from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
+    from aerialdojo_gen.benchmark.tables import DEFAULT_RADII_M, ReportRequest
     from aerialdojo_gen.dataset.contents import release_scenes
     from aerialdojo_gen.store.root import open_root
 
     if as_json:
         style = "json"
     groups = _groups(group or [])
-    requested = [*(table or contents.DEFAULT), *(["scene"] if by_scene else [])]
-    names = contents.check_names(requested + (["radius"] if radius and not table else []))
+    requested = [*(table or registry.DEFAULT), *(["scene"] if by_scene else [])]
+    names = registry.check_names(requested + (["radius"] if radius and not table else []))
     rules = [profile_named(name) for name in dict.fromkeys(profile or DEFAULT_PROFILES)]
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
         release_scenes(root)  # a folder without either is the wrong one
     named = load_runs(written, runs or ())
     loaded = group_runs(with_baselines(written, named) if floors else named, groups)
-    request = contents.ReportRequest(
+    request = ReportRequest(
         root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
     )
     if style in ("csv", "json"):
         extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]
         write = score_rows.as_csv if style == "csv" else score_rows.as_json
-        print(write(loaded, [*rules, *extra_rules], request.paper_results, request.breakdowns), end="")
+        print(write(replace(request, profiles=[*rules, *extra_rules])), end="")
     elif paired and table is None:
         _show(paired_tables(named, rules), style)
     else:
-        chosen = contents.report_tables(request, names)
+        chosen = registry.report_tables(request, names)
         _show([*chosen, *(paired_tables(named, rules) if paired else [])], style)
-        if lacking := contents.missing_note(request, names):
+        if lacking := registry.missing_note(request, names):
             typer.echo(lacking, err=True)
         if table is None and style == "terminal":
-            others = ", ".join(name for name in (*contents.NAMES, "all") if name not in names)
+            others = ", ".join(name for name in (*registry.NAMES, "all") if name not in names)
             print("\n".join(["", *wrapped(f"More with --table: {others}.", terminal_width())]))
     if out is not None:
         from aerialdojo_gen.benchmark import replay
@@ -139,14 +140,14 @@ def report(
 
 
 def _show(tables: Any, style: str) -> None:
-    from aerialdojo_gen.benchmark import grid
+    from aerialdojo_gen.base import table_formats
 
     if style == "terminal":
         width = terminal_width()
-        parts = [*(grid.as_text(table, width) for table in tables), grid.legend(tables)]
+        parts = [*(table_formats.as_text(table, width) for table in tables), table_formats.legend(tables)]
         print("\n\n".join(filter(None, parts)))
     else:
-        print("\n\n".join(grid.FORMATS[style](table) for table in tables))
+        print("\n\n".join(table_formats.FORMATS[style](table) for table in tables))
 
 
 def _groups(given: list[str]) -> dict[str, list[str]]:

@@ -15,8 +15,10 @@ import pytest
 from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Status, Trickle, serving
 
 from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.benchmark.counts import conduct_cells
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.runs import episode_outcomes, load_runs
+from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.benchmark.runs import load_runs
 
 KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."
@@ -77,7 +79,7 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
     assert steps["action"].to_pylist() == [14, None, 0] * 2
     assert steps["answer"].to_pylist() == [TURN, UNREADABLE, STOP] * 2
     (run,) = load_runs(tmp_path)
-    assert (episode_outcomes(run).invalid, episode_outcomes(run).requests) == (2, 8)
+    assert conduct_cells(run, PROFILES["aerialdojo"])[5:7] == ("2", "8")
     # Defaults too: how many pictures were sent is in the log.
     used = json.loads(episodes["agent_options"][0].as_py())
     assert (used["history_images"], used["actions"], used["image_size_px"], used["answer"]) == (

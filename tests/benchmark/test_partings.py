@@ -14,12 +14,13 @@ from support.extended import set_difficulty
 from support.planting import Planted
 from typer.testing import CliRunner
 
-from aerialdojo_gen.benchmark.contents import ReportRequest, missing_note, report_tables
 from aerialdojo_gen.benchmark.difficulty import find_breakdowns
 from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.benchmark.registry import missing_note, report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.store.root import open_root
@@ -69,18 +70,17 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
     found = {breakdown.name: breakdown for breakdown in breakdowns.found}
     assert found.keys() == {*expected, "detour_ratio"}
     for name, wanted in expected.items():
-        parts = {part.head: part.masks[0] for part in found[name].parts}
-        assert parts.keys() == set(wanted.unique()), name
-        for head, mask in parts.items():
-            assert mask.tolist() == (wanted == head).tolist(), (name, head)
-    tables = report_tables(ReportRequest(open_root(planted.data), runs, [AT_3]), ["difficulty", "seen"])
+        assert set(found[name].parts) == set(wanted.unique()), name
+        assert found[name].labels[0].tolist() == wanted.tolist(), name
+    request = ReportRequest(open_root(planted.data), runs, [AT_3])
+    tables = report_tables(request, ["difficulty", "seen"])
     assert len(tables) == 9
     heads = {table.title.split(",")[0]: table for table in tables}
     one = heads["Targets that training shows"]
     seen = rows[rows.target_seen_in_train]
     assert one.rows[0][1][0] == f"{100 * seen.success.mean():.2f}"
     assert one.notes[-1] == f"Episodes – seen in training: {len(seen):,}; unseen: {len(rows) - len(seen):,}."
-    lines = list(csv.DictReader(io.StringIO(as_csv(runs, [AT_3], breakdowns=breakdowns))))
+    lines = list(csv.DictReader(io.StringIO(as_csv(request))))
     blocked = rows[~rows.straight_line_free.astype(bool)]
     (row,) = [line for line in lines if (line["scope"], line["name"]) == ("straight_line_free", "blocked")]
     assert int(row["episodes"]) == len(blocked)

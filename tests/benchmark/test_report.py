@@ -19,13 +19,15 @@ import pytest
 from support.run_logs import write_run
 from typer.testing import CliRunner
 
+from aerialdojo_gen.base import table_formats
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError
 from aerialdojo_gen.base.paper_figures import results
-from aerialdojo_gen.benchmark import contents, figures, grid, score_rows, tables
-from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table
+from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
+from aerialdojo_gen.benchmark import figures, registry, score_rows, tables
+from aerialdojo_gen.benchmark.counts import conduct_cells
 from aerialdojo_gen.benchmark.metrics import PROFILES, Profile, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
-from aerialdojo_gen.benchmark.runs import Run, episode_outcomes, load_runs
+from aerialdojo_gen.benchmark.runs import Run, load_runs
 from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow
@@ -60,18 +62,23 @@ def test_runs_are_found_named_and_told_apart(log: Path, tmp_path: Path) -> None:
         load_runs(tmp_path / "nothing")
 
 
-def wanted(runs: list[Run], *profiles: Profile) -> contents.ReportRequest:
-    return contents.ReportRequest(Path("no-release"), runs, list(profiles))
+def wanted(runs: list[Run], *profiles: Profile) -> tables.ReportRequest:
+    return tables.ReportRequest(Path("no-release"), runs, list(profiles))
 
 
-def all_tables(runs: list[Run], *profiles: Profile) -> list[Table]:
-    return contents.report_tables(wanted(runs, *profiles), ["all"])
+def all_tables(runs: list[Run], *profiles: Profile) -> list[TextTable]:
+    return registry.report_tables(wanted(runs, *profiles), ["all"])
+
+
+def table(name: str, runs: list[Run], *profiles: Profile) -> TextTable:
+    (made,) = registry.report_tables(wanted(runs, *profiles), [name])
+    return made
 
 
 def test_every_table_says_what_the_metrics_say(runs: list[Run]) -> None:
-    main, family = tables.main_table(runs, [AT_3, AT_5]), tables.family_table(runs, AT_3)
-    setting, modality = (tables.slice_table(runs, AT_3, column) for column in ("setting", "modality"))
-    went = tables.conduct_table(runs)
+    main = table("overall", runs, AT_3, AT_5)
+    names = ("family", "setting", "modality", "conduct", "scene")
+    family, setting, modality, went, scenes = (table(name, runs, AT_3) for name in names)
     explorer = runs[2]
     at_3, at_5 = (summarize(explorer.episodes, p) for p in (AT_3, AT_5))
     cells = dict(main.rows)["explorer"]
@@ -90,7 +97,6 @@ def test_every_table_says_what_the_metrics_say(runs: list[Run]) -> None:
     )  # fmt: skip
     assert dict(went.rows)["explorer"][6:] == ("10,080", "13,104,000", "478,800", "52.92")
     assert dict(went.rows)["oracle"][6:] == ("–",) * 4
-    scenes = tables.scene_table(runs, AT_3)
     assert len(scenes.rows) == 42
     assert dict(scenes.rows)["U_Mall_0"][10] == f"{100 * at_3.scenes['U_Mall_0'].sr:.2f}"
 
@@ -98,7 +104,7 @@ def test_every_table_says_what_the_metrics_say(runs: list[Run]) -> None:
 def test_tables_of_part_of_the_scenes_say_so(tmp_path: Path) -> None:
     write_run(tmp_path, "a", "oracle", 2, ["U_Mall_0"])
     (run,) = load_runs(tmp_path)
-    main, family = tables.main_table([run], [AT_3]), tables.family_table([run], AT_3)
+    main, family = table("overall", [run], AT_3), table("family", [run], AT_3)
     assert (
         main.notes[1]
         == "oracle: no episodes of Natural, Infrastructure, Disaster; overall is the mean of the others."
@@ -113,10 +119,10 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
     write_run(tmp_path, "c", "random", 0, ["U_Mall_0"], failed=2)
     found = load_runs(tmp_path)
     assert [(run.name, run.failed) for run in found] == [("a", 0), ("b", 4)]
-    notes = tables.main_table(found, [AT_3]).notes
+    notes = table("overall", found, AT_3).notes
     assert "random: 4 more episodes failed for reasons outside the agent." in notes
     assert notes[-1] == "The runs flew different tasks: their scores are no comparison of agents."
-    assert not any("different" in note for note in tables.main_table(found[:1], [AT_3]).notes)
+    assert not any("different" in note for note in table("overall", found[:1], AT_3).notes)
     with pytest.raises(
         StoreError, match=r"run 'c' has no finished episode, and 2 that failed: .* --run c --rerun-failed"
     ):
@@ -125,16 +131,16 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
 
 def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
     for run in runs:
-        c = episode_outcomes(run)
-        assert sum(c.ended.values()) == pytest.approx(1.0)
-        assert c.ended["collision"] == pytest.approx(run.episodes.collision.mean())
-        assert (c.cost_usd is None) == (run.agent != "explorer")
+        cells = conduct_cells(run, AT_3)
+        assert sum(map(float, cells[:3])) == pytest.approx(100.0, abs=0.15)
+        assert float(cells[1]) == pytest.approx(100.0 * run.episodes.collision.mean(), abs=0.05)
+        assert (cells[-1] == "–") == (run.agent != "explorer")
 
 
 def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
     for table in all_tables(runs, AT_3, AT_5):
         plain = dataclasses.replace(table, marks={}, sections={})
-        lines = grid.as_text(plain).splitlines()
+        lines = table_formats.as_text(plain).splitlines()
         rule = next(k for k, line in enumerate(lines) if set(line) == {"-"})
         body = lines[rule - 1 : rule + 1 + len(table.rows)]
         del body[1]
@@ -147,7 +153,7 @@ def test_the_terminal_has_aligned_columns(runs: list[Run]) -> None:
 @pytest.mark.parametrize("width", [80, 100, 120])
 def test_a_terminal_of_any_width_has_every_cell_once(runs: list[Run], width: int) -> None:
     for table in all_tables(runs, AT_3, AT_5):
-        text = grid.as_text(dataclasses.replace(table, marks={}), width)
+        text = table_formats.as_text(dataclasses.replace(table, marks={}), width)
         assert max(map(len, text.splitlines()[1:])) <= width, table.title
         body = text.replace("\n\n", "\n").splitlines()
         for i, (label, cells) in enumerate(table.rows):
@@ -159,9 +165,9 @@ def test_a_terminal_of_any_width_has_every_cell_once(runs: list[Run], width: int
 
 def test_the_best_and_the_second_are_marked_in_every_format() -> None:
     rows = (("a", ("3.20 ± 1.00", "7")), ("", ("2.00–4.00", "")), ("b", ("2.00 ± 1.00", "7")), ("c", ("1.00", "7")))
-    table = Table("T", "agent", (("", ("SR", "n")),), rows, sections={0: "open", 3: "closed"},
-                  marks={(0, 0): BEST, (2, 0): SECOND})  # fmt: skip
-    assert grid.as_text(table).splitlines()[1:] == [
+    table = TextTable("agent", [Column("SR"), Column("n")], rows, "T", sections={0: "open", 3: "closed"},
+                      marks={(0, 0): BEST, (2, 0): SECOND})  # fmt: skip
+    assert table_formats.as_text(table).splitlines()[1:] == [
         "agent            SR  n",
         "----------------------",
         "open",
@@ -171,26 +177,25 @@ def test_the_best_and_the_second_are_marked_in_every_format() -> None:
         "closed",
         "  c            1.00  7",
     ]
-    assert grid.as_markdown(table).splitlines()[4:7] == [
+    assert table_formats.as_markdown(table).splitlines()[4:7] == [
         "| *open* |  |  |", "| a | **3.20 ± 1.00** | 7 |", "|  | 2.00–4.00 |  |"
     ]  # fmt: skip
-    assert "<ins>2.00 ± 1.00</ins>" in grid.as_markdown(table)
-    latex = grid.as_latex(table)
+    assert "<ins>2.00 ± 1.00</ins>" in table_formats.as_markdown(table)
+    latex = table_formats.as_latex(table)
     assert r"a & \textbf{3.20 $\pm$ 1.00} & 7 \\" in latex
     assert r"b & \underline{2.00 $\pm$ 1.00} & 7 \\" in latex
     assert "\\midrule\n\\multicolumn{3}{l}{\\emph{closed}} \\\\\n" in latex
 
 
 def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run]) -> None:
-    table = tables.Table(
-        "T_1", "agent", (("", ("n",)), ("50 %", ("a ↑", "b"))), ((NASTY, ("1", "2 ± 3", "–")),), ("N & M",)
-    )
-    markdown = grid.as_markdown(table).splitlines()
+    columns = [Column("n"), Column("a ↑", "50 %"), Column("b", "50 %")]
+    table = TextTable("agent", columns, [(NASTY, ("1", "2 ± 3", "–"))], "T_1", ["N & M"])
+    markdown = table_formats.as_markdown(table).splitlines()
     assert markdown[2] == "| agent | n | 50 %: a ↑ | 50 %: b |"
     assert markdown[3] == "| --- | ---: | ---: | ---: |"
     assert r"\<script\>" in markdown[4]
     assert r"\| ä" in markdown[4]
-    latex = grid.as_latex(table)
+    latex = table_formats.as_latex(table)
     assert r"\begin{tabular}{lrrr}" in latex
     assert r"\multicolumn{2}{c}{50 \%}" in latex
     assert r"\cmidrule(lr){3-4}" in latex
@@ -199,19 +204,21 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(runs: list[Run])
     assert r"\caption{T\_1. N \& M}" in latex
     for real in all_tables(runs, AT_3):
         columns = 1 + sum(len(names) for _, names in real.groups)
-        body = grid.as_latex(real).split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
+        body = table_formats.as_latex(real).split(r"\midrule", 1)[1].split(r"\bottomrule")[0]
         lines = [line for line in body.strip().splitlines() if not line.startswith(("\\multi", "\\midrule"))]
         cells = [line.count("&") for line in lines]
         assert cells == [columns - 1] * len(real.rows)
-        assert {line.count("|") for line in grid.as_markdown(real).splitlines() if "|" in line} == {columns + 1}
+        assert {line.count("|") for line in table_formats.as_markdown(real).splitlines() if "|" in line} == {
+            columns + 1
+        }
 
 
 def test_latex_compiles_or_parses(runs: list[Run], tmp_path: Path) -> None:
     labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(runs)]
-    made = contents.ReportRequest(
+    made = tables.ReportRequest(
         Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), paper_results=results()
     )
-    text = "\n\n".join(map(grid.as_latex, contents.report_tables(made, ["all"])))
+    text = "\n\n".join(map(table_formats.as_latex, registry.report_tables(made, ["all"])))
     if compiler := shutil.which("pdflatex"):
         head = "\\documentclass{article}\n\\usepackage[a0paper,landscape]{geometry}\n\\usepackage{booktabs}\n"
         (tmp_path / "t.tex").write_text(f"{head}\\begin{{document}}\n{text}\n\\end{{document}}\n")
@@ -271,7 +278,7 @@ def test_axes_end_at_round_numbers(largest: float, end: float) -> None:
 
 
 def test_the_csv_holds_every_score_unrounded(runs: list[Run]) -> None:
-    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(runs, [AT_3, AT_5]))))
+    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(wanted(runs, AT_3, AT_5)))))
     keys = ["run", "profile", "setting", "modality", "scope", "name"]
     found = {tuple(row[k] for k in keys): row for row in rows}
     assert len(found) == len(rows)
@@ -322,7 +329,7 @@ def test_a_page_loads_nothing_and_escapes_everything(log: Path) -> None:
     nasty = Run(NASTY, NASTY + TURNED, NASTY + TURNED, '{"x": "' + NASTY + '"}', run.table, run.episodes)
     made = wanted([nasty], AT_3)
     figures = dict.fromkeys(("families", "radar", "radius"), b"<svg/>")
-    page = html(made, [], figures, contents.named_tables(made, ["all"]))
+    page = html(made, [], figures, registry.named_tables(made, ["all"]))
     assert "alert(1)</script>" not in page
     assert page.count("<script") == page.count("</script>") == 1
     assert not re.search(r'(?:src|href)="(?!data:)', page)
@@ -342,8 +349,8 @@ def test_the_command_prints_what_is_asked_for(log: Path, tmp_path: Path) -> None
     brief = invoke("--data", str(log))
     assert brief.startswith("Base (the form of the paper's Table 4)\n")
     told = " ".join(brief.partition("\nMore with --table: ")[2].split())
-    assert told == ", ".join(name for name in (*contents.NAMES, "all") if name != "results") + "."
-    most = [part for name in contents.NAMES if name != "scene" for part in ("--table", name)]
+    assert told == ", ".join(name for name in (*registry.NAMES, "all") if name != "results") + "."
+    most = [part for name in registry.NAMES if name != "scene" for part in ("--table", name)]
     plain = invoke("--data", str(log), *most)
     assert plain.startswith("Overall\n")
     assert plain.index("explorer") < plain.index("oracle") < plain.index("random")

@@ -15,11 +15,12 @@ from support.run_logs import episode
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.paper_figures import results
-from aerialdojo_gen.benchmark import contents, difficulty, intervals, paired, radii, score_rows, tables
-from aerialdojo_gen.benchmark.grid import BEST, SECOND, Table, as_text
-from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.base.table_formats import as_text
+from aerialdojo_gen.base.text_table import BEST, SECOND, TextTable
+from aerialdojo_gen.benchmark import intervals, paired, registry, score_rows
+from aerialdojo_gen.benchmark.metrics import PROFILES, summarize
 from aerialdojo_gen.benchmark.runs import Run, group_runs, load_runs, with_baselines
-from aerialdojo_gen.benchmark.tables import result_tables
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
@@ -99,11 +100,12 @@ def runs(log: Path) -> list[Run]:
     return group_runs(with_baselines(log, load_runs(log, ["alpha", "beta"])))
 
 
-def broken_down(data: Path, runs: list[Run], kind: str) -> list[Table]:
-    return difficulty.breakdown_tables(difficulty.find_breakdowns(open_root(data), runs), kind, runs, AT_3)
+def made(name: str, runs: list[Run], data: Path = Path("no-release"), **options: Any) -> TextTable:
+    (table,) = registry.report_tables(ReportRequest(open_root(data), runs, [AT_3], **options), [name])
+    return table
 
 
-def cells(table: Table, label: str) -> tuple[str, ...]:
+def cells(table: TextTable, label: str) -> tuple[str, ...]:
     return dict(table.rows)[label]
 
 
@@ -126,7 +128,8 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, r
 
 
 def test_tables_4_and_5(runs: list[Run]) -> None:
-    (table,) = result_tables(runs, [AT_3, AT_5], paper_results=[r for r in results() if r.setting == "base"])
+    request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
+    (table,) = registry.report_tables(request)
     assert table.title.startswith("Base")
     assert [head for head, _ in table.groups] == ["3 m", "5 m"]
     # alpha at 3 m: Urban (¼ + 0)/2, Natural (½ + 0)/2, Infrastructure (0 + 1)/2, Disaster 0: 21.875 % in the mean.
@@ -158,29 +161,29 @@ def test_tables_4_and_5(runs: list[Run]) -> None:
     # One line more each has the intervals, but for the paper's.
     assert [rows[row + 1] for row in order] == ["", "", ""]
     assert table.rows[order[2] + 1][1][0] == "0.00–0.00"
-    assert result_tables(runs, [AT_3], intervals=False)[0].rows[1][0] == "package:Beta"
+    assert made("results", runs, intervals=False).rows[1][0] == "package:Beta"
     text = as_text(table, 120)
     assert max(map(len, text.splitlines())) <= 120
 
 
 def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) -> None:
     # ID scenes: ¼, ½, 0, 0; OOD scenes: 0, 0, 1, 0.
-    partition = cells(tables.partition_table(runs, AT_3), "package:Alpha")
+    partition = cells(made("partition", runs), "package:Alpha")
     assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
     # OSR ¼, 1, 1, 1 and ½, 0, 1, 0.
     assert (partition[1], partition[6], partition[11]) == ("81.25", "37.50", "−43.75")
     # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
-    goal = cells(tables.goal_table(runs, AT_3), "package:Alpha")
+    goal = cells(made("goal", runs), "package:Alpha")
     assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")
     # 4 of 18 tasks, 10 of 18 visits.
-    average = cells(tables.average_table(runs, AT_3), "package:Alpha")
+    average = cells(made("averages", runs), "package:Alpha")
     assert (average[0], average[5], average[1], average[6]) == ("21.88", "22.22", "59.38", "55.56")
-    types = tables.type_table(runs, AT_3)
+    types = made("type", runs)
     assert [label for label, _ in types.rows] == ["Mall", "Coast", "Harbor", "Flood"]
     assert list(types.sections.values()) == ["Urban", "Natural", "Infrastructure", "Disaster"]
     assert [row[0] for _, row in types.rows] == ["12.50", "25.00", "50.00", "0.00"]
     # L / d_E is 10 / 8 in ID scenes and 10 / 9 in the others.
-    (detour,) = broken_down(log, runs, difficulty.DIFFICULTY)
+    detour = made("difficulty", runs, log)
     assert [head for head, _ in detour.groups] == ["1.1 to 1.25", "1.25 to 1.5"]
     assert cells(detour, "package:Alpha")[::3] == ("25.00", "18.75")
     # A log or a release that has the column has the table.
@@ -193,14 +196,14 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
         )
         for run in load_runs(log, ["alpha", "beta"])
     ]
-    (seen,) = broken_down(log, shown, difficulty.SEEN)
+    seen = made("seen", shown, log)
     assert [head for head, _ in seen.groups] == ["seen in training", "unseen"]
     # Every second task is one with a semantic goal.
     assert cells(seen, "package:Alpha")[0] == "31.25"
 
 
 def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> None:
-    table = radii.radius_table(runs, AT_3, (5.0, 3.0))
+    table = made("radius", runs, radii_m=(5.0, 3.0))
     heads = [f"{group} {name}" for group, names in table.groups for name in names]
     alpha, beta = (dict(zip(heads, cells(table, f"package:{name}"), strict=True)) for name in ("Alpha", "Beta"))
     assert (alpha["SR ↑ 3 m"], alpha["SR ↑ 5 m"], alpha["SR gain, points 3→5 m"]) == ("21.88", "37.50", "+15.62")
@@ -210,13 +213,13 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> N
     assert (alpha["OSR, at poses ↑ 3 m"], alpha["OSR, along the way ↑ 3 m"]) == ("59.38", "65.62")
     assert alpha["OSR, at poses ↑ 5 m"] == alpha["OSR, along the way ↑ 5 m"] == "81.25"
     assert "Base, from 3 to 5 m: package:Beta overtakes package:Alpha." in table.notes
-    four = radii.radius_table(runs, AT_3, (1.0, 3.0, 5.0, 10.0))
+    four = made("radius", runs, radii_m=(1.0, 3.0, 5.0, 10.0))
     at_10 = dict(zip([name for _, names in four.groups for name in names][:4], cells(four, "stop"), strict=False))
     assert at_10 == {"1 m": "0.00", "3 m": "0.00", "5 m": "0.00", "10 m": "100.00"}
-    lost = cells(radii.visit_table(runs, AT_3), "package:Alpha")
+    lost = cells(made("visits", runs), "package:Alpha")
     # T; C of Mall_1 and twice of Flood_0; R; N.
     assert lost == ("18", "10", "4", "6", "16.7", "50.0", "16.7", "16.7")
-    assert cells(radii.visit_table(runs, AT_3), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
+    assert cells(made("visits", runs), "stop") == ("18", "0", "0", "0", "–", "–", "–", "–")
     assert runs[0].path_clearance_to_goal_m is not None
     assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
 
@@ -226,7 +229,7 @@ def test_a_log_without_steps_has_no_distances_along_the_way(log: Path, tmp_path:
     store.shard_path(tmp_path, "steps", "U_Mall_1", run="alpha").unlink()
     (run,) = load_runs(tmp_path)
     assert run.path_clearance_to_goal_m is None
-    assert not any("along the way" in group for group, _ in radii.radius_table([run], AT_3).groups)
+    assert not any("along the way" in group for group, _ in made("radius", [run]).groups)
 
 
 def test_a_paired_comparison_is_of_common_tasks_and_exact(log: Path, runs: list[Run]) -> None:
@@ -252,9 +255,8 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log: Path, runs: list[
 
 
 def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
-    found = intervals.score_intervals(runs[0].episodes, AT_3)
-    scores = intervals.scene_scores(runs[0].episodes, AT_3)
-    families = [[float(values[0]) for values in part.values()] for part in scores.values()]
+    found = intervals.score_intervals(summarize(runs[0].episodes, AT_3))
+    families = [part[:, 0].tolist() for part in intervals.scene_scores(summarize(runs[0].episodes, AT_3))]
     assert families == [[0.25, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
     # Every draw of two scenes a family, all alike likely.
     means = sorted(
@@ -270,25 +272,26 @@ def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
         method="percentile", n_resamples=4000, vectorized=False, rng=np.random.default_rng(5),
     ).confidence_interval  # fmt: skip
     assert (low, high) == (pytest.approx(theirs.low, abs=0.016), pytest.approx(theirs.high, abs=0.016))
-    np.testing.assert_equal(found, intervals.score_intervals(runs[0].episodes, AT_3))
+    np.testing.assert_equal(found, intervals.score_intervals(summarize(runs[0].episodes, AT_3)))
     # The log does not say SR-view: that has no interval, and the others have theirs.
     assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
     # How far scenes differ is not known of a family with one of them.
     one = runs[0].episodes.where(runs[0].episodes.scene != "U_Mall_1")
-    assert all(math.isnan(end) for ends in intervals.score_intervals(one, AT_3) for end in ends)
+    assert all(math.isnan(end) for ends in intervals.score_intervals(summarize(one, AT_3)) for end in ends)
 
 
 def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
-    wanted = contents.ReportRequest(log, runs, [AT_3, AT_5])
-    titles = [table.title for table in contents.report_tables(wanted, ["visits", "overall", "visits"])]
+    wanted = ReportRequest(open_root(log), runs, [AT_3, AT_5])
+    titles = [table.title for table in registry.report_tables(wanted, ["visits", "overall", "visits"])]
     assert titles == ["Overall", "Where visits are lost, 3 m"]
-    assert len(contents.report_tables(wanted, ["all"])) == 14
+    assert len(registry.report_tables(wanted, ["all"])) == 14
     with pytest.raises(UsageError, match="no table 'visit': did you mean 'visits'"):
-        contents.report_tables(wanted, ["visit"])
+        registry.report_tables(wanted, ["visit"])
 
 
 def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
-    lines = score_rows.as_csv(runs, [AT_3, AT_5], results()).splitlines()
+    request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
+    lines = score_rows.as_csv(request).splitlines()
     head = lines[0].split(",")
     (row,) = [line.split(",") for line in lines if line.startswith("paper,Claude Opus 5,aerialdojo,3.0,base")]
     assert dict(zip(head, row, strict=True))["osr"] == "0.0784"

@@ -15,13 +15,13 @@ import pytest
 from support.browser import chromium, errors
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.benchmark.contents import ReportRequest
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import PROFILES, outcomes, summarize
 from aerialdojo_gen.benchmark.replay import Replay, choose_tasks, replays
 from aerialdojo_gen.benchmark.report import write_report
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import Run, load_runs
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import ACTION_NAMES

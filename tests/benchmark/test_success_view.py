@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,12 +20,13 @@ from support.walled import SCENE, VIEWPOINTS, walled, write_walled
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.benchmark.viewpoints import view_of
 from aerialdojo_gen.pipeline.progress import Reporter
@@ -196,7 +198,7 @@ def test_the_report_has_it_beside_sr_with_intervals(viewed_smoke: Path) -> None:
         assert all(after == "SR-view ↑" for before, after in pairwise(heads) if before == "SR ↑")
     rows = {
         (row["run"], row["profile"], row["scope"], row["setting"], row["modality"]): row
-        for row in csv.DictReader(io.StringIO(as_csv(runs, [AT_3, AT_5])))
+        for row in csv.DictReader(io.StringIO(as_csv(wanted)))
         if row["scope"] == "overall"
     }
     scenes = runs[0].table.to_pandas().groupby("scene").success_view.mean()
@@ -205,7 +207,11 @@ def test_the_report_has_it_beside_sr_with_intervals(viewed_smoke: Path) -> None:
     assert float(row["sr_view"]) == pytest.approx(scenes.mean())
     assert float(row["sr_view_low95"]) <= float(row["sr_view"]) <= float(row["sr_view_high95"])
     assert float(rows["random", "aerialdojo-5m", "overall", "all", "all"]["sr_view"]) >= float(row["sr_view"])
-    same = [r for r in loads_json(as_json(runs, [AT_3])) if r["scope"] == "overall" and r["setting"] == "all"]
+    same = [
+        r
+        for r in loads_json(as_json(replace(wanted, profiles=[AT_3])))
+        if r["scope"] == "overall" and r["setting"] == "all"
+    ]
     assert {r["run"]: r["sr_view"] for r in same if r["modality"] == "all"}["random"] == float(row["sr_view"])
 
 

@@ -14,13 +14,14 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observation, Rules
-from aerialdojo_gen.benchmark.contents import ReportRequest, report_tables
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.llm.prompt import Sight, goal_text, system_prompt
 from aerialdojo_gen.benchmark.metrics import PROFILES
+from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv
+from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.geometry.frames import compass_direction, compass_heading
 from aerialdojo_gen.geometry.motion import TURN_RAD, TURNS
 from aerialdojo_gen.store.root import open_root
@@ -85,9 +86,10 @@ def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path
     assert read_run(tmp_path, "told")["told"].to_pylist() == ["heading"] * 3
     runs = load_runs(tmp_path, ["plain", "told"])
     assert [run.label for run in runs] == [ME, f"{ME} + heading"]
-    (overall,) = report_tables(ReportRequest(open_root(court), runs, [PROFILES["aerialdojo"]]), ["overall"])
+    request = ReportRequest(open_root(court), runs, [PROFILES["aerialdojo"]])
+    (overall,) = report_tables(request, ["overall"])
     assert f"Told more than the goal: {ME} + heading (heading)." in overall.notes
-    told = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(runs, [PROFILES["aerialdojo"]]).splitlines()}
+    told = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(request).splitlines()}
     assert told == {"run": "told", "plain": "", "told": "heading"}
 
 

@@ -1,0 +1,323 @@
+"""The registry of a report's tables: how each groups episodes, what it averages, what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.text_table import TextTable
+from aerialdojo_gen.benchmark.counts import CountSpec, conduct_cells, count_table, visit_cells
+from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
+from aerialdojo_gen.benchmark.metrics import METRICS, at_radius
+from aerialdojo_gen.benchmark.outcome_table import Cut
+from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run
+from aerialdojo_gen.benchmark.tables import Cell, ReportRequest, Row, TableSpec, make_table, profile_head
+from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
+
+PARTITIONS = ("ID", "OOD")
+MODALITIES = ("semantic", "image")
+NAMES_OF = {
+    "base": "Base", "standard": "Standard", "long_horizon": "Long-Horizon", "semantic": "Semantic", "image": "Image",
+}  # fmt: skip
+_ORDER = {"family": tuple(FAMILIES.values()), "setting": SETTINGS, "modality": MODALITIES, "partition": PARTITIONS}
+_RATES = ("sr", "sr_view", "osr", "spl")
+# At every radius but the first, as in the paper.
+_FURTHER = ("sr", "sr_view", "osr")
+_PAPER_TABLES = {"base": " (the form of the paper's Table 4)", "standard": " (the form of the paper's Table 5)"}
+# Reversals that a note lists.
+_MOST_REVERSALS = 6
+_MEANS = "Mean of the {0}families, each the mean of its scenes; ± is the standard deviation over scenes."
+
+
+def _ranked(run: Run, group: str = "") -> str | None:
+    """Return a run's rank group; the oracle is not ranked."""
+    return None if GROUP_OF.get(run.agent) == UPPER_BOUND else group
+
+
+def run_rows(request: ReportRequest) -> list[Row]:
+    """Make a row a run, under its group's heading."""
+    return [
+        Row(run.label, Cut(k), run.group, _ranked(run), (f"{len(run.episodes):,}",))
+        for k, run in enumerate(request.runs)
+    ]
+
+
+def _setting_rows(request: ReportRequest) -> list[Row]:
+    return [
+        Row(run.label, Cut(k, where=(("setting", setting),)), NAMES_OF[setting], _ranked(run, NAMES_OF[setting]))
+        for setting in SETTINGS
+        for k, run in enumerate(request.runs)
+        if (run.episodes.setting == setting).any()
+    ]
+
+
+def _scene_rows(request: ReportRequest) -> list[Row]:
+    return [Row(n, Cut(where=(("scene", n),)), rank_group=None) for n in request.table.values("scene", Cut())]
+
+
+def _type_rows(request: ReportRequest) -> list[Row]:
+    columns, order = request.table.columns, list(FAMILIES.values())
+    family_of = dict(zip(columns["scene_type"].tolist(), columns["family"].tolist(), strict=True))
+    types = sorted(family_of, key=lambda t: (order.index(f) if (f := family_of[t]) in order else len(order), t))
+    return [Row(name, Cut(where=(("scene_type", name),)), family_of[name], None) for name in types]
+
+
+def _cells(parts: Mapping[str, Cut], measures: Sequence[str]) -> list[Cell]:
+    return [Cell(head, name, cut) for head, cut in parts.items() for name in measures]
+
+
+def _by(column: str, heads: Sequence[str] = (), *, gap: str = "") -> Callable[[ReportRequest], list[Cell]]:
+    """Make columns a value of a column; and, of two values, the differences of their rates."""
+    values = _ORDER[column]
+    named = heads or [NAMES_OF.get(value, value) for value in values]
+    cuts = [Cut(where=((column, value),)) for value in values]
+
+    def columns(request: ReportRequest) -> list[Cell]:
+        cells = _cells(dict(zip(named, cuts, strict=True)), request.shown())
+        rates = {"sr": "SR", "osr": "OSR"} if gap else {}
+        return cells + [Cell(gap, name, cuts[1], head, (name, cuts[0])) for name, head in rates.items()]
+
+    return columns
+
+
+def _by_run(request: ReportRequest) -> list[Cell]:
+    return [Cell(run.label, name, Cut(k)) for k, run in enumerate(request.runs) for name in request.shown()]
+
+
+def _by_average(request: ReportRequest) -> list[Cell]:
+    return _cells({"mean of the families": Cut(), "mean of the tasks": Cut(weighted=True)}, request.shown())
+
+
+def _by_profile(request: ReportRequest, metrics: Sequence[str]) -> list[Cell]:
+    """Make columns a success rule: all measures of the first, some of the others."""
+    first = request.profiles[0]
+    return [
+        Cell(profile_head(profile), name, Cut(profile=profile))
+        for k, profile in enumerate(request.profiles)
+        # Another radius changes neither the distance at the end nor the collisions.
+        for name in request.shown(
+            metrics if k and (metrics is _FURTHER or profile.planar == first.planar) else METRICS, profile
+        )
+    ]
+
+
+def _along_way(request: ReportRequest) -> bool:
+    # The heights of the goal are not in the log: only the distance in space is known along the way.
+    known = all(run.path_clearance_to_goal_m is not None for run in request.runs)
+    return not request.profiles[0].planar and known
+
+
+def _by_radius(request: ReportRequest) -> list[Cell]:
+    radii = sorted(set(request.radii_m))
+    at = {r: Cut(profile=at_radius(request.profiles[0], r)) for r in radii}
+    cells = [Cell("SR ↑", "sr", at[r], f"{r:g} m") for r in radii]
+    cells += [Cell("OSR, at poses ↑", "osr", at[r], f"{r:g} m") for r in radii]
+    if _along_way(request):
+        cells += [Cell("OSR, along the way ↑", "osr", at[r] | Cut(along_way=True), f"{r:g} m") for r in radii]
+    cells += [
+        Cell("SR gain, points", "sr", at[far], f"{near:g}→{far:g} m", ("sr", at[near]))
+        for near, far in pairwise(radii)
+    ]
+    return cells + [Cell("OSR − SR, points", "osr", at[r], f"{r:g} m", ("sr", at[r])) for r in radii]
+
+
+def _radius_notes(request: ReportRequest) -> list[str]:
+    notes = ["OSR at poses is the paper's: the distance is taken after every action."]
+    if _along_way(request):
+        notes[0] += " Along the way it is taken on every segment flown: a move may pass the goal and end beyond it."
+    rows = _setting_rows(request)
+    for section in dict.fromkeys(row.section for row in rows):
+        for near, far in pairwise(sorted(set(request.radii_m))):
+            at = [Cut(profile=at_radius(request.profiles[0], radius)) for radius in (near, far)]
+            rates = [
+                (row.label, request.table.score(at[0] | row.cut).sr, request.table.score(at[1] | row.cut).sr)
+                for row in rows
+                if row.section == section
+            ]
+            # Differences in the last digits are sums in another order.
+            turned = [
+                f"{up} overtakes {down}"
+                for up, a, a_far in rates
+                for down, b, b_far in rates
+                if a < b - 1e-9 and a_far > b_far + 1e-9
+            ]
+            if turned:
+                more = f", and {len(turned) - _MOST_REVERSALS} more" if len(turned) > _MOST_REVERSALS else ""
+                said = f"{', '.join(turned[:_MOST_REVERSALS])}{more}."
+                notes.append(f"{section}, from {near:g} to {far:g} m: {said}")
+    return notes
+
+
+def caveats(runs: Sequence[Run]) -> list[str]:
+    """Notes on what a comparison of runs lacks: families, episodes, SR-view, common tasks."""
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for run in runs:
+        if missing := tuple(f for f in FAMILIES.values() if not (run.episodes.family == f).any()):
+            lacking.setdefault(missing, []).append(run.label)
+    notes = [
+        f"{', '.join(labels)}: no episodes of {', '.join(missing)}; overall is the mean of the others."
+        for missing, labels in lacking.items()
+    ]
+    notes += [
+        f"{run.label}: {run.failed:,} more episodes failed for reasons outside the agent."
+        for run in runs
+        if run.failed
+    ]
+    blind = [run.label for run in runs if np.isnan(run.episodes.view_distance_m).any()]
+    if len(blind) < len(runs):
+        notes.append("SR-view: stopped that near to any valid viewpoint of the target, with the target in sight.")
+    if blind:
+        notes.append(
+            f"No SR-view of {', '.join(blind)}: flown by an older version or on a release without viewpoints/. "
+            "Flown again on a release that has them they have one."
+        )
+    if told := [f"{run.label} ({run.told})" for run in runs if run.told]:
+        notes.append(f"Told more than the goal: {', '.join(told)}.")
+    if len({frozenset(run.table["task_id"].to_pylist()) for run in runs}) > 1:
+        notes.append("The runs flew different tasks: their scores are no comparison of agents.")
+    return notes
+
+
+def in_setting(runs: Sequence[Run], setting: str) -> list[Run]:
+    """Return the runs' episodes of a setting, without runs that have none."""
+    masks = [run.episodes.setting == setting for run in runs]
+    return [run.where(mask) for run, mask in zip(runs, masks, strict=True) if mask.any()]
+
+
+def result_tables(request: ReportRequest) -> list[TextTable]:
+    """Make a table per length setting that any run has flown, in the form of the paper's."""
+    tables = []
+    for setting in SETTINGS:
+        runs = in_setting(request.runs, setting)
+        if not runs:
+            continue
+        results = [result for result in request.paper_results if result.setting == setting]
+        theirs = [
+            Row(r.model, Cut(), f"another simulator (Unreal Engine; {r.source}), {r.group}-source", "paper", (), r)
+            for r in results
+        ]
+        rows = run_rows(replace(request, runs=runs)) + theirs
+        counts = {len(run.episodes) for run in runs}
+        sizes = ", ".join(f"{run.label} {len(run.episodes):,}" for run in runs)
+        notes = [_MEANS.format(""), f"{counts.pop():,} episodes each." if len(counts) == 1 else f"Episodes: {sizes}."]
+        if results:
+            notes.append(
+                "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks, and what "
+                "its ± is it does not say: its rows are no comparison with ours, and are ranked among themselves."
+            )
+        spec = TableSpec(
+            NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), lambda _, own=rows: own,  # type: ignore[misc]
+            partial(_by_profile, metrics=_FURTHER), spread=True, headed=False,
+        )  # fmt: skip
+        table = make_table(spec, replace(request, runs=runs), intervals=request.intervals)
+        if any(not label for label, _ in table.rows):
+            notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
+        tables.append(replace(table, notes=[*notes, *caveats(runs)]))
+    return tables
+
+
+def radius_tables(request: ReportRequest) -> list[TextTable]:
+    """SR and OSR at several radii; notes name the agents whose order changes between radii."""
+    profile = request.profiles[0]
+    title = f"Success radius{'' if profile.own else f', {profile.name}'}"
+    return [make_table(TableSpec(title, _setting_rows, _by_radius, notes=_radius_notes, headed=False), request)]
+
+
+def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
+    """Make a table per breakdown of a kind that has at least two parts with episodes."""
+    tables = []
+    for found in request.breakdowns.found:
+        if found.kind != kind or len(found.parts) < 2:
+            continue
+        counts = [[int((own == part).sum()) for own in found.labels] for part in found.parts]
+        alike = all(len(set(count)) == 1 for count in counts)
+        sizes = "; ".join(f"{part}: {n[0]:,}" for part, n in zip(found.parts, counts, strict=True))
+        note = " ".join(filter(None, (found.note, f"Episodes – {sizes}." if alike else "")))
+        cuts = {part: Cut(where=((found.name, part),)) for part in found.parts}
+        cells = _cells(cuts, request.shown(_RATES))
+        spec = TableSpec(found.title, run_rows, lambda _, own=cells: own)  # type: ignore[misc]
+        tables.append(replace(make_table(spec, request, request.broken_down), notes=[note] if note else []))
+    return tables
+
+
+_TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
+    "overall": TableSpec(
+        "Overall", run_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes",), headed=False,
+        notes=lambda r: [_MEANS.format("four "), *caveats(r.runs)],
+    ),
+    "results": result_tables,
+    "partition": TableSpec(
+        "ID and OOD scenes", _setting_rows, _by("partition", gap="OOD − ID, points"),
+    ),
+    "family": TableSpec("By family", run_rows, _by("family")),
+    "averages": TableSpec("Two averages", run_rows, _by_average, notes=lambda _: [
+        "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
+    ]),
+    "setting": TableSpec("By setting", run_rows, _by("setting")),
+    "goal": TableSpec(
+        "Goal type", _setting_rows, _by("modality", ("Semantic goal", "Image goal"), gap="image − semantic, points")
+    ),
+    "modality": TableSpec("By modality", run_rows, _by("modality")),
+    "radius": radius_tables,
+    "visits": CountSpec(
+        "Where visits are lost", {
+            "episodes": ("flown", "visited", "solved", "lost"),
+            "lost: how they ended, %": ("too far", "collided", "ran out", "no Stop"),
+        }, _setting_rows, visit_cells,
+        "Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out: "
+        "of actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
+        "averaged.",
+        headed=True,
+    ),
+    "difficulty": partial(breakdown_tables, kind=DIFFICULTY),
+    "seen": partial(breakdown_tables, kind=SEEN),
+    "conduct": CountSpec(
+        "How episodes went", {
+            "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
+            "service": ("requests", "tokens in", "tokens out", "USD"),
+        }, run_rows, conduct_cells,
+    ),
+    "type": TableSpec("By scene type", _type_rows, _by_run, "scene type"),
+    "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),
+}  # fmt: skip
+NAMES = tuple(_TABLES)
+# As in the paper; the others are optional.
+DEFAULT = ("results",)
+
+
+def _made(request: ReportRequest, name: str) -> list[TextTable]:
+    spec = _TABLES[name]
+    if isinstance(spec, TableSpec):
+        return [make_table(spec, request)]
+    return [count_table(spec, request)] if isinstance(spec, CountSpec) else spec(request)
+
+
+def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:
+    """Make tables."""
+    return [table for made in named_tables(request, names).values() for table in made]
+
+
+def missing_note(request: ReportRequest, names: Sequence[str] = DEFAULT) -> str:
+    """Name the requested breakdowns that are missing, and why, in one line; empty if none is."""
+    needed = {"all", "difficulty", "seen"} & set(names)
+    return request.breakdowns.missing_note if needed else ""
+
+
+def check_names(names: Sequence[str]) -> Sequence[str]:
+    """Return the names; UsageError for an unknown one."""
+    for name in names:
+        if name not in (*NAMES, "all"):
+            raise UsageError(unknown("no table", name, NAMES, besides=("all",)))
+    return names
+
+
+def named_tables(request: ReportRequest, names: Sequence[str]) -> dict[str, list[TextTable]]:
+    """Make tables by name."""
+    check_names(names)
+    return {name: _made(request, name) for name in NAMES if "all" in names or name in names}
