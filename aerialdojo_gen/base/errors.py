@@ -94,7 +94,7 @@ def lacks(who: str, package: str | None, extra: str) -> str:
     Parameters
     ----------
     who : str
-        What wants the package, as the user calls it: an option, a command, a kind of file.
+        What needs the package, in the user's terms: an option, a command, a kind of file.
     package : str or None
         The package, as it is imported; None as ImportError may have it.
     extra : str
@@ -143,7 +143,7 @@ class AgentUnavailable(AerialDojoError):  # noqa: N818 (it says what is the matt
 
 
 class ServiceDown(AerialDojoError):  # noqa: N818
-    """A service will answer no request of the run: there is no route to it, or nobody listens. The run ends."""
+    """A service will answer no request of the run: there is no route to it, or no connection. The run ends."""
 
 
 DISK_ERRORS = {

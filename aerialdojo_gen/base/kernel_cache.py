@@ -133,7 +133,7 @@ def _homes(source: Path) -> Iterator[Path]:
     with contextlib.suppress(OSError):
         temporary = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.geteuid()}"
         temporary.mkdir(mode=0o700, exist_ok=True)
-        # What is read from there is run: nobody else may have written it.
+        # Cached code is executed: no other user may be able to write it.
         found = temporary.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o077:
             yield temporary / own

@@ -10,7 +10,7 @@ from typing import Any, TextIO, cast
 
 from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError
 
-# As a shell reports a program that SIGPIPE ended: nobody reads what it prints.
+# The exit code that a shell reports for a program ended by SIGPIPE: its output has no reader.
 CLOSED_PIPE = 141
 
 # C0 and C1 controls, marks and overrides of writing direction, separators that some terminals break lines at.

@@ -36,7 +36,7 @@ _HEADINGS = {
 
 
 class _Commands(TyperGroup):
-    """Lists the commands by purpose, with the whole of what they do."""
+    """Lists the commands by purpose, with their complete help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the names and their help, wrapped."""
@@ -87,7 +87,7 @@ def _program(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which version this is.")
     ] = False,
 ) -> None:
-    """Take what stands before a command."""
+    """Accept options before the command."""
 
 
 _GROUPS = (
@@ -99,7 +99,7 @@ app.add_typer(config.app, name="config", cls=_Commands)
 
 
 def _app_for(named: list[str]) -> typer.Typer:
-    """Return a command line of one command where that is named, else of all: of each one Typer makes parameters."""
+    """Return an app with only the named command, else with all: Typer's set-up takes time for each."""
     for info in [info for group in _GROUPS for info in group.app.registered_commands]:
         if [info.name] == named:
             alone = _new()
@@ -128,7 +128,7 @@ def main() -> None:
 
 
 def _run() -> tuple[int, str]:
-    """Run the command; return its exit code, and its error in one line where it is an expected one."""
+    """Run the command; return its exit code, and an expected error as one line."""
     try:
         environment_errors.check_arguments(sys.argv[1:])
         environment_errors.check_limits(sys.argv[1:])

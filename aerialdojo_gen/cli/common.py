@@ -34,12 +34,12 @@ __all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "r
 
 
 def print_json(value: object) -> None:
-    """Print what ``--json`` asks for: bytes left out, null where a figure is not finite."""
+    """Print JSON for ``--json``: without bytes, null for values that are not finite."""
     print(json_text(value))
 
 
 def json_text(value: object) -> str:
-    """Give what `print_json` prints."""
+    """Convert to the JSON values that `print_json` prints."""
     return json.dumps(_plain(value), ensure_ascii=False, indent=1, allow_nan=False)
 
 
@@ -52,7 +52,7 @@ def _plain(value: object) -> object:
 
 
 def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
-    """Keep what is written on the command line (not what the environment says) for the advice of messages."""
+    """Keep the options of the command line (not the environment's) for commands in messages."""
     source = ctx.get_parameter_source(str(param.name))
     if source is not None and source.name == "COMMANDLINE":
         cli_context.update_context(**{str(param.name): value})

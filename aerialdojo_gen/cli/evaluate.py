@@ -223,7 +223,7 @@ def _tracebacks(enabled: bool) -> Iterator[None]:
 
 
 def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tuple[str, dict[str, Any]]:
-    """Take the agent, or a preset's with its options under those that are given."""
+    """Return the agent and its options; given options override a preset's."""
     from aerialdojo_gen.benchmark.agents.load import read_options
 
     if preset is None:
@@ -250,7 +250,7 @@ def _options(given: list[str]) -> dict[str, str]:
 def _sensors(
     agent: str, options: dict[str, Any], view: list[str] | None, width: int | None, height: int | None
 ) -> Sensors | None:
-    """Take the agent's own sensors, with what was asked for instead; None leaves them as they are."""
+    """Return the agent's sensors with the requested changes; None if there are none."""
     if view is None and width is None and height is None:
         return None
     from dataclasses import replace
@@ -269,7 +269,7 @@ def _sensors(
 
 
 def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
-    """Return this process's command with all its options, so that a shell takes it as it stands."""
+    """Return this process's command with all its options, quoted for a shell."""
     kept = [argument for argument in sys.argv[1:] if argument not in without]
     if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
         kept += ["--data", data]

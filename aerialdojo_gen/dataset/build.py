@@ -224,7 +224,7 @@ def run_stages(
     ------
     AssetError
         No scene has annotations, and nothing was run; or one that was asked for by its full name, or by a
-        pipeline that wants the paper's numbers, has none, and all others are finished.
+        pipeline with the paper's numbers, has none, and all others are finished.
     UsageError
         The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
     """

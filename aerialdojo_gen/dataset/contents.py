@@ -77,7 +77,7 @@ def files_there(where: Where) -> list[str]:
 def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes that any table of a release has a part of, by name; none if there is no release.
 
-    A scene that lacks a part is listed too, so that whoever reads it is told.
+    A scene that lacks a part is listed too, so that reading it raises an error.
     """
     return sorted(set().union(*parts_there(where, folder).values()))
 

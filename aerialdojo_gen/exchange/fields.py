@@ -1,4 +1,4 @@
-"""The fields of a record, each checked as it is read; what nobody read is what could not be mapped."""
+"""The fields of a record, checked when read; fields that are never read could not be mapped."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class Fields:
         return child
 
     def unread(self) -> Iterator[str]:
-        """Paths of the fields that nobody asked for, in this object and its children."""
+        """Paths of the fields that were never read, in this object and its children."""
         for key in self._value:
             if key not in self._read:
                 yield self.path(plain(key))

@@ -112,7 +112,7 @@ class PartialExport:
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold the folder, which nobody else may write to meanwhile."""
+        """Lock the folder against other writers."""
         make_folder(self.folder)
         with (self.folder / _LOCK).open("a") as lock:
             try:

@@ -193,7 +193,7 @@ def _write(job: _Job) -> int:
 
 
 def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: list[Part]) -> dict[str, Any]:
-    """Collect what decides every byte: parts of another request are not gone on with."""
+    """Collect what decides every byte: parts of another request are not reused."""
     scenes = sorted({part.scene for part in parts})
     read, shown = options.source != "render", "image" in options.goal
     return {

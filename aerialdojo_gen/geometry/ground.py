@@ -24,7 +24,7 @@ Ints = NDArray[np.int64]
 
 # Columns that decide what is ground are this far apart.
 _COLUMN_M = 0.5
-# A body that is smaller in plan is nobody's terrain.
+# A body with a smaller area in plan is never terrain.
 _LEAST_AREA_M2 = 4.0
 # A sheet has one layer, but for overhangs; walls with a floor and a roof have two or more.
 _SINGLE_LAYER = 2 / 3

@@ -17,7 +17,7 @@ Ints = NDArray[np.int32]
 
 @njit(cache=True)
 def _rays(origins: Floats, directions: Floats, centre: Floats) -> tuple[Floats, Singles, Singles]:
-    """Unit directions, and origins and directions as Embree wants them."""
+    """Unit directions, and origins and directions in Embree's format."""
     n = len(directions)
     unit, start, aim = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     for i in range(n):

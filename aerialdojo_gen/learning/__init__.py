@@ -1,4 +1,4 @@
-"""Loading a release for learning: trajectories as arrays, in an order that can be repeated and gone on with.
+"""Loading a release for learning: trajectories as arrays, in an order that can be repeated and resumed.
 
 >>> from aerialdojo_gen.learning import Loader, Trajectories  # doctest: +SKIP
 >>> data = Trajectories("data", split="id_train", views=("front", "down"), size=128)  # doctest: +SKIP

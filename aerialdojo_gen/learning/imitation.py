@@ -275,7 +275,7 @@ class Learner:
             return network.choose(seen, guess.with_goal_offset(batch["offset"]) if told else guess), guess
 
     def _views_loss(self, draw: np.random.Generator) -> Any:
-        """Loss of places told by pictures from anywhere: an episode's are too much alike to learn a scene by."""
+        """Loss of the place predicted from pictures of the whole scene: one episode's are too similar."""
         n = self.recipe.train.looks
         about = [(pool, frames, rows) for pool, frames, rows in self._about if len(rows)]
         if not (n and self.recipe.data.views and about):

@@ -183,7 +183,7 @@ class _Batches:
 
 
 def torch_package(who: str = "a policy") -> Any:
-    """Import torch for who wants it; MissingPackage naming the extra where it is not installed."""
+    """Import torch; raise MissingPackage, which names the extra, if it is not installed."""
     try:
         importlib.import_module("torch.utils.data")
         return importlib.import_module("torch")

@@ -62,7 +62,7 @@ class TrainingConfig(Section):
     weight_decay: float = Field(0.01, ge=0, le=1, description="of AdamW")
     warmup_batches: int = Field(50, ge=0, description="batches in which the learning rate rises to its highest")
     gradient_norm: float = Field(1.0, gt=0, description="gradients are scaled down to this norm")
-    image_share: float = Field(0.5, ge=0, le=1, description="goals told by picture, of those that have both")
+    image_share: float = Field(0.5, ge=0, le=1, description="share of pictures among goals that have both forms")
     goal_weight: float = Field(
         1.0, ge=0, description="of the tasks beside the choice: where body and goal are, which actions are blocked"
     )

@@ -31,7 +31,7 @@ def cli_page() -> str:
     out = [
         "# Commands",
         "",
-        "Written from the commands themselves; `aerialdojo-gen COMMAND --help` says the same. Data go to",
+        "Generated from the commands; `aerialdojo-gen COMMAND --help` prints the same. Data are written to",
         "`--data`, else to `AERIALDOJO_DATA`, else to `data/`. [Exit",
         "codes](../errors.md).",
     ]
@@ -65,10 +65,10 @@ def config_page() -> str:
     out = [
         "# The pipeline file",
         "",
-        "One TOML file, one section a stage; a key that does not exist is an error. `aerialdojo-gen config init",
-        "NAME.toml` writes a file with all of this as comments, `aerialdojo-gen config show [STAGE]` prints it",
-        "with the values of a pipeline. Paths are relative to the file. What several sections say of one thing",
-        "must agree; a contradiction is an error that says which way to go.",
+        "One TOML file with one section per stage; a key that does not exist is an error. `aerialdojo-gen",
+        "config init NAME.toml` writes a file with all of this as comments, `aerialdojo-gen config show",
+        "[STAGE]` prints it with the values of a pipeline. Paths are relative to the file. Contradictions between sections are",
+        "errors that name both keys.",
     ]
     # A section's own keys together, then those of the tables in it.
     order = list(dict.fromkeys(key.section for key in config_keys()))
@@ -98,10 +98,10 @@ def tables_page() -> str:
     out = [
         "# Tables",
         "",
-        "Every table is a folder of Parquet files, and every column says its unit and meaning in the field's",
-        "metadata, which is where this page has them from. World: x east, y north, z up, metres; yaw in radians,",
-        "counter-clockwise from +x. [The format](../release-format.md) tells more of the release's; the others",
-        "are what stages write for each other.",
+        "Every table is a folder of Parquet files. Units and meanings of columns are in the fields'",
+        "metadata; this page is generated from them. World: x east, y north, z up, metres; yaw in radians,",
+        "counter-clockwise from +x. [The format](../release-format.md) describes the release's tables; the",
+        "others are intermediate tables of the stages.",
     ]
     for name, place in LAYOUT.items():
         if name.endswith("/test"):
@@ -131,7 +131,7 @@ def python_page() -> str:
     out = [
         "# Python API",
         "",
-        "The names of `aerialdojo_gen.__all__`, and what an agent is made of. [In Python](../api.md) has",
+        "The names of `aerialdojo_gen.__all__`, and the classes of agents. [In Python](../api.md) has",
         "examples.",
     ]
     homes = {
