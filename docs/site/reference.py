@@ -67,8 +67,8 @@ def config_page() -> str:
         "",
         "One TOML file with one section per stage; a key that does not exist is an error. `aerialdojo-gen",
         "config init NAME.toml` writes a file with all of this as comments, `aerialdojo-gen config show",
-        "[STAGE]` prints it with the values of a pipeline. Paths are relative to the file. Contradictions between sections are",
-        "errors that name both keys.",
+        "[STAGE]` prints it with the values of a pipeline. Paths are relative to the file. Contradictions between",
+        "sections are errors that name both keys.",
     ]
     # A section's own keys together, then those of the tables in it.
     order = list(dict.fromkeys(key.section for key in config_keys()))
