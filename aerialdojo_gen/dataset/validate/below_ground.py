@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, place_text
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
@@ -58,7 +58,7 @@ def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     route = np.searchsorted(paths.first, pose[buried], side="right") - 1
     for k, first in zip(*np.unique(route, return_index=True), strict=True):
         at = int(np.flatnonzero(buried)[first])
-        position = f"below ground at {_place(points[at])}, after pose {pose[at] - paths.first[k]}"
+        position = f"below ground at {place_text(points[at])}, after pose {pose[at] - paths.first[k]}"
         yield Finding(int(paths.rows[k]), f"{position}, {int((route == k).sum())} samples of the way", "above ground")
 
 
@@ -68,11 +68,7 @@ def _buried(data: SceneData, places: Floats) -> Iterator[Finding]:
         return
     fit = np.flatnonzero((np.abs(places) < _FAR_M).all(axis=1))
     for row in fit[_below(ground, places[fit])]:
-        yield Finding(int(row), f"below ground at {_place(places[row])}", "above ground")
-
-
-def _place(p: Floats) -> str:
-    return "({:.3f}, {:.3f}, {:.3f}) m".format(*p.tolist())
+        yield Finding(int(row), f"below ground at {place_text(places[row])}", "above ground")
 
 
 def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
@@ -102,11 +98,7 @@ def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
 
 
 def _ground(data: SceneData) -> TriangleRayCaster | None:
-    if "ground" not in data.kept:
-        data.kept["ground"] = open_ground(scene_mesh(data).scene)
-    kept = data.kept["ground"]
-    assert kept is None or isinstance(kept, TriangleRayCaster)
-    return kept
+    return data.keep("ground", lambda: open_ground(scene_mesh(data).scene))
 
 
 def open_ground(scene: Scene) -> TriangleRayCaster | None:

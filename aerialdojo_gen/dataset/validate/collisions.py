@@ -28,11 +28,9 @@ _HALVINGS = 14
 def route_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
-    paths = data.paths
-    for k in data.sampled:
-        hit = _hit(world, corners(paths.xyz[paths.of(k)]), radius)
-        if hit:
-            yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
+    for k, row in data.sampled_routes():
+        if hit := _hit(world, corners(data.paths.xyz[data.paths.of(k)]), radius):
+            yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
 @check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
@@ -40,19 +38,15 @@ def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the replayed actions touches no surface."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
     paths = data.paths
-    skip = data.flagged("routes", ("list_lengths_differ", "action_order", "replay_differs"))
-    for k in data.sampled:
-        if skip[paths.rows[k]]:
-            continue
+    for k, row in data.sampled_routes("list_lengths_differ", "action_order", "replay_differs"):
         where = paths.of(k)
         start = (*paths.xyz[where][0], paths.yaw[where][0])
         flown = replay(start, paths.action[where][:-1])[:, :3]
         # Where the two agree to the last bit but for the Approach, the certificate above is this one too.
         if np.array_equal(flown[:-1], paths.xyz[where][:-1]):
             continue
-        hit = _hit(world, corners(flown), radius)
-        if hit:
-            yield Finding(int(paths.rows[k]), f"the body touches a surface {hit}", "a free sweep")
+        if hit := _hit(world, corners(flown), radius):
+            yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
 @check("routes", needs=("mesh",), after=(*_FITS, "route_collision"), samples=True)
@@ -61,11 +55,7 @@ def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     world = scene_mesh(data).world
     cap = data.pipeline.plan.clearance_cap_m
     stored, paths = rows.floats("min_clearance_m"), data.paths
-    skip = data.flagged("routes", (*_FITS, "route_collision", "null_value", "not_finite"))
-    for k in data.sampled:
-        row = int(paths.rows[k])
-        if skip[row]:
-            continue
+    for k, row in data.sampled_routes(*_FITS, "route_collision", "null_value", "not_finite"):
         legs, told = corners(paths.xyz[paths.of(k)]), float(stored[row])
         if told > cap + _CLEARANCE_M:
             yield Finding(row, f"{told:.6g} m", f"{cap:g} m at most")

@@ -9,7 +9,7 @@ counts, not only one that stands before its name, unless the thing's looks or it
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -70,10 +70,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
         i = index[str(node)]
         for name, column in texts.items():
             text = column[row] or ""
-            wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
-            wrong = wrong or _unborne(words, i, text) or _recoloured(instances[i], text)
-            wrong = wrong or _unlike(words, instances[i], text)
-            if wrong:
+            if wrong := _untrue(words, i, text) or _unlike(words, instances[i], text):
                 yield Finding(row, f"{name} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break
 
@@ -85,8 +82,7 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
     for row, (node, text) in enumerate(zip(rows.texts("mesh_node"), rows.texts("description"), strict=True)):
         distractors = ambiguity.distractors(index[str(node)], text or "") if node in index else []
-        if distractors:
-            others = ", ".join(instances[j].node for j in distractors[:3]) + ("..." if len(distractors) > 3 else "")
+        if others := _listed(instances, distractors):
             yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
 
 
@@ -100,11 +96,14 @@ def object_twins(data: SceneData, rows: Rows) -> Iterator[Finding]:
         twins = (
             ambiguity.first_sentence_distractors(index[str(node)], name or "", text or "") if node in index else []
         )
-        if twins:
-            others = ", ".join(instances[j].node for j in twins[:3]) + ("..." if len(twins) > 3 else "")
+        if others := _listed(instances, twins):
             yield Finding(
                 row, f"{text!r}, the first sentence of which fits {others} as well", "words that tell them apart"
             )
+
+
+def _listed(instances: Sequence[Instance], some: Sequence[int]) -> str:
+    return ", ".join(instances[j].node for j in some[:3]) + ("..." if len(some) > 3 else "")
 
 
 @check("objects", after=("object_words",))
@@ -129,9 +128,7 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
         if node not in geometry.index:
             continue
         i, text = geometry.index[str(node)], name or ""
-        wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
-        wrong = wrong or _unborne(words, i, text) or _recoloured(geometry.scene.instances[i], text)
-        wrong = wrong or _other_side(words, data, i, text)
+        wrong = _untrue(words, i, text) or _other_side(words, data, i, text)
         if first.setdefault(text.lower(), row) != row:
             wrong = f"as {rows.key(first[text.lower()])}"
         if wrong:
@@ -139,12 +136,12 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _words(data: SceneData, landmarks: bool = True) -> _Words:
-    kept = data.kept.get(f"words {landmarks}")
-    if isinstance(kept, _Words):
-        return kept
+    return data.keep(f"words {landmarks}", lambda: _read_words(data, landmarks))
+
+
+def _read_words(data: SceneData, landmarks: bool) -> _Words:
     scene = scene_mesh(data).scene
-    geometry = data.kept.setdefault("relations", SceneGeometry(scene))
-    assert isinstance(geometry, SceneGeometry)
+    geometry = data.keep("relations", lambda: SceneGeometry(scene))
     marks = data["landmarks"]
     nodes = [str(node) for node in marks.texts("mesh_node")]
     if not nodes or len(set(nodes)) < len(nodes) or not all(node in scene for node in nodes):
@@ -158,8 +155,7 @@ def _words(data: SceneData, landmarks: bool = True) -> _Words:
     ambiguity = make_ambiguity(scene, names, called if landmarks else {}, order, geometry)
     # A colour that nothing in the scene has is a colour all the same.
     ambiguity.lexicon.add_values("colour", _COLOURS)
-    made = data.kept[f"words {landmarks}"] = _Words(ambiguity, names, catalogue, Surface(scene))
-    return made
+    return _Words(ambiguity, names, catalogue, Surface(scene))
 
 
 @lru_cache(maxsize=2)
@@ -168,6 +164,12 @@ def _catalogue(folder: Path | None) -> Catalogue | None:
         return load_catalogue(folder) if folder else None
     except (AerialDojoError, OSError):
         return None
+
+
+def _untrue(words: _Words, i: int, text: str) -> str:
+    """Say what a text says of its thing, as a name, claim, value or colour, that is not so."""
+    wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
+    return wrong or _unborne(words, i, text) or _recoloured(words.ambiguity.geometry.scene.instances[i], text)
 
 
 def _misnamed(words: _Words, i: int, text: str) -> str:

@@ -51,11 +51,10 @@ _SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """No piece of a route is flown for nothing: the straight way between its ends is blocked, or hardly shorter."""
     world, room = scene_mesh(data).world, data.pipeline.embodiment.radius_m + _ROOM_M
-    paths, skip = data.paths, data.flagged("routes", _FITS)
-    for k in data.sampled.tolist():
-        row = int(paths.rows[k])
+    paths = data.paths
+    for k, row in data.sampled_routes(*_FITS):
         positions = paths.xyz[paths.of(k)]
-        if skip[row] or not np.isfinite(positions).all():
+        if not np.isfinite(positions).all():
             continue
         for first, last, flown, straight in _pieces(positions):
             if _straight_is_free(world, positions[first], positions[last], room):
@@ -106,11 +105,9 @@ def _flown_shorter(data: SceneData, k: int) -> float | None:
     Clearly is by `_SHORTER_M`, and by a share, of what routes are searched for: metres, and what they cost beside for
     surfaces that they come near and an Approach that does not fly ahead (`aerialdojo_gen.planning.preference`).
     """
-    planner = data.kept.get("wide")
-    if not isinstance(planner, Planner):
-        config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
-        planner = Planner(scene_mesh(data).scene, config, data.pipeline.embodiment.radius_m)
-        data.kept["wide"] = planner
+    config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
+    radius_m = data.pipeline.embodiment.radius_m
+    planner = data.keep("wide", lambda: Planner(scene_mesh(data).scene, config, radius_m))
     paths = data.paths
     where = paths.of(k)
     poses = np.column_stack([paths.xyz[where], paths.yaw[where]])

@@ -125,10 +125,8 @@ def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
     world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
     paths, stored = data.paths, rows.floats("straight_line_free")
-    skip = data.flagged("routes", _OF_ROUTE)
-    for k in data.sampled.tolist():
-        row = int(paths.rows[k])
-        if skip[row] or not np.isfinite(stored[row]):
+    for k, row in data.sampled_routes(*_OF_ROUTE):
+        if not np.isfinite(stored[row]):
             continue
         start, goal = paths.starts[k, :3], paths.ends[k, :3]
         free = bool(stored[row])
@@ -143,11 +141,10 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     things = {item.node: item for item in mesh.scene.instances}
     nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
     stored, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
-    skip = data.flagged("routes", _OF_ROUTE) | ~np.isfinite(stored)
     of_target: dict[int, list[int]] = {}
-    for k in data.sampled.tolist():
-        if not skip[paths.rows[k]]:
-            of_target.setdefault(int(data.target_of_route[paths.rows[k]]), []).append(k)
+    for k, row in data.sampled_routes(*_OF_ROUTE):
+        if np.isfinite(stored[row]):
+            of_target.setdefault(int(data.target_of_route[row]), []).append(k)
     camera = Camera(2, 2, 90.0)
     for target, routes in of_target.items():
         item = things.get(str(nodes[target])) if target >= 0 else None

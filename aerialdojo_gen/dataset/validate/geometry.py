@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, list_lengths
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, list_lengths, place_text
 from aerialdojo_gen.pipeline.stages.work.rules import KEPT, judge
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 
@@ -92,9 +92,8 @@ def out_of_bounds(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     route = np.searchsorted(paths.first, np.flatnonzero(outside), side="right") - 1
     for k, pose in zip(*np.unique(route, return_index=True), strict=True):
         step = int(np.flatnonzero(outside)[pose])
-        x, y, z = paths.xyz[step].tolist()
         box = f"{radius:g} m inside {_corner(low)} to {_corner(high)}"
-        yield Finding(int(paths.rows[k]), f"pose {step - paths.first[k]} at ({x:.3f}, {y:.3f}, {z:.3f}) m", box)
+        yield Finding(int(paths.rows[k]), f"pose {step - paths.first[k]} at {place_text(paths.xyz[step])}", box)
 
 
 def _judged(data: SceneData, rows: Rows) -> tuple[np.ndarray, np.ndarray, Floats, Floats]:

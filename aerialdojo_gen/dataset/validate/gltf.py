@@ -132,15 +132,15 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _document(data: SceneData) -> dict[str, Any]:
     """Return the glTF document, read once; `scene_mesh` raises if there is none."""
     scene_mesh(data)
-    kept = data.kept.get("gltf")
-    if not isinstance(kept, dict):
-        raw = mesh_path(data).read_bytes()
-        (length,) = struct.unpack_from("<I", raw, 12)
-        kept = json.loads(raw[20 : 20 + length])
-        data.kept["gltf"] = kept
-    if not isinstance(kept, dict):
+    document = data.keep("gltf", lambda: _parse(mesh_path(data).read_bytes()))
+    if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
-    return kept
+    return document
+
+
+def _parse(raw: bytes) -> Any:
+    (length,) = struct.unpack_from("<I", raw, 12)
+    return json.loads(raw[20 : 20 + length])
 
 
 def _placed(document: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Floats]]:

@@ -6,10 +6,11 @@ import zlib
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.base.pictures import decode_grey
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, repeated
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.casters import triangle_caster
@@ -57,25 +58,17 @@ def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", after=("image_missing", "image_damaged"))
 def image_blank(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture shows something."""
-    damaged = data.flagged("objects", ("image_damaged",))
-    for row, raw in enumerate(rows.column("reference_image")):
-        if raw.as_py() is None or damaged[row]:
-            continue
-        picture = decode_grey(raw.as_py())
-        if picture is not None and float(picture.std()) < _BLANK:
+    for row, picture in _decoded(data, rows, "image_damaged"):
+        if float(picture.std()) < _BLANK:
             yield Finding(row, f"grey values with a deviation of {float(picture.std()):.2f}", f"{_BLANK:g} at least")
 
 
 @check("objects", after=("image_missing", "image_damaged"))
 def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The object's box lies in its picture and is not empty, and its share of the pixels fits into it."""
-    damaged = data.flagged("objects", ("image_damaged",))
     boxes, fraction = rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
-    for row, raw in enumerate(rows.column("reference_image")):
-        if raw.as_py() is None or damaged[row] or np.isnan(boxes[row]).all():
-            continue
-        picture = decode_grey(raw.as_py())
-        if picture is None:
+    for row, picture in _decoded(data, rows, "image_damaged"):
+        if np.isnan(boxes[row]).all():
             continue
         height, width = picture.shape
         u0, v0, u1, v1 = boxes[row].tolist()
@@ -118,14 +111,11 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Box and share of pixels are those of the object as rays from the picture's camera find it."""
     mesh = scene_mesh(data)
     index = {node: k for k, node in enumerate(mesh.rays.nodes)}
-    skip = data.flagged("objects", ("image_damaged", "image_box", "object_node", "image_pose"))
+    places = rows.floats(*POSE)
     nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
-    for row, place in enumerate(rows.floats(*POSE)):
-        png = rows.column("reference_image")[row].as_py()
-        if png is None or skip[row] or not np.isfinite(place).all():
-            continue
-        picture = decode_grey(png)
-        if picture is None:
+    for row, picture in _decoded(data, rows, "image_damaged", "image_box", "object_node", "image_pose"):
+        place = places[row]
+        if not np.isfinite(place).all():
             continue
         camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
         pose = view_pose(place[:3], float(place[3]), "front")
@@ -149,12 +139,12 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     mesh = scene_mesh(data)
     first = dict(zip(mesh.rays.nodes, np.cumsum([0, *(len(i.faces) for i in mesh.scene.instances)]), strict=False))
     nodes, shown, missing = rows.texts("mesh_node"), rows.floats("tells_shown"), rows.texts("tells_missing")
-    triangles = triangle_caster(mesh.scene)
-    for row, place in enumerate(rows.floats(*POSE)):
-        png = rows.column("reference_image")[row].as_py()
+    triangles, places = triangle_caster(mesh.scene), rows.floats(*POSE)
+    for row, picture in _decoded(data, rows):
+        place = places[row]
         anatomy = mesh.scene[str(nodes[row])].anatomy if nodes[row] in mesh.scene else None
         tells = () if anatomy is None else anatomy.identifying_parts
-        if png is None or not np.isfinite(place).all() or (picture := decode_grey(png)) is None:
+        if not np.isfinite(place).all():
             continue
         if bool(tells) == bool(np.isnan(shown[row])):
             yield Finding(row, f"tells_shown = {shown[row]:g}", f"{'a share' if tells else 'null'}")
@@ -182,10 +172,17 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects")
 def image_id_twice(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture's id names one object."""
-    first: dict[str | None, int] = {}
-    for row, image_id in enumerate(rows.texts("reference_image_id")):
-        if first.setdefault(image_id, row) != row:
-            yield Finding(row, f"reference_image_id = {image_id!r}, as {rows.key(first[image_id])}", "its own")
+    ids = rows.texts("reference_image_id")
+    for row, first in repeated(ids):
+        yield Finding(row, f"reference_image_id = {ids[row]!r}, as {rows.key(first)}", "its own")
+
+
+def _decoded(data: SceneData, rows: Rows, *faults: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Rows with a picture that can be read, and it in grey; without those that have one of these faults."""
+    skip = data.flagged("objects", faults)
+    for row, raw in enumerate(rows.column("reference_image")):
+        if raw.is_valid and not skip[row] and (picture := decode_grey(raw.as_py())) is not None:
+            yield row, picture
 
 
 def _chunks(png: bytes) -> list[str]:

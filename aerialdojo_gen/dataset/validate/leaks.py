@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, repeated
 
 _START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
 _SAME_M = 1e-9
@@ -73,8 +73,6 @@ def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A start anchor and a target make one navigation task."""
     columns = [rows.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
     nav_ids = rows.texts("nav_id")
-    first: dict[tuple[int, ...], int] = {}
-    for row, key in enumerate(zip(*columns, strict=True)):
-        if first.setdefault(key, row) != row:
-            pair = f"{key[0]}_{key[1]}__{key[2]}"
-            yield Finding(row, f"start and target {pair} as {nav_ids[first[key]]}", "each pair once")
+    for row, first in repeated(zip(*columns, strict=True)):
+        start, anchor, target = (column[row] for column in columns)
+        yield Finding(row, f"start and target {start}_{anchor}__{target} as {nav_ids[first]}", "each pair once")

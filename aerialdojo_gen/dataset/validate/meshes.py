@@ -10,7 +10,7 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, place_text
 from aerialdojo_gen.dataset.validate.scene_mesh import mesh_path, mesh_place, scene_mesh, want_meshes
 from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.store.root import LocalRoot
@@ -127,10 +127,6 @@ def _other_box(data: SceneData, rows: Rows, size: np.ndarray | None) -> Iterator
             continue
         low, high = scene[str(node)].bounds
         if np.abs(centre[row] - (low + high) / 2).max() > _SAME_M:
-            yield Finding(row, f"centre {_triple(centre[row])}", _triple((low + high) / 2))
+            yield Finding(row, f"centre {place_text(centre[row], 4)}", place_text((low + high) / 2, 4))
         elif size is not None and np.abs(size[row] - (high - low)).max() > _SAME_M:
-            yield Finding(row, f"size {_triple(size[row])}", _triple(high - low))
-
-
-def _triple(v: np.ndarray) -> str:
-    return "({:.4f}, {:.4f}, {:.4f}) m".format(*v.tolist())
+            yield Finding(row, f"size {place_text(size[row], 4)}", place_text(high - low, 4))

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Mask, Rows, SceneData, place_text
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.rays import RayCaster
 
@@ -51,8 +51,7 @@ def _shut_in(data: SceneData, places: Floats) -> Iterator[Finding]:
     unique, which = np.unique(np.round(places[fit] / _SAME_M) * _SAME_M, axis=0, return_inverse=True)
     free = _have_a_way(data, unique)
     for row in fit[~free[which.reshape(-1)]]:
-        x, y, z = places[row].tolist()
-        yield Finding(int(row), f"shut in at ({x:.3f}, {y:.3f}, {z:.3f}) m", "a free way to the open sky")
+        yield Finding(int(row), f"shut in at {place_text(places[row])}", "a free way to the open sky")
 
 
 def _have_a_way(data: SceneData, places: Floats) -> Mask:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+T = TypeVar("T")
 
 LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 # What names a row to a person, where it is not the table's key without the scene.
@@ -85,6 +86,19 @@ def pose_text(pose: ArrayLike) -> str:
     """Write a pose, x, y, z in metres and yaw in radians."""
     x, y, z, yaw = np.asarray(pose, dtype=np.float64).tolist()
     return f"({x:.6g}, {y:.6g}, {z:.6g}) m, {yaw:.6g} rad"
+
+
+def place_text(place: Floats, digits: int = 3) -> str:
+    """Write a place, x, y, z in metres."""
+    return "(" + ", ".join(f"{value:.{digits}f}" for value in place.tolist()) + ") m"
+
+
+def repeated(keys: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
+    """Rows whose key an earlier row has, each with the first that has it."""
+    first: dict[Hashable, int] = {}
+    for row, key in enumerate(keys):
+        if first.setdefault(key, row) != row:
+            yield row, first[key]
 
 
 def unequal(a: pa.Array, b: pa.Array) -> Mask:
@@ -169,7 +183,7 @@ class SceneData:
     sample: int | None = None  # How many routes FCL checks; None for all
     pictures: int | None = None  # How many reference images are rendered again; None for all
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
-    kept: dict[str, object] = field(default_factory=dict)
+    kept: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Rows:
         """Return a table's rows."""
@@ -187,6 +201,20 @@ class SceneData:
             if (table, name) in self.faulty:
                 mask |= self.faulty[table, name]
         return mask
+
+    def keep(self, name: str, make: Callable[[], T]) -> T:
+        """Return what one check has made for all others, made now where none has."""
+        if name not in self.kept:
+            self.kept[name] = make()
+        kept: T = self.kept[name]
+        return kept
+
+    def sampled_routes(self, *faults: str) -> Iterator[tuple[int, int]]:
+        """Sampled routes without any of these faults: their places in `paths`, and their rows."""
+        skip = self.flagged("routes", faults)
+        for k in self.sampled.tolist():
+            if not skip[row := int(self.paths.rows[k])]:
+                yield k, row
 
     @cached_property
     def sampled(self) -> Ints:

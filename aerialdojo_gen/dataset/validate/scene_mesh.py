@@ -64,8 +64,5 @@ def scene_mesh(data: SceneData) -> SceneMesh:
     want_meshes(data)
     if data.flagged("scenes", MESH_CHECKS).any():
         raise UncheckedError("no mesh")
-    kept = data.kept.get("mesh")
-    if not isinstance(kept, SceneMesh):
-        digest = str(data["scenes"].texts("mesh_sha256")[0])
-        kept = data.kept["mesh"] = SceneMesh(open_scene(mesh_path(data), digest).scene)
-    return kept
+    digest = str(data["scenes"].texts("mesh_sha256")[0])
+    return data.keep("mesh", lambda: SceneMesh(open_scene(mesh_path(data), digest).scene))

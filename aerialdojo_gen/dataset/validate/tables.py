@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, repeated
 from aerialdojo_gen.store.layout import partition
 from aerialdojo_gen.store.schemas import DIRECTIONS, FAMILIES, SETTINGS, VIEWS
 
@@ -91,9 +91,8 @@ def duplicate_key(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     seen_rows: set[int] = set()
     for names in keys:
         columns = [rows.texts(name) for name in names]
-        first: dict[tuple[object, ...], int] = {}
-        for row, key in enumerate(zip(rows.part_of.tolist(), *columns, strict=True)):
-            if first.setdefault(key, row) != row and row not in seen_rows:
+        for row, _ in repeated(zip(rows.part_of.tolist(), *columns, strict=True)):
+            if row not in seen_rows:
                 seen_rows.add(row)
                 yield Finding(row, f"{', '.join(names)} stand twice", "once")
 
@@ -125,9 +124,7 @@ def route_in_both_subsets(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _in_both(rows: Rows) -> Iterator[Finding]:
-    part_of = rows.part_of.tolist()
-    first: dict[str | None, int] = {}
-    for row, nav_id in enumerate(rows.texts("nav_id")):
-        part = part_of[first.setdefault(nav_id, row)]
-        if part != part_of[row]:
-            yield Finding(row, f"{nav_id} stands in {rows.parts[part]} too", "one side of the split")
+    nav_ids = rows.texts("nav_id")
+    for row, first in repeated(nav_ids):
+        if rows.part(first) != rows.part(row):
+            yield Finding(row, f"{nav_ids[row]} stands in {rows.part(first)} too", "one side of the split")
