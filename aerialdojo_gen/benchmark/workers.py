@@ -15,7 +15,7 @@ from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
-from aerialdojo_gen.dataset.fingerprint import release_fingerprint
+from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
 from aerialdojo_gen.pipeline.executors.channels import WorkerChannel, at_end
 from aerialdojo_gen.store.root import DataRoot

@@ -99,23 +99,7 @@ def run_pipeline(
 
 
 def pipeline_file(given: str | Path | None = None) -> Path:
-    """Find a pipeline's file: as a path, else by its name among those that come with the program.
-
-    Parameters
-    ----------
-    given : str or Path, optional
-        A path, or a name such as ``smoke`` or ``smoke.toml``; the paper's pipeline where absent.
-
-    Returns
-    -------
-    Path
-        What is at that path goes before what has that name.
-
-    Raises
-    ------
-    ConfigError
-        There is neither; the message lists the names.
-    """
+    """Find a pipeline's file: as a path, else by its name among those that come with the program."""
     shipped = home() / "pipelines"
     path = Path(given) if given else shipped / DEFAULT_PIPELINE
     if path.is_file():
@@ -129,13 +113,7 @@ def pipeline_file(given: str | Path | None = None) -> Path:
 
 
 def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = False) -> Path | None:
-    """Find the file of a release's pipeline, shipped or beside the data directory; None if there is no release.
-
-    Raises
-    ------
-    UsageError
-        Several pipelines made the release; or its pipeline's file is not found, and the caller does not only read.
-    """
+    """Find the file of a release's pipeline, shipped or beside the data directory; None if there is no release."""
     from aerialdojo_gen.base.safe_parse import read_toml
     from aerialdojo_gen.dataset.provenance import pipeline_names
     from aerialdojo_gen.store.root import LocalRoot
@@ -161,29 +139,7 @@ def release_pipeline(data: DataRoot, folder: str = "release", *, reads: bool = F
 def open_pipeline(
     pipeline: str | Path | Pipeline | None, data: str | Path | DataRoot, *, reads: bool = False
 ) -> tuple[Pipeline, ProjectPaths]:
-    """Read the pipeline file and find the folders.
-
-    Parameters
-    ----------
-    pipeline : str, Path, Pipeline or None
-        The pipeline file as for `pipeline_file`, or what was read of one; None for that of the release in the data
-        directory, else the paper's.
-    data : str, Path or DataRoot
-        The data directory.
-    reads : bool
-        Nothing is written: where the file of the release's pipeline is not found, the paper's will do.
-
-    Returns
-    -------
-    Pipeline, Roots
-
-    Raises
-    ------
-    ConfigError
-        The file is missing or wrong.
-    UsageError
-        As for `release_pipeline`.
-    """
+    """Read the pipeline file (None: the release's, else the paper's) and find the folders; `reads`: write nothing."""
     from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
     from aerialdojo_gen.pipeline.stage import ProjectPaths
     from aerialdojo_gen.store.root import open_root
@@ -214,20 +170,8 @@ def run_stages(
     options: RunOptions | None = None,
     reporter: Reporter | None = None,
 ) -> list[StageSummary]:
-    """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date.
-
-    A scene without annotations is left out, with a warning that names the mend; the others are finished.
-
-    `scenes` are names or globs, the pipeline's own where absent.
-
-    Raises
-    ------
-    AssetError
-        No scene has annotations, and nothing was run; or one that was asked for by its full name, or by a
-        pipeline with the paper's numbers, has none, and all others are finished.
-    UsageError
-        The release would lose scenes that another pipeline made, and `replace` is not given; nothing was run.
-    """
+    """Run exactly these stages over the chosen scenes; after `split`, bring card and croissant.json up to date."""
+    # A scene without annotations is left out, with a warning that names the mend; the others are finished.
     from aerialdojo_gen.dataset.provenance import check_replaced
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.pipeline.freshness import cache_footers

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -191,6 +193,13 @@ def sizes(where: Where, scenes: list[str]) -> dict[str, int]:
         for name in SHARDS:
             total[table_and_split(name, scene)[0]] += root.size(part_name(name, scene))
     return total
+
+
+def release_fingerprint(data: Where) -> str:
+    """SHA-256, hexadecimal, of the names and meshes of a release's scenes: a trained policy depends on them."""
+    root, facts = open_root(data), ("scene", "mesh_sha256")
+    rows = [store.read_scene(root, "release/scenes", scene, facts).to_pylist() for scene in scenes_in_release(root)]
+    return hashlib.sha256(json.dumps(rows, sort_keys=True).encode()).hexdigest()
 
 
 def table_and_split(name: str, scene: str) -> tuple[str, str]:

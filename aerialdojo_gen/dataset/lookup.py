@@ -181,26 +181,7 @@ class FoundTask:
 
 
 def find_task(data: Where, task_id: str) -> FoundTask:
-    """Find a task of the release.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    task_id : str
-        A ``task_id`` or a ``nav_id``.
-
-    Returns
-    -------
-    FoundTask
-
-    Raises
-    ------
-    UsageError
-        There is no such task; the message names the nearest one, or how to list them.
-    StoreError
-        There is no release, or a part of it is missing or damaged.
-    """
+    """Find a task by its ``task_id`` or ``nav_id``; UsageError, which names the nearest, if there is none."""
     root = open_root(data)
     known = release_scenes(root)
     match = _TASK_ID.fullmatch(task_id)

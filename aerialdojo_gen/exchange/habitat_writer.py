@@ -10,8 +10,9 @@ import gzip
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -97,20 +98,11 @@ def _numbers(categories: Mapping[str, int]) -> dict[str, Any]:
     return {name: dict(categories) for name in names}
 
 
-class _gzip:  # noqa: N801 - used as a function
+@contextmanager
+def _gzip(path: Path) -> Iterator[gzip.GzipFile]:
     """A gzip file without a date or a name in it, so that the same release gives the same bytes."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> BinaryIO:
-        self._raw = self._path.open("wb")
-        self._file = gzip.GzipFile("", "wb", 6, self._raw, mtime=0)
-        return self._file  # type: ignore[return-value]
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-        self._raw.close()
+    with path.open("wb") as raw, gzip.GzipFile("", "wb", 6, raw, mtime=0) as file:
+        yield file
 
 
 def _goal(row: Mapping[str, Any], anchors: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -207,13 +207,7 @@ def pull_release(
 
 
 def scene_of(name: str) -> str:
-    """Return the scene that a file of a data set is a part or the mesh of; empty where it is neither.
-
-    Parameters
-    ----------
-    name : str
-        Path in the data set, as anybody may have written it.
-    """
+    """Return the scene that a file of a data set is a part or the mesh of; empty where it is neither."""
     stem = PurePosixPath(name).name.partition(".")[0].removeprefix("part-")
     if not is_plain(stem):
         return ""

@@ -23,6 +23,15 @@ EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.par
 GOAL = "observation.images.goal"
 STATE = ("x_ahead_m", "y_left_m", "z_up_m", "yaw_rad", "remaining_actions")
 ACTION = ("forward_m", "left_m", "up_m", "turn_rad", "stop")
+# Features that are no videos: their type, and the names of their numbers where they have several.
+_NUMBERS: dict[str, tuple[str, tuple[str, ...] | None]] = {
+    "observation.state": ("float32", STATE),
+    "action": ("float32", ACTION),
+    "discrete_action": ("int64", None),
+    "next.done": ("bool", None),
+    "timestamp": ("float32", None),
+    **dict.fromkeys(("frame_index", "episode_index", "index", "task_index"), ("int64", None)),
+}
 
 
 def _of_actions() -> NDArray[np.float32]:
@@ -57,37 +66,21 @@ def video_kinds(options: ExportOptions) -> dict[str, str]:
 
 def features(options: ExportOptions) -> dict[str, dict[str, Any]]:
     """Return the features of frames: their types, shapes, names, and how videos are to be read."""
+    videos = {key: _video(options, kind) for key, kind in video_kinds(options).items()}
     numbers = {
-        "observation.state": _feature("float32", len(STATE), list(STATE)),
-        "action": _feature("float32", len(ACTION), list(ACTION)),
-        "discrete_action": _feature("int64", 1, None),
-        "next.done": _feature("bool", 1, None),
-        "timestamp": _feature("float32", 1, None),
-        **{name: _feature("int64", 1, None) for name in ("frame_index", "episode_index", "index", "task_index")},
+        name: {"dtype": dtype, "shape": [len(names) if names else 1], "names": names and [*names]}
+        for name, (dtype, names) in _NUMBERS.items()
     }
-    return {**{key: _video(options, kind) for key, kind in video_kinds(options).items()}, **numbers}
+    return {**videos, **numbers}
 
 
 def frame_schema() -> pa.Schema:
     """Return the columns of ``data/``: all features that are no videos."""
-
-    def numbers(n: int) -> pa.DataType:
-        return pa.list_(pa.float32(), n)
-
+    kinds = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}
     return pa.schema(
-        [
-            ("observation.state", numbers(len(STATE))),
-            ("action", numbers(len(ACTION))),
-            ("discrete_action", pa.int64()),
-            ("next.done", pa.bool_()),
-            ("timestamp", pa.float32()),
-            *((name, pa.int64()) for name in ("frame_index", "episode_index", "index", "task_index")),
-        ]
+        (name, pa.list_(kinds[dtype], len(names)) if names else kinds[dtype])
+        for name, (dtype, names) in _NUMBERS.items()
     )
-
-
-def _feature(dtype: str, n: int, names: list[str] | None) -> dict[str, Any]:
-    return {"dtype": dtype, "shape": [n], "names": names}
 
 
 def _video(options: ExportOptions, kind: str) -> dict[str, Any]:

@@ -13,8 +13,7 @@ import numpy as np
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import mesh_of
-from aerialdojo_gen.dataset.contents import part_name
-from aerialdojo_gen.dataset.fingerprint import release_fingerprint
+from aerialdojo_gen.dataset.contents import part_name, release_fingerprint
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.learning.parts import DaggerRound, Exploration, Part, references
 from aerialdojo_gen.learning.steps import Steps, is_written, read_steps

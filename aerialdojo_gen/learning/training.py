@@ -20,7 +20,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import loads_json, read_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.dataset.fingerprint import release_fingerprint
+from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint

@@ -11,7 +11,7 @@ from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
 from aerialdojo_gen.base.config.sections import PlanConfig
-from aerialdojo_gen.dataset.reference_flight import Reference, fly, shortcoming
+from aerialdojo_gen.dataset.episode import Reference, fly, shortcoming
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.difficulty import agent_actions, difficulty_of, straight_lines_free
 from aerialdojo_gen.planning.flight_space import FlightSpace

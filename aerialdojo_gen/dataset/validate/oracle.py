@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M, SUCCESS_RADIUS_M
-from aerialdojo_gen.dataset.reference_flight import LEAST_SPL, Reference, fly, shortcoming
+from aerialdojo_gen.dataset.episode import LEAST_SPL, Reference, fly, shortcoming
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
