@@ -98,11 +98,7 @@ class Release:
             raise UsageError(f"{name} is one table, not split: leave split out")
         key = f"{name}/train" if name in _SPLIT else f"release/{name}"
         schema = store.LAYOUT[key].spec.schema
-        selected = list(columns) if columns is not None else None
-        with_split = name in _SPLIT and (selected is None or "split" in selected)
-        read = (
-            None if selected is None else [column for column in selected if column != "split" or name not in _SPLIT]
-        )
+        read = None if columns is None else [column for column in columns if column != "split" or name not in _SPLIT]
         for column in read or ():
             if column not in schema.names:
                 raise UsageError(unknown(f"no column of {name}", column, schema.names))
@@ -115,13 +111,11 @@ class Release:
                 subset = f"{store.partition(scene_name)}_{side}"
                 if subset in splits:
                     part = store.read_scene(self._data, f"{name}/{side}", scene_name, read)
-                    if with_split:
-                        part = part.append_column("split", pa.array([subset] * part.num_rows, pa.string()))
-                    parts.append(part)
+                    parts.append(part.append_column("split", pa.array([subset] * part.num_rows, pa.string())))
         if not parts:
             raise UsageError(f"no scene that was asked for has a part in {', '.join(splits)}")
         table = pa.concat_tables(parts)
-        return table if selected is None else table.select(selected)
+        return table if columns is None else table.select(list(columns))
 
     def tasks(
         self, *, split: str | Sequence[str] | None = None, scene: str | Sequence[str] | None = None

@@ -74,11 +74,7 @@ def _whole(made: Sequence[Made]) -> bool:
 
 
 def _figures(made: Sequence[Made]) -> tuple[int | float, ...]:
-    settings = [2 * sum(m.of(s) for m in made) for s in SETTINGS]
-    return (
-        sum(m.landmarks for m in made), sum(m.objects for m in made), *settings, sum(settings),
-        sum(m.path_m for m in made) / 1000,
-    )  # fmt: skip
+    return _sums(made, [2 * sum(m.of(s) for m in made) for s in SETTINGS])
 
 
 def _paper_figures(made: Sequence[Made]) -> tuple[int | float | None, ...]:
@@ -86,11 +82,13 @@ def _paper_figures(made: Sequence[Made]) -> tuple[int | float | None, ...]:
     rows = [m.paper for m in made if m.paper]
     if len(rows) < len(made):
         return (None,) * (len(_COUNTS) + 1)
-    settings = [2 * sum(row.tasks[s] for row in rows) for s in SETTINGS]
-    return (
-        sum(row.landmarks for row in rows), sum(row.objects for row in rows), *settings, sum(settings),
-        sum(row.path_m for row in rows) / 1000,
-    )  # fmt: skip
+    return _sums(rows, [2 * sum(row.tasks[s] for row in rows) for s in SETTINGS])
+
+
+def _sums(rows: Sequence[Made | PaperScene], settings: list[int]) -> tuple[int | float, ...]:
+    """Landmarks, objects, instances by setting and in all, and kilometres."""
+    counts = sum(row.landmarks for row in rows), sum(row.objects for row in rows), *settings, sum(settings)
+    return *counts, sum(row.path_m for row in rows) / 1000
 
 
 def in_paper_order(made: Sequence[Made]) -> list[Made]:

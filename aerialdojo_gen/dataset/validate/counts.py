@@ -11,7 +11,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.dataset.validate.parts import Release
-from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
+from aerialdojo_gen.dataset.validate.registry import Outcome
 from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
@@ -73,7 +73,7 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
     for name, n in expected.items():
         outcome.rows += 1
         if found[name] != n:
-            outcome.faults.append(Fault("scene_counts", data.scene, "", "", name, f"{found[name]:,}", f"{n:,}"))
+            outcome.fault(f"{found[name]:,}", f"{n:,}", scene=data.scene, key=name)
     return outcome
 
 
@@ -105,9 +105,7 @@ def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipel
             outcome.rows += 1
             found = sum(tally.routes[folder, setting] for tally in tallies)
             if found != n:
-                outcome.faults.append(
-                    Fault("split_counts", "", "", f"routes/{folder}", f"{setting} tasks", f"{found:,}", f"{n:,}")
-                )
+                outcome.fault(f"{found:,}", f"{n:,}", part=f"routes/{folder}", key=f"{setting} tasks")
     return ""
 
 
@@ -118,7 +116,7 @@ def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipelin
     outcome.rows = 1
     if abs(found - expected) > _PATH_SHARE * expected:
         stated = f"{found / 1000:,.1f} km", f"{expected / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
-        outcome.faults.append(Fault("path_total", "", "routes", "", "", *stated))
+        outcome.fault(*stated, table="routes")
     return ""
 
 
@@ -126,7 +124,7 @@ def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipelin
     card = _text(release, "README.md")
     if card is None:
         outcome.rows = 1
-        outcome.faults.append(Fault("card_counts", "", "", "README.md", "", "no file", "the dataset card"))
+        outcome.fault("no file", "the dataset card", part="README.md")
         return ""
     stated = _of_card(card)
     machine = _text(release, "croissant.json")
@@ -134,9 +132,7 @@ def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipelin
         try:
             stated += _of_croissant(machine)
         except (ValueError, KeyError, TypeError):
-            outcome.faults.append(
-                Fault("card_counts", "", "", "croissant.json", "", "no record sets", "a Croissant description")
-            )
+            outcome.fault("no record sets", "a Croissant description", part="croissant.json")
     for file, table, folder, n in stated:
         outcome.rows += 1
         if table == "tasks":
@@ -144,7 +140,7 @@ def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipelin
         else:
             found = sum(k for tally in tallies for (name, _), k in tally.routes.items() if name == folder)
         if n != found:
-            outcome.faults.append(Fault("card_counts", "", table, file, folder, f"{n:,} rows told", f"{found:,}"))
+            outcome.fault(f"{n:,} rows told", f"{found:,}", table=table, part=file, key=folder)
     return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
 
 
@@ -179,8 +175,8 @@ def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipe
         for image_id in tally.images:
             outcome.rows += 1
             if first.setdefault(image_id, tally.scene) != tally.scene:
-                stated = f"reference_image_id={image_id}", f"of {first[image_id]} too", "one scene"
-                outcome.faults.append(Fault("image_id_shared", tally.scene, "objects", "", *stated))
+                key, found = f"reference_image_id={image_id}", f"of {first[image_id]} too"
+                outcome.fault(found, "one scene", scene=tally.scene, table="objects", key=key)
     return ""
 
 

@@ -1,19 +1,48 @@
-"""Checks that `tasks` tells an agent nothing of the target's place, and that no task stands there twice."""
+"""Checks that `tasks` tells an agent nothing of the target's place, and that no task stands there twice.
+
+Ids reveal nothing either: made with a key, not to be enumerated, and independent of all that is withheld. Where the
+pipeline has the salt that the release was made with, every id is computed again. Where it has not, ids are held
+against the hashes that anybody could compute, and against chance: whether their digits go with the target, the start,
+the landmark, the direction or the length more often than digits that were drawn.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, repeated
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, repeated
+from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id, reference_id
 
 _START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
 _SAME_M = 1e-9
 # Digits with a decimal point: no description of the project's has any, a coordinate always does.
 _DECIMAL = re.compile(r"\d[.,]\d")
+_DIGITS = 12
+# Standard deviations from chance beyond which digits tell something, and drawings that chance is measured by.
+_DEVIATIONS, _DRAWINGS = 7.0, 24
+# Fewer ids than this tell nothing about chance.
+_FEW = 40
+_LENGTH_BINS = 8
+# A route whose ends are not its own has been named: its id is another pair's for that reason.
+_OTHER_PAIR = (
+    "duplicate_key", "duplicate_route", "unknown_target", "unknown_start", "start_anchor", "goal_anchor",
+    "end_position",
+)  # fmt: skip
+_HASHES: tuple[Callable[[bytes], str], ...] = (
+    lambda raw: hashlib.blake2b(raw, digest_size=6).hexdigest(),
+    lambda raw: hashlib.blake2b(raw).hexdigest()[:_DIGITS],
+    lambda raw: hashlib.md5(raw, usedforsecurity=False).hexdigest()[:_DIGITS],
+    lambda raw: hashlib.sha1(raw, usedforsecurity=False).hexdigest()[:_DIGITS],
+    lambda raw: hashlib.sha256(raw).hexdigest()[:_DIGITS],
+    lambda raw: f"{zlib.crc32(raw):012x}",
+)
 
 
 @check("tasks")
@@ -21,11 +50,11 @@ def telling_id(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Ids are the scene and a hash: an agent reads no object out of them."""
     nav = re.compile(re.escape(data.scene) + r"-[0-9a-f]{12}")
     columns = (rows.texts("nav_id"), rows.texts("task_id"), rows.texts("modality"), rows.texts("reference_image_id"))
-    for row, (nav_id, task_id, modality, image) in enumerate(zip(*columns, strict=True)):
-        if not nav.fullmatch(str(nav_id)):
-            yield Finding(row, f"nav_id = {nav_id!r}", f"{data.scene}-<12 hexadecimal digits>")
-        elif task_id != f"{nav_id}-{str(modality)[:1]}":
-            yield Finding(row, f"task_id = {task_id!r}", f"{nav_id}-{str(modality)[:1]}")
+    for row, (own, task_id, modality, image) in enumerate(zip(*columns, strict=True)):
+        if not nav.fullmatch(str(own)):
+            yield Finding(row, f"nav_id = {own!r}", f"{data.scene}-<12 hexadecimal digits>")
+        elif task_id != f"{own}-{str(modality)[:1]}":
+            yield Finding(row, f"task_id = {task_id!r}", f"{own}-{str(modality)[:1]}")
         elif image is not None and not re.fullmatch(r"ref_[0-9a-f]{12}", image):
             yield Finding(row, f"reference_image_id = {image!r}", "ref_<12 hexadecimal digits>")
 
@@ -71,8 +100,128 @@ def _leaked(own: Floats, secret: Floats, start: Floats) -> Floats:
 @check("routes", after=("duplicate_key", "route_in_both_subsets"))
 def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A start anchor and a target make one navigation task."""
+    pairs, nav_ids = _pairs(rows), rows.texts("nav_id")
+    for row, first in repeated(pairs):
+        yield Finding(row, f"start and target {pairs[row]} as {nav_ids[first]}", "each pair once")
+
+
+@check("routes", after=("duplicate_key", "unknown_target", "unknown_start"))
+def nav_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A nav_id is no hash of its start and target that anybody could compute."""
+    for row, (pair, digits) in enumerate(zip(_pairs(rows), _digits(data, rows), strict=True)):
+        if _guessed(data.scene, pair, digits):
+            yield Finding(row, f"…-{digits}, a plain hash of the pair {pair}", "a hash with a key")
+
+
+@check("objects")
+def image_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture's id is no hash of its object that anybody could compute."""
+    ids = zip(rows.ints("object_id").tolist(), rows.texts("mesh_node"), rows.texts("reference_image_id"), strict=True)
+    for row, (object_id, node, image_id) in enumerate(ids):
+        digits = str(image_id).removeprefix("ref_")
+        if any(_guessed(data.scene, word, digits) for word in (str(object_id), str(node))):
+            yield Finding(row, f"{image_id}, a plain hash of the object", "a hash with a key")
+
+
+@check("routes", after=(*_OTHER_PAIR, "nav_id_guessed"))
+def nav_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A nav_id is what the pipeline's salt makes of its start and target."""
+    key = key_of(data.pipeline.split.salt, data.pipeline.seed)
+    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in _pairs(rows)])
+
+
+@check("objects", after=("image_id_guessed", "image_id_twice"))
+def image_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A picture's id is what the pipeline's salt makes of its object."""
+    key = key_of(data.pipeline.split.salt, data.pipeline.seed)
+    expected = [reference_id(data.scene, k, key) for k in rows.ints("object_id").tolist()]
+    yield from _unlike(rows.texts("reference_image_id"), expected)
+
+
+@check("routes", needs=("objects",), after=("duplicate_key", "unknown_target", "nav_id_guessed", "nav_id_of_salt"))
+def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Digits and order of nav_ids are independent of target, start, landmark, direction, category and length."""
+    odd = data.flagged("routes", ("duplicate_key", "unknown_target"))
+    fit = np.flatnonzero(~odd)
+    digits = [text for k, text in enumerate(_digits(data, rows)) if not odd[k]]
+    if len(fit) < _FEW:
+        raise UncheckedError(f"fewer than {_FEW} ids")
+    objects, target = data["objects"], data.target_of_route[fit]
+    length = rows.floats("length_m")[fit]
+    secrets = {
+        "target_object_id": _codes(rows.ints("target_object_id")[fit].tolist()),
+        "start_object_id": _codes(rows.ints("start_object_id")[fit].tolist()),
+        **{
+            name: _codes(np.asarray(objects.column(name).to_pylist(), dtype=object)[target].tolist())
+            for name in ("landmark_id", "direction", "category")
+        },
+        "setting": _codes(np.asarray(rows.texts("setting"), dtype=object)[fit].tolist()),
+        "length_m": np.searchsorted(np.quantile(length, np.linspace(0, 1, _LENGTH_BINS + 1)[1:-1]), length),
+    }
+    order = np.argsort(np.array(digits), kind="stable")
+    backwards = np.argsort(np.array([text[::-1] for text in digits]), kind="stable")
+    parts = {f"digit {k + 1}": _codes([text[k : k + 1] for text in digits]) for k in range(_DIGITS)}
+    parts |= {f"digits {k + 1} and {k + 2}": _codes([text[k : k + 2] for text in digits]) for k in (0, _DIGITS - 2)}
+    for name, secret in secrets.items():
+        tests = {words: _shared(part, secret) for words, part in parts.items()}
+        tests |= {"order": _neighbours(order, secret), "order from the end": _neighbours(backwards, secret)}
+        for words, statistic in tests.items():
+            rng = generator(0, "validate", data.scene, name, words)
+            drawn = [statistic(rng.permutation(len(secret))) for _ in range(_DRAWINGS)]
+            # Counts that hardly vary by chance are given the deviation of a count.
+            deviation = max(float(np.std(drawn)), float(np.sqrt(np.mean(drawn))), 1.0)
+            off = (statistic(np.arange(len(secret))) - float(np.mean(drawn))) / deviation
+            if off > _DEVIATIONS:
+                found = f"nav_ids whose {words} goes with {name}, {off:.0f} standard deviations above chance"
+                yield Finding(int(fit[0]), found, f"{_DEVIATIONS:g} at most, as of digits that were drawn")
+                break
+
+
+def _pairs(rows: Rows) -> list[str]:
     columns = [rows.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
-    nav_ids = rows.texts("nav_id")
-    for row, first in repeated(zip(*columns, strict=True)):
-        start, anchor, target = (column[row] for column in columns)
-        yield Finding(row, f"start and target {start}_{anchor}__{target} as {nav_ids[first]}", "each pair once")
+    return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
+
+
+def _digits(data: SceneData, rows: Rows) -> list[str]:
+    return [str(text).removeprefix(f"{data.scene}-") for text in rows.texts("nav_id")]
+
+
+def _guessed(scene: str, name: str, digits: str) -> bool:
+    texts = (f"{scene}/{name}", name, f"{scene}-{name}", f"{scene}_{name}")
+    return any(make(text.encode()) == digits for text in texts for make in _HASHES)
+
+
+def _unlike(ids: Sequence[str | None], expected: Sequence[str]) -> Iterator[Finding]:
+    off = [row for row, (own, made) in enumerate(zip(ids, expected, strict=True)) if own != made]
+    if 2 * len(off) > len(ids):
+        raise UncheckedError("the release was made with another salt than the pipeline's")
+    # An id of another form is told by `telling_id`.
+    for row in (row for row in off if re.search(r"[-_][0-9a-f]{12}$", str(ids[row]))):
+        yield Finding(row, str(ids[row]), expected[row])
+
+
+def _codes(values: Sequence[object]) -> Ints:
+    """Number the values, equal ones alike, (n,) int64."""
+    known: dict[object, int] = {}
+    return np.array([known.setdefault(value, len(known)) for value in values], dtype=np.int64)
+
+
+def _shared(part: Ints, secret: Ints) -> Callable[[Ints], float]:
+    """Pairs of rows that share both a part of their ids and a secret, by how the secrets are dealt out."""
+    width = int(secret.max(initial=0)) + 1
+
+    def count(dealt: Ints) -> float:
+        cells = np.bincount(part * width + secret[dealt]).astype(np.float64)
+        return float((cells * (cells - 1)).sum() / 2)
+
+    return count
+
+
+def _neighbours(order: Ints, secret: Ints) -> Callable[[Ints], float]:
+    """Ids next to each other in their order that share a secret, by how the secrets are dealt out."""
+
+    def count(dealt: Ints) -> float:
+        sorted_secrets = secret[dealt][order]
+        return float((sorted_secrets[1:] == sorted_secrets[:-1]).sum())
+
+    return count

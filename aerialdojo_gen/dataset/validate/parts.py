@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.errors import DamagedFile
 from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, part_name
-from aerialdojo_gen.dataset.validate.registry import Fault, Outcome
+from aerialdojo_gen.dataset.validate.registry import Outcome
 from aerialdojo_gen.dataset.validate.rows import Rows
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.parquet_files import read_file
@@ -91,9 +91,7 @@ def foreign_files(release: Release, scenes: list[str]) -> Outcome:
         outcome.rows += 1
         if relative.as_posix() in expected or relative.parts[0] in _BESIDE:
             continue
-        outcome.faults.append(
-            Fault("foreign_file", "", "", relative.as_posix(), "", "a file that is no part of a release", "none")
-        )
+        outcome.fault("a file that is no part of a release", "none", part=relative.as_posix())
     return outcome
 
 
@@ -139,7 +137,7 @@ def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], run
     name, where = release.name(relative), release.at(relative)
 
     def fault(check: str, what: str, expected: str) -> None:
-        found[check].faults.append(Fault(check, scene, spec.name, relative, "", what, expected))
+        found[check].fault(what, expected, scene=scene, table=spec.name, part=relative)
 
     found["part_missing"].rows += 1
     try:
@@ -182,8 +180,8 @@ def _one_run(scene: str, runs: dict[str, str], outcome: Outcome) -> None:
     outcome.rows = len(runs)
     for fingerprint, _ in Counter(runs.values()).most_common()[1:]:
         for part in (part for part, own in runs.items() if own == fingerprint):
-            fault_text = f"written by run {fingerprint[:12] or '(none)'}", "the run of the scene's other parts"
-            outcome.faults.append(Fault(outcome.check, scene, "", part, "", *fault_text))
+            written = f"written by run {fingerprint[:12] or '(none)'}"
+            outcome.fault(written, "the run of the scene's other parts", scene=scene, part=part)
 
 
 def _schema_faults(spec: TableSpec, table: pa.Table, extra: list[str]) -> Iterator[str]:

@@ -65,6 +65,12 @@ class Outcome:
     skipped: str = ""  # Why nothing was checked; empty if it was
     warnings: list[Fault] = field(default_factory=list)  # Rows to report that are no fault
 
+    def fault(
+        self, found: str, expected: str, *, scene: str = "", table: str = "", part: str = "", key: str = ""
+    ) -> None:
+        """Add a fault of this check."""
+        self.faults.append(Fault(self.check, scene, table, part, key, found, expected))
+
 
 CHECKS: list[Check] = []
 
