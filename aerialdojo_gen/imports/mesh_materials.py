@@ -36,6 +36,11 @@ def add_materials(
 
 def _paint(node: RawNode, body: Any, place: dict[int, int], surfaces: tuple[RawSurface, ...]) -> RawNode:
     n, visual, node = len(body.faces), body.visual, replace(node, surfaces=surfaces)
+    painted = {"face": n, "vertex": len(body.vertices)}.get(visual.kind)
+    if painted is not None and len(getattr(visual, f"{visual.kind}_colors")) != painted:
+        # A damaged file, or one whose polygons were cut into triangles without their colours.
+        note = f"its colours do not match its {'faces' if visual.kind == 'face' else 'vertices'}: drawn in grey"
+        return replace(node, surfaces=(*surfaces, RawSurface(notes=(note,))))
     if visual.kind == "face":
         return replace(node, colours=np.asarray(visual.face_colors[:, :3], dtype=np.uint8))
     corners = empty_corners(n)
