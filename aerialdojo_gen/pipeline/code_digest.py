@@ -49,6 +49,7 @@ BY_NAME: dict[str, tuple[str, ...]] = {
     "pipeline.stage": (),
     "rendering.gl": ("moderngl",),
     "scenes.builders": ("scenes.builders.*",),
+    "scenes.kit": ("scenes.kit.*",),
     "scenes.layouts.build": ("scenes.layouts.*",),
 }
 

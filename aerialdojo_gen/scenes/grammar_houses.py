@@ -15,6 +15,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame, Parts, block
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import Material
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import prism
 from aerialdojo_gen.scenes.site import Site
@@ -28,10 +29,10 @@ class HouseStyle:
     depth_m: float = 8.0
     storeys: int = 2  # Number and height of its storeys
     storey_m: float = 2.8
-    wall: str = "planks:#d8d2c2"
-    roof: str = "shingles"  # Materials
-    trim: str = "#f2efe6"
-    door: str = "#8a2f2a"
+    wall: Material = "planks:#d8d2c2"
+    roof: Material = "shingles"  # Materials
+    trim: Material = "#f2efe6"
+    door: Material = "#8a2f2a"
     roof_kind: str = "gable"  # ``"gable"`` or ``"hip"``, and the ridge's height over the eaves
     roof_m: float = 2.6
     porch_m: float = 0.0  # Depth of a roofed porch on posts along the front; 0 for a hood over the door

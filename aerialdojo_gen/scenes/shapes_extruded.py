@@ -15,7 +15,7 @@ from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
-from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _positive, number, rows_of, whole
+from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, number, rows_of, whole
 
 _SECTIONS = ("gable", "wedge", "trapezoid")
 
@@ -53,6 +53,14 @@ def profile(*, points: Sequence[Numbers], width: float) -> Mesh:
     body = extrude(_checked(Polygon(outline) if len(outline) > 2 else None), width)
     a, b, c = body.vertices.T
     return Mesh(np.column_stack([a, width / 2 - c, b]), body.faces)
+
+
+def block(*, corners: Numbers, z: Numbers) -> Mesh:
+    """Make an axis-parallel block from ``[x0, y0, x1, y1]`` between two heights, metres."""
+    x0, y0, x1, y1 = _numbers("corners", corners, 4)
+    z0, z1 = _numbers("z", z, 2)
+    body = extrude(Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), z1 - z0)
+    return Mesh(body.vertices + np.array([0.0, 0.0, z0]), body.faces, body.corner_uv)
 
 
 def sweep(

@@ -18,7 +18,7 @@ SHAPES: dict[str, Callable[..., Mesh]] = {
     for f in (
         shapes.box, shapes.cylinder, shapes.cone, shapes.sphere, shapes.capsule, shapes.torus, shapes.lathe,
         shapes.sheet, shapes.crown, shapes_extruded.prism, shapes_extruded.polygon, shapes_extruded.profile,
-        shapes_extruded.sweep, lettering.text,
+        shapes_extruded.sweep, shapes_extruded.block, lettering.text,
     )
 }  # fmt: skip
 PLACEMENT_KEYS = frozenset({"shape", "role", "at", "rotate", "tag", "array", "ring", "mirror"})

@@ -14,6 +14,7 @@ from aerialdojo_gen.pipeline.code_digest import _is_cut, stage_code
 from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.scenes.plans.build import is_plan
 from aerialdojo_gen.scenes.recipe import load_recipe
 
 SOURCES = Path(aerialdojo_gen.__file__).parent
@@ -21,7 +22,8 @@ PROJECT = SOURCES.parent
 ASSETS = PROJECT / "scene_assets"
 # Layouts of real places have no scene among the 42.
 PLACES = PROJECT / "tests" / "layouts" / "places"
-RECIPES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml"), *PLACES.glob("*.toml")])
+FILES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml"), *PLACES.glob("*.toml")])
+RECIPES = [path for path in FILES if not is_plan(path)]
 BUILD = BY_NAME["build-scenes"]
 # It calls the layouts, and belongs to none.
 ENGINE = "aerialdojo_gen.scenes.layouts.build"
@@ -56,7 +58,7 @@ def test_what_one_type_alone_uses_lies_in_its_folder_and_what_several_share_in_p
                 users.setdefault(part, set()).add(home)
     for module, homes in users.items():
         families = {home.rpartition(".")[0] for home in homes}
-        place = "aerialdojo_gen.scenes.layouts.parts" if len(families) > 1 else f"{min(families)}.parts"
+        place = "aerialdojo_gen.scenes.kit" if len(families) > 1 else f"{min(families)}.parts"
         assert module.rpartition(".")[0] == (min(homes) if len(homes) == 1 else place), (module, sorted(homes))
 
 
@@ -98,18 +100,14 @@ def test_what_a_process_imports_to_build_a_type_is_what_counts():
 
 @pytest.mark.parametrize(
     ("module", "users"),
-    [("urban.mall.shops", {"mall"}), ("natural.parts.strata", {"desert", "snowfield"}), ("parts.structures", None)],
+    [("urban.mall.shops", {"mall"}), ("natural.parts.strata", {"desert", "snowfield"})],
 )
 def test_a_layout_counts_what_it_is_built_with_and_nothing_else(module, users):
     name = f"aerialdojo_gen.scenes.layouts.{module}"
     counting = {
         load_recipe(recipe).layout for recipe in RECIPES if name in stage_code(BUILD.name, chosen(recipe)).parts
     }
-    if users is None:
-        assert {"mall", "harbor", "island"} <= counting
-        assert not {"mountain", "snowfield", "desert", "forest", "courtyard"} & counting
-    else:
-        assert counting == users
+    assert counting == users
 
 
 def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tmp_path):

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.forest.layout import _SPOTS
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 _ELSEWHERE = {"in the wood", "beside a path", "beside the stream"}

@@ -181,7 +181,7 @@ def test_another_seed_makes_another_scene(assets):
         (
             "[inventory]\npost = 4",
             "[inventory]\npost = 9",
-            "inventory: the layout placed too few of post (needs 9, has 4)",
+            "inventory: the scene has too few of post (needs 9, has 4)",
         ),
         ("seed = 3", "seed = ", "Invalid value"),
     ],

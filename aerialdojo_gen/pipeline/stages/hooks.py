@@ -36,7 +36,7 @@ def layout_of(roots: ProjectPaths, scene: str) -> tuple[str, ...] | None:
         recipe = _recipe_header(roots.recipes / f"{scene}.toml")
     except (AssetError, OSError, UnicodeDecodeError):
         return None
-    if "imported" in recipe:
+    if "imported" in recipe or "plan" in recipe:
         return ()
     module = layouts.layout_modules().get(str(recipe.get("layout")))
     return (f"{layouts.__name__}.{module}",) if module else None

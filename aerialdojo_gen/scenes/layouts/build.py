@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from collections import Counter
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +15,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.plans.build import build_plan, check_inventory, is_plan
 from aerialdojo_gen.scenes.recipe import Imported, Recipe, load_imported, load_recipe, validated
 from aerialdojo_gen.scenes.site import Site
 
@@ -44,6 +44,8 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
     imported = load_imported(recipe_path)
     if imported is not None:
         return _imported(recipe_path, imported)
+    if is_plan(recipe_path):
+        return build_plan(recipe_path, catalogue)
     recipe = load_recipe(recipe_path)
     layout = _layout(recipe, recipe_path)
     _check_names(recipe, recipe_path, catalogue)
@@ -62,7 +64,7 @@ def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
     except AssetError as error:
         raise AssetError(f"{recipe_path}: layout {recipe.layout!r}: {error}") from error
     scene = site.scene()
-    _check_inventory(scene, recipe, recipe_path)
+    check_inventory(scene, recipe, recipe_path)
     return scene
 
 
@@ -94,10 +96,3 @@ def _check_names(recipe: Recipe, path: Path, catalogue: Catalogue) -> None:
     for category in recipe.inventory:
         if category not in catalogue:
             raise AssetError(f"{path}: inventory: unknown category {category!r}{nearest(category, catalogue)}")
-
-
-def _check_inventory(scene: Scene, recipe: Recipe, path: Path) -> None:
-    found = Counter(i.category for i in scene.instances)
-    short = [f"{c} (needs {n}, has {found[c]})" for c, n in recipe.inventory.items() if found[c] < n]
-    if short:
-        raise AssetError(f"{path}: inventory: the layout placed too few of {', '.join(short)}")

@@ -11,6 +11,8 @@ from shapely.geometry import LineString, Polygon
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.structures import columns
 from aerialdojo_gen.scenes.layouts.disaster.earthquake.old_town_things import furnish_town
 from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
 from aerialdojo_gen.scenes.layouts.disaster.parts.ground import (
@@ -24,8 +26,6 @@ from aerialdojo_gen.scenes.layouts.disaster.parts.ground import (
 from aerialdojo_gen.scenes.layouts.disaster.parts.relief import leaning_poles
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, Parts, torn_floor
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.parts.structures import columns
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site

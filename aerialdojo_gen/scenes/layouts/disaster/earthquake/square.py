@@ -11,13 +11,13 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.disaster.earthquake.square_things import furnish_square
 from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
 from aerialdojo_gen.scenes.layouts.disaster.parts.ground import cracks, faulted, heaped, slab_pile, strew_chunks
 from aerialdojo_gen.scenes.layouts.disaster.parts.relief import leaning_poles
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 

@@ -10,8 +10,8 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.kit.structures import block, columns, railing
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import XY, Parts, tilted_plate, torn_wall
-from aerialdojo_gen.scenes.layouts.parts.structures import block, columns, railing
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box, cylinder

@@ -12,6 +12,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.disaster.explosion.industry import pipe_bridge, twisted_steel
 from aerialdojo_gen.scenes.layouts.disaster.explosion.street_things import furnish_street
 from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
@@ -25,7 +26,6 @@ from aerialdojo_gen.scenes.layouts.disaster.parts.ground import (
 )
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site

@@ -12,6 +12,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_streets import parking_row
 from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.disaster.explosion.industry import (
     Hall,
     burst_tank,
@@ -24,7 +25,6 @@ from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
 from aerialdojo_gen.scenes.layouts.disaster.parts.ground import crater, faulted, heaped, strew_chunks
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain

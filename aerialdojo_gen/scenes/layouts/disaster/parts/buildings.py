@@ -11,6 +11,7 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.structures import block
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import (
     XY,
     Parts,
@@ -22,7 +23,6 @@ from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import (
     torn_wall,
 )
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
-from aerialdojo_gen.scenes.layouts.parts.structures import block
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box

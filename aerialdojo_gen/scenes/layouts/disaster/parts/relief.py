@@ -11,9 +11,9 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Parts
 from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site

@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, railing
+from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 

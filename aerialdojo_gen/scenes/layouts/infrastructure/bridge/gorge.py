@@ -13,9 +13,9 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.kit.structures import Parts, block, letters, railing
 from aerialdojo_gen.scenes.layouts.infrastructure.bridge.decks import Deck, approach
 from aerialdojo_gen.scenes.layouts.infrastructure.bridge.gorge_things import furnish_gorge
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, letters, railing
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site

@@ -9,8 +9,8 @@ from shapely.geometry import LineString
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import place_wild, settled_z
 from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import things
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z, wild
 from aerialdojo_gen.scenes.site import Site
 
 _FOOTWAY_M = 0.12
@@ -57,7 +57,7 @@ def _below(site: Site, stream_x: Callable[[float], float]) -> None:
     def bank(dx: float, y: float) -> tuple[float, float]:
         return stream_x(y) + dx, y
 
-    wild(site, "at the bottom of the gorge", [
+    place_wild(site, "at the bottom of the gorge", [
         ("dome_tent", *bank(6.0, 14.0), 200.0), ("campfire", *bank(4.6, 9.4), 0.0),
         ("tent", *bank(-6.4, -13.0), 40.0),
         ("stone_cairn", *bank(-5.4, 8.0), 0.0), ("fallen_log", *bank(5.2, -9.0), 30.0),
@@ -73,11 +73,11 @@ def _below(site: Site, stream_x: Callable[[float], float]) -> None:
 
 
 def _rims(site: Site) -> None:
-    wild(site, "on the east rim", [
+    place_wild(site, "on the east rim", [
         ("hunting_stand", 33.0, 27.0, 200.0), ("standing_stone", 29.6, -18.0, 0.0), ("stone_arch", 33.0, -24.0, 20.0),
         ("wooden_gate", 38.6, 21.6, 70.0), ("beehive", 30.4, -30.0, 0.0), ("trail_signpost", 36.0, 18.8, 0.0),
     ])  # fmt: skip
-    wild(site, "on the west rim", [
+    place_wild(site, "on the west rim", [
         ("log_pile", -33.0, 14.0, 0.0), ("ruined_wall", -33.0, 22.0, 30.0), ("hay_bales", -38.0, -24.0, 0.0),
         ("stone_well", -39.6, 12.0, 0.0), ("weather_station", -31.0, -20.0, 0.0), ("tractor", -43.0, -23.0, 40.0),
     ])  # fmt: skip

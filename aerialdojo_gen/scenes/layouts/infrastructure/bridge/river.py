@@ -12,9 +12,9 @@ import numpy as np
 from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, letters, railing, stairs
 from aerialdojo_gen.scenes.layouts.infrastructure.bridge.decks import Deck, approach
 from aerialdojo_gen.scenes.layouts.infrastructure.bridge.river_things import furnish_river
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy, letters, railing, stairs
 from aerialdojo_gen.scenes.mesh import Floats, merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain

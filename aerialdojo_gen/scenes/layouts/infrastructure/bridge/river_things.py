@@ -5,8 +5,8 @@ from __future__ import annotations
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import place_wild, settled_z
 from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import things
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z, wild
 from aerialdojo_gen.scenes.site import Site
 
 _WATER_M, _FOOTWAY_M = -12.0, 0.12
@@ -88,7 +88,7 @@ def _river(site: Site) -> None:
 
 
 def _east(site: Site) -> None:
-    wild(site, "on the river beach", [
+    place_wild(site, "on the river beach", [
         ("canoe", 32.8, 16.0, 40.0), ("picnic_table", 36.0, 22.0, 0.0), ("campfire", 34.6, -14.0, 0.0),
         ("canoe", 32.6, -21.0, 70.0), ("deck_chair", 35.6, 11.0, 180.0), ("beach_umbrella_set", 34.8, 30.0, 180.0),
         ("dome_tent", 37.4, -20.0, 180.0), ("stone_cairn", 36.8, 4.0, 0.0), ("reed_clump", 30.6, 25.0, 0.0),

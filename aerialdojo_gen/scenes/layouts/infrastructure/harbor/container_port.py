@@ -7,6 +7,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.ferry import build_ferry_berth
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.fishing_basin import build_fishing_basin
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
@@ -21,7 +22,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
     quay,
     set_out,
 )
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns
 from aerialdojo_gen.scenes.mesh import merge, translated
 from aerialdojo_gen.scenes.shapes import cone
 from aerialdojo_gen.scenes.shapes_extruded import sweep

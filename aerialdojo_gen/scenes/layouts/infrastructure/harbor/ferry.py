@@ -7,6 +7,7 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
     QUAY_M,
     dashes,
@@ -16,7 +17,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
     open_shed,
     set_out,
 )
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes_extruded import profile
 from aerialdojo_gen.scenes.site import Site

@@ -10,6 +10,7 @@ from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import Pose, smooth_path
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.kit.structures import Parts, block, stairs
 from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
     QUAY_M,
     breakwater,
@@ -22,7 +23,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import (
     quay,
     set_out,
 )
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, stairs
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes_extruded import profile
 from aerialdojo_gen.scenes.site import Site

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.grammar_buildings import pitched_roof
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import Polyline, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, letters
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, crown, cylinder
 from aerialdojo_gen.scenes.site import Site

@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, Point, block
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box, cylinder

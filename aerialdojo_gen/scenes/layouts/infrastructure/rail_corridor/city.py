@@ -11,6 +11,7 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters, railing, stairs
 from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
     ballast,
     footbridge_roof,
@@ -22,7 +23,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
     wires,
 )
 from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.city_things import furnish_city
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy, columns, letters, railing, stairs
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 

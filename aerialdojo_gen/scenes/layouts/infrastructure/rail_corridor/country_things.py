@@ -9,8 +9,8 @@ from shapely.geometry import LineString
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.natural_ground import keep_clear, place_wild, settled_z
 from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import RAIL_M, things, train
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import keep_clear, settled_z, wild
 from aerialdojo_gen.scenes.site import Site
 
 _PLATFORM_M = 1.05
@@ -101,7 +101,7 @@ def _street(site: Site) -> None:
 def _valley(site: Site, brook_x: Callable[[float], float]) -> None:
     path = [(brook_x(y) - 7.0, y) for y in (-30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0)]
     x = {round(y): px for px, y in path}
-    wild(site, "on the bank of the brook", [
+    place_wild(site, "on the bank of the brook", [
         ("picnic_table", x[10] - 2.4, 9.0, 20.0), ("information_board", x[-10] - 1.8, -8.0, 0.0),
         ("campfire", x[-20] + 3.0, -17.5, 0.0), ("tent", x[-20] - 0.6, -21.5, 60.0),
         ("dome_tent", x[20] + 2.6, 17.0, 200.0),
@@ -110,8 +110,8 @@ def _valley(site: Site, brook_x: Callable[[float], float]) -> None:
         ("trail_signpost", x[0] + 2.2, 5.4, 0.0), ("bench", x[-10] + 1.8, -6.0, 0.0),
         ("deer", x[20] - 3.0, 17.0, 30.0),
     ])  # fmt: skip
-    wild(site, "under the viaduct", [("canoe", 21.8, 1.4, 80.0), ("log_pile", 20.0, -1.6, 0.0)])
-    wild(site, "on the slope of the valley", [
+    place_wild(site, "under the viaduct", [("canoe", 21.8, 1.4, 80.0), ("log_pile", 20.0, -1.6, 0.0)])
+    place_wild(site, "on the slope of the valley", [
         ("fallen_log", 17.6, 12.0, 30.0), ("rock_pile", 19.4, -9.0, 0.0), ("hunting_stand", 17.0, -18.0, 0.0),
         ("boulder", 21.0, 7.6, 0.0), ("boulder", 47.0, 12.0, 50.0), ("fox", 15.6, 8.6, 200.0),
         ("dead_tree", 14.5, 26.0, 0.0),

@@ -13,6 +13,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.coast.cove_things import GROUPS
 from aerialdojo_gen.scenes.layouts.natural.parts.quays import bars, field_wall, flight, mole, pier
 from aerialdojo_gen.scenes.layouts.natural.parts.shore import (
@@ -27,7 +28,6 @@ from aerialdojo_gen.scenes.layouts.natural.parts.shore import (
     steep_area,
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import patches, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.site import Site
 

@@ -16,6 +16,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import along
 from aerialdojo_gen.scenes.grammar_streets import streets
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy
 from aerialdojo_gen.scenes.layouts.natural.coast.resort_things import GROUPS
 from aerialdojo_gen.scenes.layouts.natural.parts.quays import (
     bars,
@@ -37,7 +38,6 @@ from aerialdojo_gen.scenes.layouts.natural.parts.shore import (
     steep_area,
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import patches, strew
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.site import Site
 

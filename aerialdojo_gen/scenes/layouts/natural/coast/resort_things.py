@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import Thing
+from aerialdojo_gen.scenes.kit.natural_ground import Thing
 
 _DECK = 4.52
 _ROOF_FLATS = 9.0 + 4 * 3.2

@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.desert.mudbrick import House, Wall, build_house, build_wall, wall_area
 from aerialdojo_gen.scenes.layouts.natural.desert.sands import dunes, wash
 from aerialdojo_gen.scenes.layouts.natural.parts.groups import (
@@ -27,7 +28,6 @@ from aerialdojo_gen.scenes.layouts.natural.parts.groups import (
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.strata import Rock, put_up, raise_foot
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import near, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound
 from aerialdojo_gen.scenes.values import At, Degrees, Hill, Length, Line, LineOrNone, Size2, Step

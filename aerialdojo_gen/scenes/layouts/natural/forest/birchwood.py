@@ -14,9 +14,9 @@ from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab, smooth_path
 from aerialdojo_gen.scenes.ground import ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob, keep_clear
 from aerialdojo_gen.scenes.layouts.natural.parts.groups import Group, level_ground, plan_groups, set_out
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import Species, near, patches, plant, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob, keep_clear
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import Thing
+from aerialdojo_gen.scenes.kit.natural_ground import Thing
 
 _PORCH = {"place": "on the cabin's porch"}
 _DECK = {"place": "on the fire tower's deck"}

@@ -16,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import place_along, smooth_path
 from aerialdojo_gen.scenes.ground import disc, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import Spot, Thing, blob, keep_clear, place_near
 from aerialdojo_gen.scenes.layouts.natural.forest.birchwood import BirchWood, build_birch_wood
 from aerialdojo_gen.scenes.layouts.natural.forest.forest_things import (
     APIARY,
@@ -29,7 +30,6 @@ from aerialdojo_gen.scenes.layouts.natural.forest.forest_things import (
     TOWER,
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import Species, near, patches, plant, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import Spot, Thing, blob, furnish, keep_clear
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
@@ -171,9 +171,9 @@ def _furnish(site: Site) -> None:
         "apiary": APIARY, "crossroads": CROSSROADS,
     }  # fmt: skip
     for key, things in groups.items():
-        furnish(site, _SPOTS[key], things)
+        place_near(site, _SPOTS[key], things)
     for place, things in STRAYS.items():
-        furnish(site, Spot(0.0, 0.0, 0.0, place), things)
+        place_near(site, Spot(0.0, 0.0, 0.0, place), things)
     corner = [_SPOTS["cabin"].world(*xy) for xy in ((-6.8, -4.5), (-6.8, 4.8), (-1.0, 7.4))]
     words = {"place": "behind the log cabin"}
     fence = place_along(site, "wooden_fence", corner, 2.4, turn_deg=90.0, variant="brown", attributes=words)

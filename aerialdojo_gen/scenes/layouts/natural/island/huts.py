@@ -7,8 +7,8 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, stairs
 from aerialdojo_gen.scenes.layouts.natural.parts.quays import bars
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box

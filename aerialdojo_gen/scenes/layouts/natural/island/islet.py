@@ -14,6 +14,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.island.huts import boathouse, drying_rack
 from aerialdojo_gen.scenes.layouts.natural.island.islet_things import GROUPS
 from aerialdojo_gen.scenes.layouts.natural.parts.quays import field_wall, pier
@@ -28,7 +29,6 @@ from aerialdojo_gen.scenes.layouts.natural.parts.shore import (
     steep_area,
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import patches, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.site import Site
 

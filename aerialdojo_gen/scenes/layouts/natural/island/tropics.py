@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.island.huts import stilt_hut
 from aerialdojo_gen.scenes.layouts.natural.island.tropics_things import GROUPS
 from aerialdojo_gen.scenes.layouts.natural.parts.quays import pier
@@ -29,7 +30,6 @@ from aerialdojo_gen.scenes.layouts.natural.parts.shore import (
     steep_area,
 )
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import patches, strew
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.site import Site
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import Thing
+from aerialdojo_gen.scenes.kit.natural_ground import Thing
 
 _JETTY, _WALK = 1.5, 1.72
 _OFF = {"place": "off the north shore"}

@@ -20,7 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.ground import disc
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain

@@ -13,7 +13,7 @@ from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, Point, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box, cylinder

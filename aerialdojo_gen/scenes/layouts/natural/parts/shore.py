@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import Spot, Thing, blob, furnish
+from aerialdojo_gen.scenes.kit.natural_ground import Spot, Thing, blob, place_near
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import crown, cylinder
@@ -106,13 +106,13 @@ def _dense(line: BaseGeometry, spacing_m: float) -> list[shapely.Point]:
 def settle(site: Site, place: str, things: Sequence[Thing], margin_m: float = 1.2) -> None:
     """Set things out by world coordinates, each of the variant that is rarest so far where none is asked for.
 
-    Unlike in `furnish`, a thing's `lift_m` is its base's z: decks and roofs over water have no ground to count from.
+    Unlike in `place_near`, `lift_m` is the z of a base: decks and roofs over water have no ground to count from.
     """
     datum = site.ground_z(0.0, 0.0)
     for thing in things:
         variant = thing.variant or next_variant(site, thing.category)
         lift = None if thing.lift_m is None else thing.lift_m - datum
-        furnish(site, Spot(0.0, 0.0, 0.0, place), [replace(thing, variant=variant, lift_m=lift)], margin_m)
+        place_near(site, Spot(0.0, 0.0, 0.0, place), [replace(thing, variant=variant, lift_m=lift)], margin_m)
 
 
 def boulders(

@@ -15,8 +15,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.parts.groups import Deck
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.mesh import Mesh
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain

@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import downhill_deg, settled_z
+from aerialdojo_gen.scenes.kit.natural_ground import downhill_deg, settled_z
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 

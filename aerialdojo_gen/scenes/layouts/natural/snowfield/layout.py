@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import along, smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.layouts.natural.parts.groups import (
     Deck,
     Group,
@@ -37,7 +38,6 @@ from aerialdojo_gen.scenes.layouts.natural.snowfield.winter import (
     moguls,
     slope_ground,
 )
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 from aerialdojo_gen.scenes.values import Hill, Length, Line, LineOrNone, Metres

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.layouts.places.parts.heights import Heights
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain

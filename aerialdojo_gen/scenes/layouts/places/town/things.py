@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose, place_along, poisson_disc, wall
 from aerialdojo_gen.scenes.grammar_streets import parking_row
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import settled_z
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.layouts.places.town.buildings import building_base
 from aerialdojo_gen.scenes.layouts.places.town.model import Area, Barrier, Building, Parameters, Road, Thing
 from aerialdojo_gen.scenes.layouts.places.town.roofs import PARAPET_M

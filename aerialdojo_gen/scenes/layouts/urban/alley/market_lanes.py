@@ -5,7 +5,7 @@ from __future__ import annotations
 from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, canopy, deck
+from aerialdojo_gen.scenes.kit.structures import Parts, canopy, deck
 from aerialdojo_gen.scenes.layouts.urban.alley.walls import (
     Box,
     awning,

@@ -7,7 +7,7 @@ import numpy as np
 from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, Point, block, deck, railing, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, deck, railing, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box, sphere

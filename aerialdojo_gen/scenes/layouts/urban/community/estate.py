@@ -9,7 +9,7 @@ from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, letters
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.site import Site
 

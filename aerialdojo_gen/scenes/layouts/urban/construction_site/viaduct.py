@@ -10,7 +10,7 @@ from shapely.geometry import LineString
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, smooth_path
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, parapet, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, block, parapet, stairs
 from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import scaffold
 from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, roughened
 from aerialdojo_gen.scenes.layouts.urban.parts.halls import across_x

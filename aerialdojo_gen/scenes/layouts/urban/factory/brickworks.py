@@ -10,7 +10,7 @@ from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, block, stairs
 from aerialdojo_gen.scenes.layouts.urban.factory.plant import gallery
 from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, ramped, roughened, shaped
 from aerialdojo_gen.scenes.layouts.urban.parts.halls import Hall, flat_roof, gable_roof, open_shed, put_up_hall

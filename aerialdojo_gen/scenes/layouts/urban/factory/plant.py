@@ -9,7 +9,7 @@ import numpy as np
 from shapely.geometry import LineString
 
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, block, stairs
 from aerialdojo_gen.scenes.layouts.urban.parts.industry import (
     Point3,
     bars,

@@ -7,7 +7,7 @@ from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy, columns, letters, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters, stairs
 from aerialdojo_gen.scenes.layouts.urban.factory.plant import bund, gallery, pipe_bridge, platform_tower
 from aerialdojo_gen.scenes.layouts.urban.parts.halls import (
     Hall,

@@ -14,7 +14,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import (
+from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
     canopy,

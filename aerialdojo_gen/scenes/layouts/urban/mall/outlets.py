@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import (
+from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
     canopy,

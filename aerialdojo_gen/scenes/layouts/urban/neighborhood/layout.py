@@ -15,7 +15,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy
 from aerialdojo_gen.scenes.layouts.urban.neighborhood.houses import (
     Lot,
     back_garden,

@@ -17,8 +17,8 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, deck, railing, spaced, stairs
+from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, deck, railing, spaced, stairs
 from aerialdojo_gen.scenes.layouts.urban.park.rides import (
     booths,
     entrance_gate,

@@ -11,7 +11,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, columns, letters
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes import box, cone, cylinder, sphere

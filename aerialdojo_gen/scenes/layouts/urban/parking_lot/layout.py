@@ -14,7 +14,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, canopy, columns, letters
+from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters
 from aerialdojo_gen.scenes.layouts.urban.parking_lot import park_and_ride
 from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars, parking_deck
 from aerialdojo_gen.scenes.site import Site

@@ -11,7 +11,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, streets
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import (
+from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
     canopy,

@@ -17,7 +17,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of, ribbon
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block
+from aerialdojo_gen.scenes.kit.structures import Parts, block
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import sweep

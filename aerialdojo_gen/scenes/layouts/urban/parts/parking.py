@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.grammar_streets import parking_row
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import (
+from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     Point,
     block,

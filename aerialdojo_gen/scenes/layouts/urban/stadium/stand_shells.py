@@ -15,7 +15,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block
+from aerialdojo_gen.scenes.kit.structures import Parts, block
 from aerialdojo_gen.scenes.layouts.urban.stadium.stands import Tier
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep

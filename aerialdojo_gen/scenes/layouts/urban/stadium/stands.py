@@ -18,7 +18,7 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts
+from aerialdojo_gen.scenes.kit.structures import Parts
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
 from aerialdojo_gen.scenes.shapes import box
 

@@ -6,7 +6,6 @@ is hidden.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,13 +16,14 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house, window_parts
-from aerialdojo_gen.scenes.grammar_props import next_variant, put
-from aerialdojo_gen.scenes.grammar_scatter import Polyline, Pose, poisson_disc, slab
+from aerialdojo_gen.scenes.grammar_props import put
+from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.parts.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.parts.structures import Parts, block, letters
+from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
@@ -33,14 +33,16 @@ CELL_M = 1.0
 _SLOPE_M = 6.0
 
 
-def water_level(site: Site) -> Terrain:
+@ground_builder
+def water_level(site: Site, _terrain: Terrain | None = None) -> Terrain:
     """Make the level water that everything else rises from."""
     return rolling_terrain(site.recipe.size_m, CELL_M, 1, 0.0, 50.0, 1)
 
 
-def raised(terrain: Terrain, crest: BaseGeometry, height_m: float, slope_m: float = _SLOPE_M) -> Terrain:
+@ground_builder
+def raise_bank(_site: Site, terrain: Terrain, *, area: Area, to_m: Number, slope_m: Number = _SLOPE_M) -> Terrain:
     """Raise a bank: level on its crest, with slopes of `slope_m` down to the water."""
-    return terrain.flattened(crest, height_m, slope_m)
+    return terrain.flattened(area, to_m, slope_m)
 
 
 def dry(crest: BaseGeometry, slope_m: float = _SLOPE_M) -> BaseGeometry:
@@ -48,17 +50,27 @@ def dry(crest: BaseGeometry, slope_m: float = _SLOPE_M) -> BaseGeometry:
     return crest.buffer(1.5 * CELL_M + 0.82 * slope_m, quad_segs=4)
 
 
-def paint_bank(site: Site, crests: Sequence[BaseGeometry], way: str, slope_m: float = _SLOPE_M) -> None:
+@site_builder
+def paint_bank(site: Site, crests: list[Area], way: Material, slope_m: Number = _SLOPE_M) -> None:
     """Paint banks: mud at the waterline, grass on the slopes, and a track on the crest."""
     area = shapely.union_all([dry(c, slope_m) for c in crests])
     rim = [area.boundary.interpolate(s) for s in np.arange(0.0, area.length, 3.4)]
     lobes = [blob(p.x, p.y, 1.3, site.recipe.seed + k, 0.5, 14) for k, p in enumerate(rim)]
     site.paint(shapely.union_all([area.buffer(0.7), *lobes]), site.material("mud", "mud"))
     site.paint(area.buffer(-0.5), site.material("bank", "grass"))
-    site.paint(shapely.union_all([c.buffer(0.9) for c in crests]), site.material(way, "gravel"))
+    site.paint(shapely.union_all([c.buffer(0.9) for c in crests]), way)
 
 
-def streaks(site: Site, paths: Sequence[Polyline], width_m: float) -> None:
+@site_builder
+def paint_island(site: Site, area: Area, slope_m: Number, way: Material) -> None:
+    """Paint a bank about a level place: mud at the waterline, grass on the slopes, and the place itself."""
+    site.paint(dry(area, slope_m).buffer(0.6), site.material("mud", "mud"))
+    site.paint(dry(area, slope_m).buffer(-0.4), site.material("bank", "grass"))
+    site.paint(area, way)
+
+
+@site_builder
+def streaks(site: Site, paths: list[Line], width_m: Number) -> None:
     """Paint lighter streaks of fast water along paths."""
     rng = site.rng_for("streaks")
     for path in paths:
@@ -73,21 +85,23 @@ def streaks(site: Site, paths: Sequence[Polyline], width_m: float) -> None:
             site.paint(translate(rotate(lens, yaw, origin=(0, 0)), x, y), site.material("foam", "water:#a8947a"))
 
 
-def flooded_house(site: Site, frame: Frame, style: HouseStyle) -> Instance:
+@site_builder
+def flooded_house(site: Site, at: At, yaw_deg: Number, style: HouseStyle) -> None:
     """Put up a house that stands in water up to its lower window sills, with a line of dirt above it."""
-    built = house(site, frame, style, z=-DEPTH_M)
+    frame = Frame(*at, yaw_deg)
+    house(site, frame, style, z=-DEPTH_M)
     d, w = style.depth_m / 2 + 0.03, style.width_m / 2 + 0.03
     ring = rectangle(-d, -w, d, w).difference(rectangle(-d + 0.05, -w + 0.05, d - 0.05, w - 0.05))
     stain = frame.area(ring)
     parts: Parts = [(site.material("stain", "mud:#8a7152"), _band(stain))]
     site.add(None, "water_mark", parts)
-    return built
 
 
+@site_builder
 def flat_house(
-    site: Site, x0: float, y0: float, x1: float, y1: float, *, storeys: int, wall: str, name: str = "",
-    facing_deg: float = -90.0, trim: str = "#f2efe6", roof: str = "gravel", door: str = "wood",
-    parapet_m: float = 0.35,
+    site: Site, box: tuple[Number, Number, Number, Number], *, storeys: int, wall: Material, name: str = "",
+    facing_deg: Number = -90.0, trim: Material = "#f2efe6", roof: Material = "gravel", door: Material = "wood",
+    parapet_m: Number = 0.35,
 ) -> float:  # fmt: skip
     """Put up a building with a flat roof that people can flee to; gives the height of its roof, metres.
 
@@ -95,7 +109,7 @@ def flat_house(
     ----------
     site : Site
         Where; the building takes its ground.
-    x0, y0, x1, y1 : float
+    box : (x0, y0, x1, y1)
         Its plan, metres.
     storeys : int
         Of 3.1 m each.
@@ -108,6 +122,7 @@ def flat_house(
     parapet_m : float
         Height of the rim of its roof.
     """
+    x0, y0, x1, y1 = box
     plan, top = rectangle(x0, y0, x1, y1), storeys * 3.1 - DEPTH_M + 0.3
     rim = plan.buffer(0.12, join_style="mitre").difference(plan.buffer(-0.25, join_style="mitre"))
     parts: Parts = [
@@ -149,18 +164,8 @@ def flat_house(
     return top
 
 
-def wade(site: Site, category: str, x: float, y: float, yaw_deg: float, place: str, depth_m: float = 0.0) -> Instance:
-    """Place a thing in the water, let down by a depth; 0 takes almost half of its height, at most the flood's."""
-    if not depth_m:
-        look = next_variant(site, category)
-        trial = site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, look)
-        depth_m = min(0.47 * float(trial.bounds[1, 2]), DEPTH_M)
-    return put(site, category, x, y, yaw_deg, place, z=-depth_m)
-
-
-def drift(
-    site: Site, area: BaseGeometry, categories: Sequence[str], spacing_m: float, limit: int, place: str
-) -> None:
+@site_builder
+def drift(site: Site, area: Area, categories: list[str], spacing_m: Number, limit: int, place: str) -> None:
     """Let things drift about an area, a category after the other."""
     rng = site.rng_for("drift", place)
     count = 0
@@ -173,20 +178,8 @@ def drift(
             count += 1
 
 
-def on_roof(site: Site, things: Sequence[tuple[str, float, float, float]], z_m: float, place: str) -> None:
-    """Set things (category, x, y, yaw) out on a roof."""
-    for category, x, y, yaw in things:
-        put(site, category, x, y, yaw, place, z=z_m)
-
-
-def standing_trees(site: Site, poses: Sequence[Pose], categories: Sequence[str]) -> None:
-    """Plant trees whose feet are under water."""
-    for k, pose in enumerate(poses):
-        category = categories[k % len(categories)]
-        site.try_place(category, *pose, z=-0.9, variant=next_variant(site, category))
-
-
-def wires(site: Site, heads: Sequence[tuple[float, float, float]], sag_m: float = 0.7) -> None:
+@site_builder
+def wires(site: Site, heads: list[tuple[Number, Number, Number]], sag_m: Number = 0.7) -> None:
     """Hang a power line of two wires between the heads of poles, with the poles themselves."""
     parts: Parts = []
     for x, y, z in heads:

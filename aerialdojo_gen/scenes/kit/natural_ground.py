@@ -63,7 +63,7 @@ class Spot:
         return float(self.x + c * x - s * y), float(self.y + s * x + c * y)
 
 
-def furnish(site: Site, spot: Spot, things: Sequence[Thing], margin_m: float = 1.3) -> list[Instance]:
+def place_near(site: Site, spot: Spot, things: Sequence[Thing], margin_m: float = 1.3) -> list[Instance]:
     """Set a group out and keep the room around every thing, so that trees leave it to be seen and flown around.
 
     Parameters
@@ -121,7 +121,7 @@ def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, c
     return Polygon(np.column_stack([x + r * np.cos(angles), y + r * np.sin(angles)]))
 
 
-def wild(site: Site, place: str, spots: Sequence[tuple[str, float, float, float]]) -> None:
+def place_wild(site: Site, place: str, spots: Sequence[tuple[str, float, float, float]]) -> None:
     """Set out props on uneven ground and keep the room around them."""
     for category, x, y, yaw in spots:
         instance = site.place(

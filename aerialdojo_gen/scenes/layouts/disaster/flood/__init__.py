@@ -1,1 +1,0 @@
-"""A flood: a village street under brown water behind a broken dyke, or a farm on its mound in a drowned polder."""

@@ -1,0 +1,214 @@
+"""From a plan to a scene: reads the TOML, resolves its names, and builds entry by entry."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from aerialdojo_gen.base.errors import AssetError, ShapeError, brief
+from aerialdojo_gen.base.explain import explain
+from aerialdojo_gen.base.names import nearest, unknown
+from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
+from aerialdojo_gen.scenes.ground import disc
+from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
+from aerialdojo_gen.scenes.plans.placing import Placement, place, poses_of, prop_height
+from aerialdojo_gen.scenes.plans.values import PlanNames
+from aerialdojo_gen.scenes.recipe import Recipe, validated
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import flat_terrain
+from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
+
+Model = TypeVar("Model", bound=BaseModel)
+_HEAD_KEYS = (
+    "seed",
+    "size_m",
+    "ceiling_m",
+    "sky",
+    "sun",
+    "palette",
+    "inventory",
+    "attribution",
+    "origin",
+    "level",
+    "moves",
+)
+
+
+def build_plan(path: Path, catalogue: Catalogue) -> Scene:
+    """Build the scene of a plan; an `AssetError` names file, entry and key."""
+    head = validated(PlanHead, read_toml(path, AssetError), str(path))
+    recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
+    names = _names(head, catalogue, str(path))
+    site = Site(path.stem, recipe, catalogue)
+    _Building(site, names, str(path)).build(head)
+    scene = site.scene()
+    check_inventory(scene, recipe, path)
+    return scene
+
+
+def is_plan(path: Path) -> bool:
+    """Whether a scene's file is a plan."""
+    return "plan" in read_toml(path, AssetError)
+
+
+def check_inventory(scene: Scene, recipe: Recipe, path: Path) -> None:
+    """Raise an `AssetError` if a scene has fewer instances of a category than its file asks for."""
+    found = Counter(instance.category for instance in scene.instances)
+    short = [f"{c} (needs {n}, has {found[c]})" for c, n in recipe.inventory.items() if found[c] < n]
+    if short:
+        raise AssetError(f"{path}: inventory: the scene has too few of {', '.join(short)}")
+
+
+def _names(head: PlanHead, catalogue: Catalogue, where: str) -> PlanNames:
+    names = PlanNames(catalogue.materials, head.palette)
+    for role, spec in head.palette.items():
+        catalogue.materials.check(spec, f"{where}: palette {role}")
+    tables: list[tuple[str, Mapping[str, Any], dict[str, Any], Callable[[Any], Any]]] = [
+        ("floor_m", head.floor_m, names.heights, names.number),
+        ("lines", head.lines, names.lines, names.line),
+        ("areas", head.areas, names.areas, names.area),
+    ]
+    for table, given, known, resolve in tables:
+        for name, value in given.items():
+            try:
+                known[name] = resolve(value)
+            except ValueError as error:
+                raise AssetError(f"{where}: [{table}] {brief(name)}: {error}") from None
+    return names
+
+
+class _Building:
+    """Builds the entries of one plan."""
+
+    def __init__(self, site: Site, names: PlanNames, where: str) -> None:
+        self._site, self._names, self._where = site, names, where
+
+    def build(self, head: PlanHead) -> None:
+        """Make the ground and then every entry, in order."""
+        self._ground(head.ground)
+        kinds: dict[str, Callable[[dict[str, Any], str], None]] = {
+            "paint": self._paint, "make": self._make, "parts": self._structure, "place": self._place,
+            "pattern": self._place,
+        }  # fmt: skip
+        for number, entry in enumerate(head.site):
+            kind = next((kind for kind in kinds if kind in entry), None)
+            where = f"{self._where}: site[{number}]"
+            if kind is None:
+                raise AssetError(f"{where}: an entry has one of paint, make, parts, place, pattern")
+            try:
+                kinds[kind](entry, f"{where} ({kind})")
+            except ShapeError as error:
+                raise AssetError(f"{where} ({kind}): {error}") from error
+
+    def _read(self, model: type[Model], body: Mapping[str, Any], where: str) -> Model:
+        try:
+            return model.model_validate(dict(body), context=self._names)
+        except ValidationError as error:
+            raise AssetError(f"{where}: {'; '.join(explain(error, model))}") from None
+
+    def _call(self, kind: str, body: Mapping[str, Any], where: str, *fixed: Any) -> Any:
+        """Call the builder that ``make`` names with the other keys of a table."""
+        name = body["make"]
+        known = {name: one for name, one in kit().items() if one.kind == kind}
+        if not isinstance(name, str) or name not in known:
+            raise AssetError(f"{where}: {unknown(f'no {kind} builder', str(name), known)}")
+        found = known[name]
+        arguments = self._read(found.arguments, {k: v for k, v in body.items() if k != "make"}, f"{where} {name!r}")
+        try:
+            return found.function(*fixed, **{key: getattr(arguments, key) for key in found.arguments.model_fields})
+        except AssetError as error:
+            raise AssetError(f"{where} {name!r}: {error}") from error
+
+    def _ground(self, body: Mapping[str, Any]) -> None:
+        ground = self._read(Ground, body, f"{self._where}: [ground]")
+        terrain = flat_terrain(self._site.recipe.size_m)
+        for number, step in enumerate(ground.steps):
+            where = f"{self._where}: [ground] steps[{number}]"
+            if "make" not in step:
+                raise AssetError(f"{where}: key 'make' is missing")
+            terrain = self._call("ground", step, where, self._site, terrain)
+        self._site.set_ground(terrain, ground.material)
+
+    def _paint(self, body: dict[str, Any], where: str) -> None:
+        entry = self._read(Paint, body, where)
+        self._site.paint(entry.paint, entry.material, entry.rise_m, entry.edge)
+
+    def _make(self, body: dict[str, Any], where: str) -> None:
+        """Call a builder; ``as`` names the height that it returns, e.g. of a roof, for what follows."""
+        height = self._call("site", {k: v for k, v in body.items() if k != "as"}, where, self._site)
+        if "as" in body:
+            if not isinstance(height, float):
+                raise AssetError(f"{where}: {body['make']!r} returns no height that 'as' could name")
+            self._names.heights[str(body["as"])] = height
+
+    def _structure(self, body: dict[str, Any], where: str) -> None:
+        entry = self._read(Structure, body, where)
+        parts: Parts = []
+        for number, part in enumerate(entry.parts):
+            parts += self._parts(part, f"{where} parts[{number}]")
+        if entry.at != (0.0, 0.0) or entry.yaw_deg or entry.on:
+            parts = Frame(*entry.at, entry.yaw_deg).parts(parts, entry.on)
+        self._site.add(entry.node, entry.category, parts, entry.attributes or None, footprint=entry.footprint)
+        for x, y, radius in entry.keep_clear:
+            self._site.occupy(disc(x, y, radius, 8))
+
+    def _parts(self, part: Mapping[str, Any], where: str) -> Parts:
+        if "make" in part:
+            made: Parts = self._call("parts", part, where)
+            return made
+        shape, role = part.get("shape"), part.get("role")
+        if not isinstance(shape, str) or shape not in SHAPES:
+            raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
+        try:
+            material = self._names.material(role)
+            return [(material, part_mesh(part, self._names.heights, {}))]
+        except (ValueError, TypeError) as error:
+            raise AssetError(f"{where} ({shape}): {error}") from None
+
+    def _place(self, body: dict[str, Any], where: str) -> None:
+        entry = self._read(Place, body, where)
+        for number, raw in enumerate(entry.place):
+            self._stand(self._thing(raw, f"{where}[{number}]"), entry, where)
+        if entry.pattern is not None:
+            placed = 0
+            for pose in poses_of(self._site, entry.pattern):
+                what = entry.pattern.of[placed % len(entry.pattern.of)]
+                placed += self._stand(self._thing([what, *pose], where), entry, where)
+
+    def _thing(self, raw: Any, where: str) -> Thing:
+        if isinstance(raw, list):
+            if len(raw) not in (3, 4, 5):
+                raise AssetError(f"{where}: a thing is [category, x, y], or with yaw and height too, got {raw!r}")
+            keys: Sequence[tuple[str, Any]] = [*zip(("yaw_deg", "on"), raw[3:], strict=False)]
+            raw = {"what": raw[0], "at": raw[1:3], **dict(keys)}
+        if not isinstance(raw, dict):
+            raise AssetError(f"{where}: a thing is a list or a table, got {raw!r}")
+        return self._read(Thing, raw, where)
+
+    def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
+        category, _, variant = thing.what.partition(":")
+        if category not in self._site.catalogue:
+            raise AssetError(f"{where}: unknown category {category!r}{nearest(category, self._site.catalogue)}")
+        x, y = thing.at
+        z = thing.on if thing.on is not None else entry.on
+        if entry.above_ground_m:
+            z = self._site.ground_z(x, y) + entry.above_ground_m
+        if entry.sunk is not None:
+            share, most_m = entry.sunk
+            height_m = prop_height(self._site, category, variant or None, x, y)
+            z = (z or 0.0) - min(share * height_m, most_m)
+        given = {key: getattr(thing, key) for key in ("scale", "roles", "params", "attributes")}
+        options = {key: value for key, value in given.items() if value and value != 1.0}
+        one = Placement(category, x, y, thing.yaw_deg, variant or None, z, entry.phrase, thing.node, options)
+        try:
+            return place(self._site, one, entry.fit, entry.clear_m) is not None
+        except AssetError as error:
+            raise AssetError(f"{where}: {error}") from error

@@ -1,0 +1,138 @@
+"""The format of a plan: its head, its names, and its entries in the order in which they are built."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.recipe import Colour, Extent, Height, Level, Move, Origin, Sun
+
+VERSION = 1
+MAX_ENTRIES = 2000
+_Text = Annotated[str, Field(min_length=1, max_length=200)]
+_STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class PlanHead(BaseModel):
+    """Everything of a plan but its ground and its entries."""
+
+    model_config = _STRICT
+
+    plan: Literal[1]  # Version of the format
+    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
+    size_m: tuple[Extent, Extent]  # Extent along x and y, metres; the origin lies in the middle
+    ceiling_m: Height  # Highest z that a drone may fly at, metres
+    sky: Colour = "#96bee6"
+    sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
+    palette: dict[str, str] = {}  # Materials by the plan's names for them
+    inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}  # Least number of instances by category
+    attribution: Annotated[str, Field(max_length=500)] = ""
+    origin: Origin | None = None  # Where on earth that is
+    level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
+    moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
+    floor_m: dict[str, Any] = {}  # Named heights, metres; also in expressions
+    lines: dict[str, Any] = {}
+    areas: dict[str, Any] = {}
+    ground: dict[str, Any] = {}
+    site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES)] = []
+
+
+class Ground(BaseModel):
+    """The terrain, and what shows where nothing is painted."""
+
+    model_config = _STRICT
+
+    material: Material = "grass"
+    steps: list[dict[str, Any]] = []  # Ground builders, each on the terrain of the one before
+
+
+class Paint(BaseModel):
+    """Paint an area of the ground over what was painted before."""
+
+    model_config = _STRICT
+
+    paint: Area
+    material: Material
+    rise_m: Number = 0.0  # Height over the terrain; its edge becomes a kerb
+    edge: Material = "concrete"  # Material of that kerb
+
+
+class Structure(BaseModel):
+    """A body made of parts, in the grammar of a prop's parts, or by part builders."""
+
+    model_config = _STRICT
+
+    parts: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=1000)]
+    node: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")] | None = None
+    category: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")]
+    at: At = (0.0, 0.0)  # Origin of the parts' frame
+    yaw_deg: Number = 0.0
+    on: Number = 0.0  # Height of that origin; the name of a floor is a number too
+    attributes: dict[str, str] = {}
+    footprint: Area | None = None  # Ground that it takes
+    keep_clear: list[tuple[Number, Number, Number]] = []  # Discs of ground that it takes: x, y, radius
+
+    @model_validator(mode="before")
+    @classmethod
+    def _category_of_node(cls, body: Any) -> Any:
+        return {"category": body.get("node"), **body} if isinstance(body, dict) else body
+
+
+class Thing(BaseModel):
+    """A prop of the catalogue, in the long form; the short one is ``["category:variant", x, y, yaw, z]``."""
+
+    model_config = _STRICT
+
+    what: _Text
+    at: At
+    yaw_deg: Number = 0.0
+    on: Number | None = None
+    node: str | None = None
+    scale: Annotated[float, Field(ge=0.05, le=20)] = 1.0
+    roles: dict[str, Material] = {}
+    params: dict[str, Number] = {}
+    attributes: dict[str, str] = {}
+
+
+class Pattern(BaseModel):
+    """Poses that are computed; the categories are dealt over them in turn."""
+
+    model_config = _STRICT
+
+    of: Annotated[list[_Text], Field(min_length=1)]
+    along: Line | None = None  # A line, with a thing every `spacing_m`
+    grid: tuple[list[Number], list[Number]] | None = None  # Every x with every y
+    poses: list[tuple[Number, Number, Number]] = []  # x, y, yaw
+    scatter: Area | None = None  # An area, strewn at least `spacing_m` apart
+    spacing_m: Annotated[Number, Field(gt=0)] = 5.0
+    offset_m: Number = 0.0  # To the left of the line
+    start_m: Number = 0.0  # What stays free at the ends of the line
+    end_m: Number = 0.0
+    turn_deg: Number = 0.0  # Of the things, from the line's direction
+    yaw: str | float = 0.0  # An expression over x and y for the poses of a grid
+    limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000
+    stream: str = ""  # Name of the random stream of a scatter
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Pattern:
+        kinds = sum((self.along is not None, self.grid is not None, bool(self.poses), self.scatter is not None))
+        if kinds != 1:
+            raise ValueError("a pattern has one of along, grid, poses, scatter")
+        return self
+
+
+class Place(BaseModel):
+    """Place things of the catalogue."""
+
+    model_config = _STRICT
+
+    place: Annotated[list[Any], Field(max_length=2000)] = []  # Things, short or long
+    pattern: Pattern | None = None
+    phrase: Annotated[str, Field(max_length=200)] = ""  # Where they are, in words: "on the dyke"
+    on: Number | None = None  # Height that they stand on; the ground where absent
+    above_ground_m: Number = 0.0  # Height over the ground; negative: sunk into it
+    sunk: tuple[Number, Number] | None = None  # Below that: a share of its own height, and the most, metres
+    fit: Literal["as_is", "skip", "must"] = "as_is"  # Where there is no room: placed all the same, left out, an error
+    clear_m: Annotated[Number, Field(ge=0)] = 0.0  # Ground about them that stays free of what follows

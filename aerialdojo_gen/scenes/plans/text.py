@@ -1,0 +1,65 @@
+"""Plans as TOML text: one key a line, lists wrapped, one blank line before an entry with a comment."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+_WIDTH = 118
+
+
+def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
+    """Write a plan; reading the text gives the same values."""
+    head = {key: value for key, value in plan.items() if key not in _TABLES and key != "site"}
+    lines = [f"# {line}" for line in comment.splitlines()]
+    lines += [line for key, value in head.items() for line in _pair(key, value)]
+    for table in _TABLES:
+        if plan.get(table):
+            lines += ["", f"[{table}]", *(line for key, value in plan[table].items() for line in _pair(key, value))]
+    for entry in plan.get("site", ()):
+        lines += ["", "[[site]]", *(line for key, value in entry.items() for line in _pair(key, value))]
+    return "\n".join(lines) + "\n"
+
+
+_TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "ground")
+
+
+def _pair(key: str, value: Any) -> Iterator[str]:
+    yield from _wrapped(f"{_key(key)} = ", value, "")
+
+
+def _wrapped(start: str, value: Any, indent: str) -> Iterator[str]:
+    """Write a value on one line, or a list over several of as many items as fit."""
+    text = _inline(value)
+    if len(indent + start + text) <= _WIDTH or not isinstance(value, list | tuple):
+        yield f"{indent}{start}{text}"
+        return
+    yield f"{indent}{start}["
+    row = ""
+    for item in value:
+        text = _inline(item)
+        if row and len(indent) + 2 + len(row) + len(text) + 2 > _WIDTH:
+            yield f"{indent}  {row.rstrip()}"
+            row = ""
+        row += f"{text}, "
+    yield f"{indent}  {row.rstrip()}"
+    yield f"{indent}]"
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    if isinstance(value, float) and value == int(value):
+        return str(int(value))
+    return repr(value)
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key)

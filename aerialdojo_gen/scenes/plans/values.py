@@ -1,0 +1,207 @@
+"""Types of values in a plan: numbers, areas, lines and materials, by name or written out.
+
+They are annotations of Pydantic models and of the kit's builders. A value is resolved against the names of its plan,
+which are the validation context.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Annotated, Any
+
+import shapely
+from pydantic import BeforeValidator, PlainValidator, ValidationInfo, WithJsonSchema
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.base.errors import ShapeError
+from aerialdojo_gen.base.names import nearest, unknown
+from aerialdojo_gen.scenes.expressions import evaluate
+from aerialdojo_gen.scenes.grammar_scatter import smooth_path
+from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.materials import MaterialLibrary
+
+Point = tuple[float, float]
+
+# The largest site is 1,000 m across.
+_MAX_M, _MAX_POINTS = 2000.0, 1000
+_SHORTEST_M = 0.01
+
+
+@dataclass
+class PlanNames:
+    """What the entries of a plan may refer to by name."""
+
+    materials: MaterialLibrary
+    palette: Mapping[str, str] = field(default_factory=dict)
+    heights: dict[str, float] = field(default_factory=dict)  # Metres
+    lines: dict[str, list[Point]] = field(default_factory=dict)
+    areas: dict[str, BaseGeometry] = field(default_factory=dict)
+
+    def number(self, value: Any) -> float:
+        """Resolve a number, or an expression over the plan's heights."""
+        if isinstance(value, str):
+            try:
+                value = evaluate(value, self.heights)
+            except ShapeError as error:
+                raise ValueError(str(error)) from None
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ValueError(f"a number or an expression is wanted, got {value!r}")
+        if abs(value) > _MAX_M:
+            raise ValueError(f"must lie within {_MAX_M:,.0f}, got {value:g}")
+        return float(value)
+
+    def point(self, value: Any) -> Point:
+        """Resolve ``[x, y]``, metres."""
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            raise ValueError(f"a point [x, y] is wanted, got {value!r}")
+        return self.number(value[0]), self.number(value[1])
+
+    def line(self, value: Any) -> list[Point]:
+        """Resolve the name of a line, its points, or ``{points, smooth}``."""
+        if isinstance(value, str):
+            if value not in self.lines:
+                raise ValueError(unknown("no line", value, self.lines))
+            return self.lines[value]
+        smooth = 0
+        if isinstance(value, dict):
+            _refuse_unknown(value, ("points", "smooth"))
+            smooth, value = value.get("smooth", 0), value.get("points")
+            if not isinstance(smooth, int) or not 0 <= smooth <= 6:
+                raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
+        if not isinstance(value, list | tuple) or not 2 <= len(value) <= _MAX_POINTS:
+            raise ValueError(f"a line has from 2 to {_MAX_POINTS:,} points [x, y]")
+        points = [self.point(point) for point in value]
+        if min(math.dist(a, b) for a, b in pairwise(points)) < _SHORTEST_M:
+            raise ValueError(f"consecutive points of a line must be {_SHORTEST_M:g} m apart")
+        return smooth_path(points, smooth)
+
+    def area(self, value: Any) -> BaseGeometry:
+        """Resolve the name of an area, ``[x0, y0, x1, y1]``, or a table with one of the keys of `_AREAS`."""
+        if isinstance(value, str):
+            if value not in self.areas:
+                raise ValueError(unknown("no area", value, self.areas))
+            return self.areas[value]
+        if isinstance(value, list):
+            value = {"box": value}
+        if not isinstance(value, dict):
+            raise ValueError(f"an area is a name, [x0, y0, x1, y1] or a table, got {value!r}")
+        _refuse_unknown(value, (*_AREAS, *_CHANGES, "width_m", "round_ends"))
+        kinds = [key for key in _AREAS if key in value]
+        if len(kinds) != 1:
+            raise ValueError(f"an area has one of {', '.join(_AREAS)}, got {', '.join(kinds) or 'none'}")
+        area = _AREAS[kinds[0]](self, value)
+        for key, change in _CHANGES.items():
+            if key in value:
+                area = change(self, area, value[key])
+        if area.is_empty:
+            raise ValueError("the area is empty")
+        return area
+
+    def material(self, value: Any) -> str:
+        """Resolve a name of the palette, or a material."""
+        if not isinstance(value, str):
+            raise ValueError(f"a material is wanted, got {value!r}")
+        spec = self.palette.get(value, value)
+        base = spec.partition(":")[0]
+        if not spec.startswith("#") and base not in self.materials.names:
+            raise ValueError(f"unknown material {value!r}{nearest(base, [*self.palette, *self.materials.names])}")
+        return spec
+
+
+def _box(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    corners = value["box"]
+    if not isinstance(corners, list) or len(corners) != 4:
+        raise ValueError(f"box is [x0, y0, x1, y1], got {corners!r}")
+    return rectangle(*(names.number(corner) for corner in corners))
+
+
+def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    given = value["disc"]
+    if not isinstance(given, list) or len(given) not in (3, 4):
+        raise ValueError(f"disc is [x, y, radius] or [x, y, radius, corners], got {given!r}")
+    x, y, radius = (names.number(one) for one in given[:3])
+    return disc(x, y, radius, int(given[3])) if len(given) == 4 else disc(x, y, radius)
+
+
+def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    return ribbon(names.line(value["ribbon"]), names.number(value.get("width_m")), bool(value.get("round_ends")))
+
+
+def _polygon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    points: list[Point] = []
+    for one in value["polygon"]:
+        points += names.line(one) if isinstance(one, str) else [names.point(one)]
+    area = Polygon(points)
+    if not area.is_valid:
+        raise ValueError("the polygon crosses itself")
+    return area
+
+
+def _union(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    return shapely.union_all([names.area(one) for one in value["union"]])
+
+
+def _plus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
+    for other in others if isinstance(others, list) and not _is_box(others) else [others]:
+        area = area.union(names.area(other))
+    return area
+
+
+def _minus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
+    for other in others if isinstance(others, list) and not _is_box(others) else [others]:
+        area = area.difference(names.area(other))
+    return area
+
+
+def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
+    return area.buffer(names.number(by_m))
+
+
+def _is_box(value: Sequence[Any]) -> bool:
+    return len(value) == 4 and all(isinstance(one, int | float) for one in value)
+
+
+_AREAS = {"box": _box, "disc": _disc, "ribbon": _ribbon, "polygon": _polygon, "union": _union}
+_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown}
+
+
+def _refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:
+    for key in value:
+        if key not in known:
+            raise ValueError(unknown("unknown key", key, known))
+
+
+def _names(info: ValidationInfo) -> PlanNames:
+    assert isinstance(info.context, PlanNames)
+    return info.context
+
+
+_NUMBER_SCHEMA = {"type": ["number", "string"]}
+_POINT_SCHEMA = {"type": "array", "items": _NUMBER_SCHEMA, "minItems": 2, "maxItems": 2}
+
+Number = Annotated[
+    float, BeforeValidator(lambda value, info: _names(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
+]
+"""A number, or an expression over the plan's heights such as ``"quay + 0.2"``."""
+At = Annotated[Point, PlainValidator(lambda value, info: _names(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
+"""A point ``[x, y]``, metres."""
+Line = Annotated[
+    list[Point],
+    PlainValidator(lambda value, info: _names(info).line(value)),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _POINT_SCHEMA}, {"type": "object"}]}),
+]
+"""The name of a line, its points, or ``{points, smooth}``."""
+Area = Annotated[
+    BaseGeometry,
+    PlainValidator(lambda value, info: _names(info).area(value)),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _NUMBER_SCHEMA}, {"type": "object"}]}),
+]
+"""The name of an area, ``[x0, y0, x1, y1]``, or a table such as ``{disc = [x, y, radius], minus = "yard"}``."""
+Material = Annotated[
+    str, PlainValidator(lambda value, info: _names(info).material(value)), WithJsonSchema({"type": "string"})
+]
+"""A name of the palette, or a material such as ``"brick:#8a4638"``."""

@@ -1,0 +1,123 @@
+"""Plans: what a scene's TOML says is built in its order, or named in one line."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.plans.build import build_plan, is_plan
+from aerialdojo_gen.scenes.plans.schema import schema_text
+from aerialdojo_gen.scenes.plans.text import plan_text
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+PLANS = [path for path in sorted((ASSETS / "scenes").glob("*.toml")) if is_plan(path)]
+HEAD = {"plan": 1, "size_m": [40, 40], "ceiling_m": 12}
+YARD = {
+    **HEAD, "palette": {"wall": "brick:#8a4638"}, "floor_m": {"loft": 2.5},
+    "lines": {"lane": {"points": [[-18, -6], [0, -4], [18, -6]], "smooth": 2}},
+    "areas": {"yard": {"disc": [0, 6, 8], "minus": [-2, 4, 2, 8]}, "way": {"ribbon": "lane", "width_m": 3}},
+    "ground": {"material": "meadow"},
+    "site": [
+        {"paint": "way", "material": "gravel"},
+        {"paint": "yard", "material": "cobbles", "rise_m": 0.1},
+        {"node": "barn", "footprint": [6, 2, 14, 9], "parts": [
+            {"shape": "block", "role": "wall", "corners": [6, 2, 14, 9], "z": [0, "loft"]},
+            {"make": "gable_roof", "box": [6, 2, 14, 9], "z": "loft", "rise_m": 2, "wall": "wall",
+             "roof": "thatch"}]},
+        {"place": [["tractor", 0, -12, 30], {"what": "beehive", "at": [-4, 10], "node": "hive"}],
+         "phrase": "in the yard"},
+        {"pattern": {"of": ["oak_tree", "birch_tree"], "along": "lane", "spacing_m": 9, "offset_m": 5},
+         "fit": "skip"},
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue(ASSETS)
+
+
+def build(tmp_path, catalogue, plan):
+    path = tmp_path / "U_Yard_0.toml"
+    path.write_text(plan_text(plan))
+    return build_plan(path, catalogue)
+
+
+def test_the_schema_is_that_of_the_code():
+    """`python -c "from aerialdojo_gen.scenes.plans.schema import schema_text; print(schema_text(), end='')"`."""
+    assert (ASSETS / "plan.schema.json").read_text() == schema_text()
+
+
+@pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)
+def test_a_plan_is_short_and_reads_back_as_it_is_written(path):
+    text = path.read_text()
+    assert text.count("\n") <= 500
+    plan = tomllib.loads(text)
+    assert tomllib.loads(plan_text(plan)) == plan
+
+
+def test_a_yard_is_built_in_order(tmp_path, catalogue):
+    scene = build(tmp_path, catalogue, YARD)
+    nodes = [instance.node for instance in scene.instances]
+    assert nodes[:4] == ["ground", "barn", "tractor_000", "hive"]
+    trees = [i for i in scene.instances if i.category in ("oak_tree", "birch_tree")]
+    assert len(trees) >= 3
+    assert [i.category for i in trees[:2]] == ["oak_tree", "birch_tree"]
+    barn = scene.instances[1]
+    assert barn.bounds[1, 2] > 4.4
+    assert {part.material for part in barn.parts} == {"brick:#8a4638", "thatch"}
+    assert all(i.attributes["place"] == "in the yard" for i in scene.instances[2:4])
+    again = build(tmp_path, catalogue, YARD)
+    assert [i.bounds.tolist() for i in again.instances] == [i.bounds.tolist() for i in scene.instances]
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"paint": "yrd", "material": "mud"}, r"site\[0\] \(paint\): .*no area 'yrd'.*yard"),
+        ({"paint": "yard", "material": "mudd"}, r"site\[0\] \(paint\): .*unknown material 'mudd'.*mud"),
+        ({"paint": {"disc": [0, 0, 3], "minus": {"disc": [0, 0, 9]}}, "material": "mud"}, "the area is empty"),
+        ({"paint": {"disc": [0, 0, 3], "box": [0, 0, 1, 1]}, "material": "mud"}, "an area has one of"),
+        ({"make": "flat_hose"}, r"site\[0\] \(make\): no site builder 'flat_hose'.*flat_house"),
+        ({"make": "wires", "headz": []}, r"site\[0\] \(make\) 'wires': .*unknown key 'headz'"),
+        ({"make": "wires", "heads": [[0, 0]]}, r"site\[0\] \(make\) 'wires': .*heads"),
+        ({"make": "wires", "heads": [[0, 0, 5], [9, 0, 5]], "as": "top"}, "returns no height"),
+        ({"parts": [{"shape": "block", "role": "wood", "corners": [0, 0, 1], "z": [0, 1]}], "node": "a"}, "corners"),
+        ({"parts": [{"shape": "blok", "role": "wood"}], "node": "a"}, "unknown shape 'blok'.*block"),
+        ({"place": [["tracter", 0, 0]]}, "unknown category 'tracter'.*tractor"),
+        ({"place": [["tractor", 0]]}, "a thing is"),
+        ({"place": [["tractor", "loft + x", 0]]}, "unknown parameter 'x'"),
+        ({"place": [["tractor", 300, 0]], "fit": "must"}, "no room for tractor"),
+        ({"pattern": {"of": ["oak_tree"]}}, "a pattern has one of"),
+        ({"note": "nothing"}, "an entry has one of paint, make, parts, place, pattern"),
+    ],
+)
+def test_what_is_wrong_is_named_in_one_line(tmp_path, catalogue, entry, message):
+    with pytest.raises(AssetError, match=message) as error:
+        build(tmp_path, catalogue, {**YARD, "site": [entry]})
+    assert "U_Yard_0.toml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@settings(max_examples=30, deadline=None)
+@given(order=st.permutations(range(len(YARD["site"]))), drop=st.sets(st.sampled_from(["lines", "areas", "floor_m"])))
+def test_any_order_builds_or_ends_in_one_line(tmp_path_factory, catalogue, order, drop):
+    plan = {key: value for key, value in YARD.items() if key not in drop} | {"site": [YARD["site"][k] for k in order]}
+    folder = tmp_path_factory.mktemp("plan")
+    if drop:
+        with pytest.raises(AssetError, match=r"^[^\n]*U_Yard_0\.toml: [^\n]*$"):
+            build(folder, catalogue, plan)
+        return
+    scene = build(folder, catalogue, plan)
+    assert {"barn", "hive", "ground"} <= {instance.node for instance in scene.instances}
+
+
+def test_every_builder_says_what_it_builds():
+    for name, one in kit().items():
+        assert one.summary.endswith("."), name
+        assert one.arguments.model_fields or one.kind == "ground", name
