@@ -6,8 +6,15 @@ from shapely.geometry import Polygon
 from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.layouts.infrastructure.bridge.decks import Deck
-from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import RAIL_M, arcade, ballast, s_curve, track, upright
+from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import (
+    RAIL_M,
+    arcade,
+    ballast,
+    s_curve,
+    track,
+    upright,
+)
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
@@ -84,11 +91,12 @@ def test_upright_faces_stand_where_they_are_drawn():
 
 
 def test_parapets_are_open_at_their_gaps():
-    deck = Deck(-10.0, 10.0, 3.0, 4.5)
-    whole = sum(len(m.faces) for _, m in deck.parapets("iron"))
+    ends = {"x0": -10.0, "x1": 10.0, "half_m": 4.5}
+    whole = bridge_parapets(**ends, frame="iron")
+    gapped = bridge_parapets(**ends, frame="iron", gaps=[(-2.0, 2.0, 1)])
+    assert sum(len(m.faces) for _, m in gapped) != sum(len(m.faces) for _, m in whole)
     site = blank()
-    site.add("deck", "bridge_deck", [*deck.parts(), *deck.parapets("iron", [(-2.0, 2.0, 1)])])
-    assert sum(len(m.faces) for _, m in deck.parapets("iron", [(-2.0, 2.0, 1)])) != whole
+    site.add("deck", "bridge_deck", [*bridge_deck(**ends, road_m=3.0), *gapped])
     cast = RayCaster(site.scene())
     far, _ = cast.first_hit(np.array([[0.0, 0.0, 0.7], [5.0, 0.0, 0.7]]), np.tile([0.0, 1.0, 0.0], (2, 1)))
     assert far[0] > 10.0

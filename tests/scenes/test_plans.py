@@ -89,6 +89,16 @@ def test_a_yard_is_built_in_order(tmp_path, catalogue):
         ({"make": "wires", "heads": [[0, 0, 5], [9, 0, 5]], "as": "top"}, "returns no height"),
         ({"parts": [{"shape": "block", "role": "wood", "corners": [0, 0, 1], "z": [0, 1]}], "node": "a"}, "corners"),
         ({"parts": [{"shape": "blok", "role": "wood"}], "node": "a"}, "unknown shape 'blok'.*block"),
+        (
+            {
+                "make": "building",
+                "outline": [0, 0, 4, 4],
+                "wall": "wood",
+                "roof": "thatch",
+                "extra": [{"shape": "blok", "role": "wood"}],
+            },
+            "'building': .*extra.*unknown shape 'blok'.*block",
+        ),
         ({"place": [["tracter", 0, 0]]}, "unknown category 'tracter'.*tractor"),
         ({"place": [["tractor", 0]]}, "a thing is"),
         ({"place": [["tractor", "loft + x", 0]]}, "unknown parameter 'x'"),
@@ -102,6 +112,25 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path, catalogue, entry, message)
         build(tmp_path, catalogue, {**YARD, "site": [entry]})
     assert "U_Yard_0.toml" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_things_settle_on_slopes_and_keep_others_at_a_distance(tmp_path, catalogue):
+    hill = {"make": "hill", "at": [0, 0], "radius_m": 18, "height_m": 9}
+    rolling = {"make": "rolling_ground", "cell_m": 1, "height_m": 0, "wavelength_m": 30}
+    stone, bench = ["boulder", 8, 0], {"place": [["bench", 8, 2.6]], "fit": "skip"}
+
+    def scene(**keys):
+        plan = {**HEAD, "ground": {"steps": [rolling, hill]}, "site": [{"place": [stone], **keys}, bench]}
+        return build(tmp_path, catalogue, plan).instances[1:]
+
+    loose, firm = scene(), scene(settle_m=1.5, margin_m=3)
+    assert [i.category for i in loose] == ["boulder", "bench"]
+    assert [i.category for i in firm] == ["boulder"]
+    assert 0.2 < loose[0].bounds[0, 2] - firm[0].bounds[0, 2] < 1.5
+    stone = {"what": "boulder", "at": [8, 2.6], "solid": False}
+    assert [i.category for i in scene()] == ["boulder", "bench"]
+    stone["solid"] = True
+    assert [i.category for i in scene()] == ["boulder"]
 
 
 @settings(max_examples=30, deadline=None)

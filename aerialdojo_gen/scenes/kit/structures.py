@@ -14,8 +14,10 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit import part_builder
 from aerialdojo_gen.scenes.lettering import text
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
 
@@ -33,8 +35,9 @@ def columns(points: Sequence[Point], z0: float, z1: float, radius_m: float = 0.2
     return merge([translated(cylinder(radius=radius_m, height=z1 - z0, segments=segments), (*p, z0)) for p in points])
 
 
+@part_builder
 def railing(
-    path: Sequence[Point], z_m: float, *, height_m: float = 1.05, pane: str | None = "glass", frame: str = "iron"
+    path: Line, z_m: Number, *, height_m: Number = 1.05, pane: Material | None = "glass", frame: Material = "iron"
 ) -> Parts:
     """Make a railing along a polyline on a floor at `z_m`: posts every 2 m, a handrail, and panes.
 
@@ -83,9 +86,10 @@ def deck(
     return parts
 
 
+@part_builder
 def stairs(
-    foot: Point, yaw_deg: float, width_m: float, rise_m: float, run_m: float, *, z_m: float = 0.0,
-    tread: str = "concrete", stringer: str = "iron",
+    foot: At, yaw_deg: Number, width_m: Number, rise_m: Number, run_m: Number, *, z_m: Number = 0.0,
+    tread: Material = "concrete", stringer: Material = "iron",
 ) -> Parts:  # fmt: skip
     """Make open stairs that climb from `foot` along `yaw_deg`: treads between two stringers.
 
@@ -117,9 +121,10 @@ def stairs(
     return [(m, _posed(merge(b), turn, (*foot, z_m))) for m, b in ((tread, treads), (stringer, side))]
 
 
+@part_builder
 def canopy(
-    x0: float, y0: float, x1: float, y1: float, z_m: float, *, roof: str, post: str = "chrome",
-    posts: Sequence[Point] = (), foot_m: float = 0.0,
+    x0: Number, y0: Number, x1: Number, y1: Number, z_m: Number, *, roof: Material, post: Material = "chrome",
+    posts: Sequence[At] = (), foot_m: Number = 0.0,
 ) -> Parts:  # fmt: skip
     """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, metres."""
     ring = rectangle(x0, y0, x1, y1).exterior.buffer(0.09, join_style="mitre", cap_style="flat")

@@ -17,6 +17,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
 from aerialdojo_gen.scenes.plans.placing import Placement, place, poses_of, prop_height
@@ -90,6 +91,7 @@ class _Building:
 
     def __init__(self, site: Site, names: PlanNames, where: str) -> None:
         self._site, self._names, self._where = site, names, where
+        names.make_parts = self._all_parts
 
     def build(self, head: PlanHead) -> None:
         """Make the ground and then every entry, in order."""
@@ -151,14 +153,15 @@ class _Building:
 
     def _structure(self, body: dict[str, Any], where: str) -> None:
         entry = self._read(Structure, body, where)
-        parts: Parts = []
-        for number, part in enumerate(entry.parts):
-            parts += self._parts(part, f"{where} parts[{number}]")
+        parts = self._all_parts(entry.parts, f"{where} ")
         if entry.at != (0.0, 0.0) or entry.yaw_deg or entry.on:
             parts = Frame(*entry.at, entry.yaw_deg).parts(parts, entry.on)
         self._site.add(entry.node, entry.category, parts, entry.attributes or None, footprint=entry.footprint)
         for x, y, radius in entry.keep_clear:
             self._site.occupy(disc(x, y, radius, 8))
+
+    def _all_parts(self, parts: Sequence[Mapping[str, Any]], where: str = "") -> Parts:
+        return [one for number, part in enumerate(parts) for one in self._parts(part, f"{where}parts[{number}]")]
 
     def _parts(self, part: Mapping[str, Any], where: str) -> Parts:
         if "make" in part:
@@ -201,14 +204,18 @@ class _Building:
         z = thing.on if thing.on is not None else entry.on
         if entry.above_ground_m:
             z = self._site.ground_z(x, y) + entry.above_ground_m
+        if entry.settle_m is not None:
+            z = settled_z(self._site, x, y, entry.settle_m)
         if entry.sunk is not None:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant or None, x, y)
             z = (z or 0.0) - min(share * height_m, most_m)
         given = {key: getattr(thing, key) for key in ("scale", "roles", "params", "attributes")}
         options = {key: value for key, value in given.items() if value and value != 1.0}
+        if not thing.solid:
+            options["solid"] = False
         one = Placement(category, x, y, thing.yaw_deg, variant or None, z, entry.phrase, thing.node, options)
         try:
-            return place(self._site, one, entry.fit, entry.clear_m) is not None
+            return place(self._site, one, entry.fit, entry.clear_m, entry.margin_m) is not None
         except AssetError as error:
             raise AssetError(f"{where}: {error}") from error

@@ -94,6 +94,7 @@ class Thing(BaseModel):
     roles: dict[str, Material] = {}
     params: dict[str, Number] = {}
     attributes: dict[str, str] = {}
+    solid: bool = True  # Whether it takes the ground it stands on
 
 
 class Pattern(BaseModel):
@@ -133,6 +134,8 @@ class Place(BaseModel):
     phrase: Annotated[str, Field(max_length=200)] = ""  # Where they are, in words: "on the dyke"
     on: Number | None = None  # Height that they stand on; the ground where absent
     above_ground_m: Number = 0.0  # Height over the ground; negative: sunk into it
+    settle_m: Number | None = None  # On a slope: neither afloat nor buried, its foot being of this radius
     sunk: tuple[Number, Number] | None = None  # Below that: a share of its own height, and the most, metres
     fit: Literal["as_is", "skip", "must"] = "as_is"  # Where there is no room: placed all the same, left out, an error
     clear_m: Annotated[Number, Field(ge=0)] = 0.0  # Ground about them that stays free of what follows
+    margin_m: Annotated[Number, Field(ge=0)] = 0.0  # The same, about the rectangle that each takes

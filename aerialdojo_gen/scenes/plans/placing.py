@@ -10,6 +10,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose, along, poisson_disc
+from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.model import Pattern
 from aerialdojo_gen.scenes.site import Site, disc
@@ -32,7 +33,9 @@ class Placement:
     options: Mapping[str, Any] = field(default_factory=dict)  # scale, params, roles, attributes
 
 
-def place(site: Site, thing: Placement, fit: Fit = "as_is", clear_m: float = 0.0) -> Instance | None:
+def place(
+    site: Site, thing: Placement, fit: Fit = "as_is", clear_m: float = 0.0, margin_m: float = 0.0
+) -> Instance | None:
     """Place a thing; with ``fit="skip"`` None where it has no room, with ``"must"`` an `AssetError`."""
     options = dict(thing.options)
     attributes = {**options.pop("attributes", {}), **({"place": thing.place} if thing.place else {})}
@@ -48,6 +51,8 @@ def place(site: Site, thing: Placement, fit: Fit = "as_is", clear_m: float = 0.0
         return None
     if clear_m:
         site.occupy(disc(thing.x, thing.y, clear_m))
+    if margin_m:
+        keep_clear(site, instance, margin_m)
     return instance
 
 

@@ -7,7 +7,7 @@ which are the validation context.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Annotated, Any
@@ -17,9 +17,10 @@ from pydantic import BeforeValidator, PlainValidator, ValidationInfo, WithJsonSc
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.base.errors import ShapeError
+from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import evaluate
+from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.materials import MaterialLibrary
@@ -40,6 +41,7 @@ class PlanNames:
     heights: dict[str, float] = field(default_factory=dict)  # Metres
     lines: dict[str, list[Point]] = field(default_factory=dict)
     areas: dict[str, BaseGeometry] = field(default_factory=dict)
+    make_parts: Callable[[list[Any]], Parts] = list  # Set by what builds the plan
 
     def number(self, value: Any) -> float:
         """Resolve a number, or an expression over the plan's heights."""
@@ -100,6 +102,15 @@ class PlanNames:
         if area.is_empty:
             raise ValueError("the area is empty")
         return area
+
+    def bodies(self, value: Any) -> Parts:
+        """Make a list of parts, each a shape or by a part builder."""
+        if not isinstance(value, list) or not all(isinstance(one, dict) for one in value):
+            raise ValueError(f"a list of parts is wanted, got {value!r}")
+        try:
+            return self.make_parts(value)
+        except AssetError as error:
+            raise ValueError(str(error)) from None
 
     def material(self, value: Any) -> str:
         """Resolve a name of the palette, or a material."""
@@ -201,6 +212,12 @@ Area = Annotated[
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _NUMBER_SCHEMA}, {"type": "object"}]}),
 ]
 """The name of an area, ``[x0, y0, x1, y1]``, or a table such as ``{disc = [x, y, radius], minus = "yard"}``."""
+Bodies = Annotated[
+    Parts,
+    PlainValidator(lambda value, info: _names(info).bodies(value)),
+    WithJsonSchema({"type": "array", "items": {"type": "object"}}),
+]
+"""Parts as of a structure, which a builder adds to what it makes."""
 Material = Annotated[
     str, PlainValidator(lambda value, info: _names(info).material(value)), WithJsonSchema({"type": "string"})
 ]

@@ -12,7 +12,8 @@ from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters, railing, stairs
-from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.city_things import furnish_city
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import (
     ballast,
     footbridge_roof,
     platform,
@@ -22,7 +23,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
     track,
     wires,
 )
-from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.city_things import furnish_city
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aerialdojo_gen.scenes.grammar_props import put
-from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import RAIL_M, things, train
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import RAIL_M, things, train
 from aerialdojo_gen.scenes.site import Site
 
 _STREET_M, _PLATFORM_M, _GOODS_M = 7.4, 1.2, 1.35

@@ -19,7 +19,8 @@ from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import place_along
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, canopy, letters
-from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.country_things import furnish_country
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import (
     BED_M,
     arcade,
     ballast,
@@ -29,7 +30,6 @@ from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import (
     track,
     upright,
 )
-from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.country_things import furnish_country
 from aerialdojo_gen.scenes.mesh import Floats, merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain

@@ -10,7 +10,7 @@ from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.natural_ground import keep_clear, place_wild, settled_z
-from aerialdojo_gen.scenes.layouts.infrastructure.parts.rail import RAIL_M, things, train
+from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import RAIL_M, things, train
 from aerialdojo_gen.scenes.site import Site
 
 _PLATFORM_M = 1.05

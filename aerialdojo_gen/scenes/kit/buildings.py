@@ -1,0 +1,40 @@
+"""Whole buildings on an outline."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from shapely.geometry import Polygon
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes import grammar_buildings
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.plans.values import Area, Bodies, Material, Number
+from aerialdojo_gen.scenes.site import Site
+
+
+@site_builder
+def building(
+    site: Site,
+    *,
+    outline: Area,
+    wall: Material,
+    roof: Material,
+    storeys: int = 2,
+    storey_m: Number = 3.2,
+    roof_kind: Literal["flat", "gable", "hip"] = "flat",
+    roof_m: Number = 2.5,
+    parapet_m: Number = 0.6,
+    on: Number | None = None,
+    category: str = "building",
+    extra: Bodies = [],  # noqa: B006
+) -> float:
+    """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
+    if not isinstance(outline, Polygon):
+        raise AssetError("outline: an area in one piece is wanted")
+    z = min(site.ground_z(x, y) for x, y in outline.exterior.coords) if on is None else on
+    grammar_buildings.building(
+        site, outline, wall=wall, roof=roof, storeys=storeys, storey_m=storey_m, roof_kind=roof_kind, roof_m=roof_m,
+        parapet_m=parapet_m, z=z, category=category, extra=extra,
+    )  # fmt: skip
+    return z + storeys * storey_m

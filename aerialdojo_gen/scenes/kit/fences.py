@@ -1,0 +1,37 @@
+"""Fences and railings on uneven ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
+from aerialdojo_gen.scenes.mesh import merge
+from aerialdojo_gen.scenes.plans.values import At, Material
+from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.site import Site
+
+
+@site_builder
+def rail_fence(
+    site: Site, *, ends: tuple[At, At], posts: int, category: str = "rail_fence", material: Material = "wood"
+) -> None:
+    """Put up a straight fence of posts and two rails that follows the ground."""
+    (x0, y0), (x1, y1) = ends
+    path = [(float(x), float(y), site.ground_z(float(x), float(y)))
+            for x, y in zip(np.linspace(x0, x1, posts), np.linspace(y0, y1, posts), strict=True)]  # fmt: skip
+    bodies = [block(x - 0.06, y - 0.06, x + 0.06, y + 0.06, z - 0.4, z + 1.1) for x, y, z in path]
+    bodies += [sweep(path=[(x, y, z + h) for x, y, z in path], section=(0.06, 0.1)) for h in (0.5, 1.0)]
+    site.add(None, category, [(material, merge(bodies))])
+
+
+@site_builder
+def railings(
+    site: Site, *, runs: list[tuple[At, At]], node: str | None = None, category: str = "railing",
+    frame: Material = "iron", pane: Material | None = "glass",
+) -> None:  # fmt: skip
+    """Put up straight level railings, each at the height of the ground at its lower end, as one structure."""
+    parts: Parts = []
+    for a, b in runs:
+        parts += railing([a, b], min(site.ground_z(*a), site.ground_z(*b)), pane=pane, frame=frame)
+    site.add(node, category, parts)

@@ -1,0 +1,88 @@
+"""A rocky gorge along y through ground at z = 0, and the stream at its bottom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from shapely.geometry import LineString, Polygon
+
+from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.scenes.ground import ribbon
+from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.kit.landforms import grid, smooth
+from aerialdojo_gen.scenes.kit.natural_ground import keep_clear, settled_z
+from aerialdojo_gen.scenes.plans.placing import Placement, place
+from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A stream that winds northwards about x = 0."""
+
+    swing_m: Number = 3.2  # To either side
+    bend_m: Number = 11.0  # Northing a radian of its waves
+
+    def x(self, y: float) -> float:
+        """Where it runs, metres east, at a northing in metres."""
+        return self.swing_m * float(np.sin(y / self.bend_m))
+
+
+_STREAM = Stream()
+
+
+@ground_builder
+def gorge(
+    site: Site, terrain: Terrain, *, depth_m: Number, half_m: Number, ledge_m: Number, stream: Stream = _STREAM
+) -> Terrain:
+    """Cut a gorge with a ledge in both its faces, which are straight about y = 0, where a bridge may stand."""
+    t, (x, y), seed = terrain, grid(terrain), site.recipe.seed
+    rough = OpenSimplex(seed=seed + 5).noise2array(x[0] / 7.0, y[:, 0] / 7.0)
+    ledge = OpenSimplex(seed=seed + 6).noise2array(x[0] / 15.0, y[:, 0] / 12.0)
+    beyond = np.clip((np.abs(y) - 5.0) / 6.0, 0.0, 1.0)
+    middle = stream.swing_m * np.sin(y / stream.bend_m)
+    away = np.abs(x - middle * beyond) + beyond * (1.6 * rough + 2.2 * ledge)
+    drop = 0.56 * smooth((half_m - away) / 4.6) + 0.44 * smooth((ledge_m - away) / 5.5)
+    bed = 0.7 * smooth((4.0 - np.abs(x - middle)) / 1.6)
+    scree = beyond * np.clip(drop, 0.0, 1.0) * (1.0 - drop) * 3.0 * rough
+    floor = 0.5 * rough * beyond * smooth((np.abs(x - middle) - 5.0) / 3.0)
+    return replace(t, heights_m=t.heights_m * (1.0 - drop) - (depth_m - floor) * drop - bed + scree)
+
+
+@site_builder
+def paint_gorge(
+    site: Site, *, half_m: Number, rock: Material, bank: Material, water: Material, stream: Stream = _STREAM
+) -> None:
+    """Paint the rock of a gorge up to a wavy rim, gravel banks, and the stream, whose bed stays free."""
+    half = site.recipe.size_m[1] / 2
+    ys = [float(y) for y in np.arange(-half, half + 1.0, 2.5)]
+    edge = [half_m + 1.2 + 1.3 * float(np.sin(y * 0.9) + np.sin(y * 0.37 + 1.0)) for y in ys]
+    rims = [
+        [(s * (e if s > 0 else edge[-1 - k]), y) for k, (e, y) in enumerate(zip(edge, ys, strict=True))]
+        for s in (-1, 1)
+    ]
+    site.paint(Polygon([*rims[0], *rims[1][::-1]]), rock)
+    line = [(stream.x(y), y) for y in ys]
+    site.paint(ribbon(line, 15.0), bank)
+    site.paint(ribbon(line, 5.4), water)
+    site.occupy(LineString([(stream.x(float(y)), float(y)) for y in np.arange(-half, half + 1.0, 3.0)]).buffer(3.2))
+
+
+@site_builder
+def by_stream(
+    site: Site,
+    *,
+    things: list[tuple[str, Number, Number, Number]],
+    phrase: str,
+    on: Number | None = None,
+    stream: Stream = _STREAM,
+) -> None:
+    """Place things by how far east of a winding stream they are, y, and yaw; on its banks, or at a height."""
+    for category, dx, y, yaw in things:
+        x = stream.x(y) + dx
+        z = settled_z(site, x, y) if on is None else on
+        instance = place(site, Placement(category, x, y, yaw, z=z, place=phrase))
+        if on is None and instance is not None:
+            keep_clear(site, instance, 1.6)

@@ -1,0 +1,54 @@
+"""What grows where there is room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapely import contains_xy
+
+from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.natural_ground import settled_z
+from aerialdojo_gen.scenes.plans.values import Area, Number
+from aerialdojo_gen.scenes.site import Site
+
+
+@dataclass(frozen=True)
+class Zone:
+    """What grows in an area, category after category; anywhere where it has none."""
+
+    of: list[str]
+    area: Area | None = None
+    steepest_m: Number = 100.0  # Greatest rise of the ground over 2 m
+
+
+@site_builder
+def keep_free(site: Site, *, areas: list[Area], z: tuple[Number, Number] = (-100.0, 1000.0)) -> None:
+    """Take areas, between two heights, so that nothing that looks for room stands there later."""
+    for area in areas:
+        site.occupy(area, *z)
+
+
+@site_builder
+def growth(
+    site: Site,
+    *,
+    area: Area,
+    zones: list[Zone],
+    spacing_m: Number,
+    room_m: Number,
+    limit: int,
+    settle_m: Number = 0.5,
+    stream: str = "growth",
+) -> None:
+    """Strew plants over an area where there is room about them; each is of the first zone that it lies in."""
+    count = 0
+    for pose in poisson_disc(area, spacing_m, site.rng_for(stream)):
+        x, y, _ = pose
+        zone = next((one for one in zones if one.area is None or contains_xy(one.area, x, y)), None)
+        if count >= limit or zone is None:
+            continue
+        z = settled_z(site, x, y, settle_m)
+        steep = abs(site.ground_z(x + 1.0, y) - site.ground_z(x - 1.0, y))
+        if steep <= zone.steepest_m and site.is_free(x, y, room_m, z=z):
+            count += site.try_place(zone.of[count % len(zone.of)], *pose, z=z) is not None

@@ -1,0 +1,80 @@
+"""Shapes of the ground, each on the terrain of the one before, and heights of the ground for what stands on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.mesh import Floats
+from aerialdojo_gen.scenes.plans.values import Area, At, Number
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
+
+
+@ground_builder
+def rolling_ground(
+    site: Site, _terrain: Terrain, *, cell_m: Number, height_m: Number, wavelength_m: Number, octaves: int = 4
+) -> Terrain:
+    """Make rolling ground by noise of the plan's seed, in place of what was there."""
+    return rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, height_m, wavelength_m, octaves)
+
+
+@ground_builder
+def hill(_site: Site, terrain: Terrain, *, at: At, radius_m: Number, height_m: Number) -> Terrain:
+    """Raise a round hill, or sink a hollow where its height is negative."""
+    return mound(terrain, at, radius_m, height_m)
+
+
+@ground_builder
+def level_area(
+    _site: Site, terrain: Terrain, *, area: Area, to_m: Number | None = None, blend_m: Number = 4.0
+) -> Terrain:
+    """Level an area, at its mean height by default, with a slope about it back to the old ground."""
+    return terrain.flattened(area, to_m, blend_m)
+
+
+@ground_builder
+def level_cross(_site: Site, terrain: Terrain, *, half_m: At, blend_m: At) -> Terrain:
+    """Level two strips along the axes at z = 0: that along y of the first half width, that along x of the second."""
+    x, y = grid(terrain)
+    rough = smooth((np.abs(y) - half_m[1]) / blend_m[1]) * smooth((np.abs(x) - half_m[0]) / blend_m[0])
+    return replace(terrain, heights_m=terrain.heights_m * rough)
+
+
+@ground_builder
+def slope(
+    _site: Site,
+    terrain: Terrain,
+    *,
+    start_m: Number,
+    end_m: Number,
+    to_m: Number,
+    within: tuple[Number, Number],
+    axis: Literal["x", "y"] = "x",
+) -> Terrain:
+    """Let the ground slope along an axis from its own height to another, level beyond; only within two limits."""
+    along = grid(terrain)["xy".index(axis)]
+    t = smooth((along - start_m) / (end_m - start_m))
+    inside = (along > within[0]) & (along <= within[1])
+    return replace(terrain, heights_m=np.where(inside, terrain.heights_m * (1 - t) + to_m * t, terrain.heights_m))
+
+
+@site_builder
+def ground_height(site: Site, *, at: At) -> float:
+    """Give the height of the painted ground at a point, to be named by `as`, metres."""
+    return site.ground_z(*at)
+
+
+def grid(terrain: Terrain) -> tuple[Floats, Floats]:
+    """Give x and y of the terrain's corners, metres, in the shape of its heights."""
+    xy = terrain.corners().reshape(*terrain.heights_m.shape, 3)
+    return xy[..., 0], xy[..., 1]
+
+
+def smooth(t: Floats) -> Floats:
+    """Ease from 0 to 1, with level ends."""
+    t = np.clip(t, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
