@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import warnings
 from collections import Counter
 from collections.abc import Callable
@@ -31,7 +32,6 @@ from support.layout_checks import (
 
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import load_recipe
 
 SCENES = sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
 TYPES = sorted({name.rpartition("_")[0] for name in SCENES})
@@ -104,7 +104,7 @@ def test_it_holds_what_the_paper_the_recipe_and_the_annotations_ask_for(scene: S
     assert kinds_of(scene)["landmark"] >= n_landmarks
     assert len(looks_of(scene)) >= n_objects
     there = Counter(i.category for i in scene.instances)
-    wanted = Counter(load_recipe(ASSETS / "scenes" / f"{scene.name}.toml").inventory)
+    wanted = Counter(tomllib.loads((ASSETS / "scenes" / f"{scene.name}.toml").read_text()).get("inventory", {}))
     assert wanted <= there
     annotated = read_annotations(scene.name)
     assert {thing["node"] for thing in annotated["landmarks"] if "node" in thing} <= {i.node for i in scene.instances}
