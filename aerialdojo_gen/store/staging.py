@@ -17,13 +17,15 @@ import re
 import secrets
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
 AREA = ".aerialdojo-staging"
 _LEASE, _OLD = "lease", "old"
-_TRIES = 100
+# How long others may take the area away before an item is in it. A number of tries would be used up in a millisecond.
+_PATIENCE_S = 30.0
 _UNSTAGED = re.compile(r"\.(?P<name>.+)\.\d+\.(?P<kind>tmp|old)(\.[A-Za-z0-9]+)?")
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL)
 
@@ -48,7 +50,8 @@ def staged(root: Path, target: Path) -> Iterator[Path]:
 
 def _claim(area: Path) -> tuple[Path, TextIO]:
     """Make an item and lock its lease; whoever sweeps in between takes it away, and another one is made."""
-    for left in reversed(range(_TRIES)):
+    end = time.monotonic() + _PATIENCE_S
+    while True:
         item = area / secrets.token_hex(8)
         try:
             area.mkdir(parents=True, exist_ok=True)
@@ -56,13 +59,14 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
             lease = (item / _LEASE).open("x+", encoding="utf-8", errors="surrogateescape")
         except (FileNotFoundError, FileExistsError):
             # Another process removed the area: pathlib reports the second where that came while it made it.
-            if not left:
+            if time.monotonic() > end:
                 raise
             continue
         if _lock(lease, unknown=True) and _is_at(lease, item / _LEASE):
             return item, lease
         lease.close()
-    raise OSError(errno.EBUSY, "it is swept again and again", str(area))
+        if time.monotonic() > end:
+            raise OSError(errno.EBUSY, "it is swept again and again", str(area))
 
 
 def sweep(root: Path) -> None:
