@@ -9,11 +9,11 @@ from support.layout_checks import catalogue, clashes, floating, props_of
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
-from aerialdojo_gen.scenes.layouts.disaster.parts.ground import crater, faulted, heaped, slab_pile
-from aerialdojo_gen.scenes.layouts.disaster.parts.relief import stand, stand_on_floor, strew_things
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, broken_edge, torn_floor, torn_wall
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.kit.relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, slab_pile
+from aerialdojo_gen.scenes.kit.ruins import put_up
+from aerialdojo_gen.scenes.kit.wreckage import Bite, broken_edge, torn_floor, torn_wall
+from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
@@ -102,7 +102,7 @@ def test_taken_ground_is_refused_by_name():
 
 def test_the_top_of_a_pile_is_level_and_free():
     site = blank()
-    z = slab_pile(site, 0.0, 0.0, 30.0, (14.0, 9.0), 4, "t")
+    z = slab_pile(site, (0.0, 0.0), 30.0, (14.0, 9.0), 4, "t")
     assert site.is_free(1.0, 0.0, 0.5, z=z)
     assert not site.is_free(1.0, 0.0, 0.5, z=z - 1.0)
     stand(site, "on top", [("bench", 1.0, 0.0, 0.0)], z=z)
@@ -110,13 +110,13 @@ def test_the_top_of_a_pile_is_level_and_free():
 
 
 def test_the_ground_sinks_right_of_a_fault():
-    ground = faulted(rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), [(-30.0, 0.0), (30.0, 0.0)], 1.5, 1.0)
+    ground = fault(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), [(-30.0, 0.0), (30.0, 0.0)], 1.5, 1.0)
     assert float(ground.z(3.0, 5.0)) == pytest.approx(0.0)
     assert float(ground.z(3.0, -5.0)) == pytest.approx(-1.5)
 
 
 def test_craters_have_a_bowl_and_a_rim():
-    ground = crater(rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0), 0.0, 0.0, 6.0, 3.0, 1.0, 2)
+    ground = crater(blank(), rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0), (0.0, 0.0), 6.0, 3.0, 1.0)
     assert float(ground.z(0.0, 0.0)) == pytest.approx(-3.0)
     ring = [float(ground.z(r, 0.0)) for r in np.arange(0.0, 20.0, 0.5)]
     assert max(ring) > 0.6
@@ -125,6 +125,6 @@ def test_craters_have_a_bowl_and_a_rim():
 
 def test_heaps_rise_inside_their_area_only():
     area = Polygon([(-5, -5), (5, -5), (5, 5), (-5, 5)])
-    ground = heaped(rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
+    ground = heap(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
     assert float(ground.z(0.0, 0.0)) > 1.0
     assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)

@@ -76,6 +76,27 @@ def test_a_yard_is_built_in_order(tmp_path, catalogue):
     assert [i.bounds.tolist() for i in again.instances] == [i.bounds.tolist() for i in scene.instances]
 
 
+def test_things_stand_in_a_frame_and_settle_on_a_slope(tmp_path, catalogue):
+    rise = {"make": "rises", "axis": "x", "stations": [[-20, 20, 8]]}
+    flat = {"make": "rolling_ground", "cell_m": 1, "height_m": 0, "wavelength_m": 9}
+    plan = {
+        **HEAD, "ground": {"steps": [flat, rise]},
+        "site": [
+            {"paint": [[-9, -9, -6, -6], {"blob": [6, 6, 3, 1, 0.2]}], "material": "gravel"},
+            {"place": [["bench", 2, 1, 10]], "frame": [5, 0, 90], "on": 9, "phrase": "upstairs"},
+            {"place": [["bench", 0, -8]], "settle_m": 1, "above_ground_m": -0.1, "fit": "must"},
+        ],
+    }  # fmt: skip
+    ground, up, low = build(tmp_path, catalogue, plan).instances
+    assert up.centroid[:2] == pytest.approx((4, 2), abs=0.3)
+    assert up.bounds[0, 2] == pytest.approx(9, abs=0.01)
+    # The ring about it is 0.3 m lower on one side.
+    assert 3.6 < low.bounds[0, 2] < 3.9
+    gravel = next(part for part in ground.parts if part.material == "gravel")
+    assert gravel.vertices[:, 0].min() == pytest.approx(-9)
+    assert gravel.vertices[:, 0].max() > 8
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
@@ -83,6 +104,8 @@ def test_a_yard_is_built_in_order(tmp_path, catalogue):
         ({"paint": "yard", "material": "mudd"}, r"site\[0\] \(paint\): .*unknown material 'mudd'.*mud"),
         ({"paint": {"disc": [0, 0, 3], "minus": {"disc": [0, 0, 9]}}, "material": "mud"}, "the area is empty"),
         ({"paint": {"disc": [0, 0, 3], "box": [0, 0, 1, 1]}, "material": "mud"}, "an area has one of"),
+        ({"paint": {"blob": [0, 0, 3]}, "material": "mud"}, r"blob is \[x, y, radius, seed\] or"),
+        ({"paint": ["yard", "yrd"], "material": "mud"}, "no area 'yrd'"),
         ({"make": "flat_hose"}, r"site\[0\] \(make\): no site builder 'flat_hose'.*flat_house"),
         ({"make": "wires", "headz": []}, r"site\[0\] \(make\) 'wires': .*unknown key 'headz'"),
         ({"make": "wires", "heads": [[0, 0]]}, r"site\[0\] \(make\) 'wires': .*heads"),

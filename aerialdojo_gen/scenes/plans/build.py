@@ -141,7 +141,8 @@ class _Building:
 
     def _paint(self, body: dict[str, Any], where: str) -> None:
         entry = self._read(Paint, body, where)
-        self._site.paint(entry.paint, entry.material, entry.rise_m, entry.edge)
+        for area in entry.paint:
+            self._site.paint(area, entry.material, entry.rise_m, entry.edge)
 
     def _make(self, body: dict[str, Any], where: str) -> None:
         """Call a builder; ``as`` names the height that it returns, e.g. of a roof, for what follows."""
@@ -200,12 +201,13 @@ class _Building:
         category, _, variant = thing.what.partition(":")
         if category not in self._site.catalogue:
             raise AssetError(f"{where}: unknown category {category!r}{nearest(category, self._site.catalogue)}")
-        x, y = thing.at
+        frame = Frame(*entry.frame)
+        x, y, yaw_deg = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
         z = thing.on if thing.on is not None else entry.on
-        if entry.above_ground_m:
-            z = self._site.ground_z(x, y) + entry.above_ground_m
         if entry.settle_m is not None:
-            z = settled_z(self._site, x, y, entry.settle_m)
+            z = settled_z(self._site, x, y, entry.settle_m) + entry.above_ground_m
+        elif entry.above_ground_m:
+            z = self._site.ground_z(x, y) + entry.above_ground_m
         if entry.sunk is not None:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant or None, x, y)
@@ -214,7 +216,7 @@ class _Building:
         options = {key: value for key, value in given.items() if value and value != 1.0}
         if not thing.solid:
             options["solid"] = False
-        one = Placement(category, x, y, thing.yaw_deg, variant or None, z, entry.phrase, thing.node, options)
+        one = Placement(category, x, y, yaw_deg, variant or None, z, entry.phrase, thing.node, options)
         try:
             return place(self._site, one, entry.fit, entry.clear_m, entry.margin_m) is not None
         except AssetError as error:

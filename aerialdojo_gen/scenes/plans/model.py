@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
 from aerialdojo_gen.scenes.recipe import Colour, Extent, Height, Level, Move, Origin, Sun
 
 VERSION = 1
@@ -49,11 +49,11 @@ class Ground(BaseModel):
 
 
 class Paint(BaseModel):
-    """Paint an area of the ground over what was painted before."""
+    """Paint an area of the ground, or several, over what was painted before."""
 
     model_config = _STRICT
 
-    paint: Area
+    paint: Areas
     material: Material
     rise_m: Number = 0.0  # Height over the terrain; its edge becomes a kerb
     edge: Material = "concrete"  # Material of that kerb
@@ -131,6 +131,7 @@ class Place(BaseModel):
 
     place: Annotated[list[Any], Field(max_length=2000)] = []  # Things, short or long
     pattern: Pattern | None = None
+    frame: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)  # Origin and direction that their poses are given in
     phrase: Annotated[str, Field(max_length=200)] = ""  # Where they are, in words: "on the dyke"
     on: Number | None = None  # Height that they stand on; the ground where absent
     above_ground_m: Number = 0.0  # Height over the ground; negative: sunk into it

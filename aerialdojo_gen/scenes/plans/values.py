@@ -23,6 +23,7 @@ from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.materials import MaterialLibrary
 
 Point = tuple[float, float]
@@ -112,6 +113,12 @@ class PlanNames:
         except AssetError as error:
             raise ValueError(str(error)) from None
 
+    def several(self, value: Any) -> list[BaseGeometry]:
+        """Resolve a list of areas, or one area."""
+        if isinstance(value, list) and value and not any(isinstance(one, int | float) for one in value):
+            return [self.area(one) for one in value]
+        return [self.area(value)]
+
     def material(self, value: Any) -> str:
         """Resolve a name of the palette, or a material."""
         if not isinstance(value, str):
@@ -136,6 +143,14 @@ def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
         raise ValueError(f"disc is [x, y, radius] or [x, y, radius, corners], got {given!r}")
     x, y, radius = (names.number(one) for one in given[:3])
     return disc(x, y, radius, int(given[3])) if len(given) == 4 else disc(x, y, radius)
+
+
+def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    given = value["blob"]
+    if not isinstance(given, list) or len(given) not in (4, 5):
+        raise ValueError(f"blob is [x, y, radius, seed] or [x, y, radius, seed, ragged], got {given!r}")
+    x, y, radius, seed, ragged = (names.number(one) for one in (*given, 0.25)[:5])
+    return blob(x, y, radius, int(seed), ragged)
 
 
 def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
@@ -176,7 +191,7 @@ def _is_box(value: Sequence[Any]) -> bool:
     return len(value) == 4 and all(isinstance(one, int | float) for one in value)
 
 
-_AREAS = {"box": _box, "disc": _disc, "ribbon": _ribbon, "polygon": _polygon, "union": _union}
+_AREAS = {"box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon, "union": _union}
 _CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown}
 
 
@@ -218,6 +233,12 @@ Bodies = Annotated[
     WithJsonSchema({"type": "array", "items": {"type": "object"}}),
 ]
 """Parts as of a structure, which a builder adds to what it makes."""
+Areas = Annotated[
+    list[BaseGeometry],
+    PlainValidator(lambda value, info: _names(info).several(value)),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}, {"type": "object"}]}),
+]
+"""An area, or a list of areas."""
 Material = Annotated[
     str, PlainValidator(lambda value, info: _names(info).material(value)), WithJsonSchema({"type": "string"})
 ]

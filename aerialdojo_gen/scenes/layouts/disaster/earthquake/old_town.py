@@ -12,20 +12,20 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.kit.natural_ground import blob
-from aerialdojo_gen.scenes.kit.structures import columns
-from aerialdojo_gen.scenes.layouts.disaster.earthquake.old_town_things import furnish_town
-from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
-from aerialdojo_gen.scenes.layouts.disaster.parts.ground import (
+from aerialdojo_gen.scenes.kit.relief import leaning_poles
+from aerialdojo_gen.scenes.kit.rubble import (
     cracks,
-    faulted,
-    heaped,
+    fault,
+    heap,
+    rises,
     slab_pile,
-    sloped,
     strew_chunks,
 )
-from aerialdojo_gen.scenes.layouts.disaster.parts.relief import leaning_poles
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, Parts, torn_floor
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.kit.ruins import put_up
+from aerialdojo_gen.scenes.kit.structures import columns
+from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, torn_floor
+from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.layouts.disaster.earthquake.old_town_things import furnish_town
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -47,8 +47,8 @@ def build_old_town(site: Site, drop_m: float, litter: float) -> None:
         put_up(site, wreck, bases[name], node=name, category="damaged_house")
     stone = site.material("stone", "blocks:#b5a78c")
     floor, tiles = "boards:#7d6243", site.material("tiles", "roof_tiles:#b0684a")
-    pile = slab_pile(site, 3.0, 19.0, 4.0, (13.0, 9.0), 4, "north", floor=floor, wall=stone, gap_m=0.7, top=tiles)
-    low = slab_pile(site, 31.5, -13.5, 86.0, (12.0, 8.5), 3, "east", floor=floor, wall=stone, gap_m=0.7, top=tiles)
+    pile = slab_pile(site, (3.0, 19.0), 4.0, (13.0, 9.0), 4, "north", floor=floor, wall=stone, gap_m=0.7, top=tiles)
+    low = slab_pile(site, (31.5, -13.5), 86.0, (12.0, 8.5), 3, "east", floor=floor, wall=stone, gap_m=0.7, top=tiles)
     arcade = _arcade(site, stone)
     _shores(site, wrecks)
     furnish_town(site, wrecks, bases, (pile, low, arcade))
@@ -112,15 +112,15 @@ def _heaps(seed: int) -> list[tuple[Polygon, float]]:
 
 def _ground(site: Site, drop_m: float, wrecks: dict[str, Wreck], heaps: list[tuple[Polygon, float]]) -> None:
     ground = rolling_terrain(site.recipe.size_m, 1.7, site.recipe.seed, 0.3, 26.0, octaves=2)
-    ground = sloped(ground, [(-24.0, 4.0, 0.9), (3.0, 27.0, 3.6), (24.0, 42.0, 1.4)], 1)
-    ground = sloped(ground, [(-50.0, -22.0, -1.4), (20.0, 50.0, 1.2)], 0)
-    ground = faulted(ground, _FAULT, drop_m, 1.4)
+    ground = rises(site, ground, [(-24.0, 4.0, 0.9), (3.0, 27.0, 3.6), (24.0, 42.0, 1.4)], "y")
+    ground = rises(site, ground, [(-50.0, -22.0, -1.4), (20.0, 50.0, 1.2)], "x")
+    ground = fault(site, ground, _FAULT, drop_m, 1.4)
     ground = ground.flattened(_TERRACE, float(ground.z(0.0, 36.0)) + 0.7, blend_m=2.2)
     for wreck in wrecks.values():
         ground = ground.flattened(wreck.frame.area(wreck.plan), blend_m=2.2)
     ground = ground.flattened(disc(-2.0, -8.0, 5.0), blend_m=3.0)
     for k, (area, height) in enumerate(heaps):
-        ground = heaped(ground, area, height, site.recipe.seed + k)
+        ground = heap(site, ground, area, height, site.recipe.seed + k)
     site.set_ground(ground, site.material("garden", "meadow:#7d8450"))
     cobbles, lane = site.material("piazza", "paving:#c2b195"), site.material("lane", "cobbles:#8f877a")
     lanes: list[tuple[list[tuple[float, float]], float]] = [

@@ -12,12 +12,12 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_streets import crossing, streets
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.relief import leaning_poles
+from aerialdojo_gen.scenes.kit.rubble import cracks, fault, heap, slab_pile, strew_chunks
+from aerialdojo_gen.scenes.kit.ruins import put_up
+from aerialdojo_gen.scenes.kit.wreckage import Bite
+from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.layouts.disaster.earthquake.square_things import furnish_square
-from aerialdojo_gen.scenes.layouts.disaster.parts.buildings import put_up
-from aerialdojo_gen.scenes.layouts.disaster.parts.ground import cracks, faulted, heaped, slab_pile, strew_chunks
-from aerialdojo_gen.scenes.layouts.disaster.parts.relief import leaning_poles
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
@@ -44,8 +44,7 @@ def build_square(site: Site, drop_m: float, litter: float) -> None:
         put_up(site, wreck, bases[name], node=name)
     pile = slab_pile(
         site,
-        26.0,
-        3.5,
+        (26.0, 3.5),
         90.0,
         (21.0, 11.5),
         6,
@@ -152,11 +151,11 @@ def _heaps(seed: int) -> list[tuple[Polygon, float]]:
 
 def _ground(site: Site, drop_m: float, wrecks: dict[str, Wreck], heaps: list[tuple[Polygon, float]]) -> None:
     ground = rolling_terrain(site.recipe.size_m, 1.6, site.recipe.seed, 0.22, 30.0, octaves=2)
-    ground = faulted(ground, _FAULT, drop_m, 1.3)
+    ground = fault(site, ground, _FAULT, drop_m, 1.3)
     for wreck in wrecks.values():
         ground = ground.flattened(wreck.frame.area(wreck.plan), blend_m=2.5)
     for k, (area, height) in enumerate(heaps):
-        ground = heaped(ground, area, height, site.recipe.seed + k)
+        ground = heap(site, ground, area, height, site.recipe.seed + k)
     site.set_ground(ground, site.material("yard", "dirt:#8b8271"))
     for area in (rectangle(-44, -40, -27, 40), rectangle(-17, 14, 44, 40), rectangle(-18, -40, 44, -24)):
         site.paint(area.buffer(-1.0), site.material("lawn", "grass:#77844f"))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.disaster.parts.relief import stand, stand_on_floor, strew_things
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
+from aerialdojo_gen.scenes.kit.relief import stand, stand_on_floor, strew_things
+from aerialdojo_gen.scenes.kit.wrecks import Wreck
 from aerialdojo_gen.scenes.site import Site
 
 

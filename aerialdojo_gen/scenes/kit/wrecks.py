@@ -12,7 +12,8 @@ from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Bite, remains
+from aerialdojo_gen.scenes.kit.wreckage import Bite, remains
+from aerialdojo_gen.scenes.plans.values import Material, Number
 
 
 @dataclass(frozen=True)
@@ -43,19 +44,19 @@ class Style:
         Shares of the windows that kept their panes, and that have a plume of soot above.
     """
 
-    wall: str = "plaster:#cfc3ab"
-    band: str = "concrete"
-    floor: str = "concrete"
-    inner: tuple[str, ...] = ("plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a")
-    roof: str = "gravel:#8f8a82"
-    storey_m: float = 3.1
-    bay_m: float = 3.4
-    window_m: tuple[float, float, float] = (1.5, 0.9, 2.3)
-    wall_m: float = 0.28
+    wall: Material = "plaster:#cfc3ab"
+    band: Material = "concrete"
+    floor: Material = "concrete"
+    inner: tuple[Material, ...] = ("plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a")
+    roof: Material = "gravel:#8f8a82"
+    storey_m: Number = 3.1
+    bay_m: Number = 3.4
+    window_m: tuple[Number, Number, Number] = (1.5, 0.9, 2.3)
+    wall_m: Number = 0.28
     columns: bool = True
     shops: bool = False
-    panes: float = 0.55
-    soot: float = 0.0
+    panes: Number = 0.55
+    soot: Number = 0.0
 
 
 @dataclass(frozen=True)

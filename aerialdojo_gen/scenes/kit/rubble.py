@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import shapely
 from shapely.affinity import rotate, scale, translate
 from shapely.geometry import LineString, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import XY, Parts, bars, chunk, tilted_plate
+from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.kit.wreckage import Parts, bars, chunk, tilted_plate
 from aerialdojo_gen.scenes.mesh import translated
 from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
 
-def faulted(terrain: Terrain, path: Sequence[XY], drop_m: float, width_m: float = 1.6) -> Terrain:
+@ground_builder
+def fault(_site: Site, terrain: Terrain, path: Line, drop_m: Number, width_m: Number = 1.6) -> Terrain:
     """Let the ground right of a path sink by `drop_m`; the scarp is `width_m` wide. The path crosses the site."""
     line = LineString(path)
     corners = terrain.corners()[:, :2]
@@ -35,20 +37,24 @@ def faulted(terrain: Terrain, path: Sequence[XY], drop_m: float, width_m: float 
     return replace(terrain, heights_m=terrain.heights_m - drop_m * t.reshape(terrain.heights_m.shape))
 
 
-def sloped(terrain: Terrain, path: Sequence[tuple[float, float, float]], axis: int) -> Terrain:
-    """Add a slope along x (axis 0) or y (axis 1): heights between stations (from, to, rise), smooth between them."""
-    corners = terrain.corners()[:, axis]
+@ground_builder
+def rises(
+    _site: Site, terrain: Terrain, stations: list[tuple[Number, Number, Number]], axis: Literal["x", "y"]
+) -> Terrain:
+    """Let the ground rise along an axis between stations (from, to, rise), smoothly."""
+    corners = terrain.corners()[:, "xy".index(axis)]
     rise = np.zeros(len(corners))
-    for start, end, height in path:
+    for start, end, height in stations:
         t = np.clip((corners - start) / (end - start), 0.0, 1.0)
         rise += height * t * t * (3.0 - 2.0 * t)
     return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
 
 
-def crater(terrain: Terrain, x: float, y: float, radius_m: float, depth_m: float, rim_m: float, seed: int) -> Terrain:
+@ground_builder
+def crater(site: Site, terrain: Terrain, at: At, radius_m: Number, depth_m: Number, rim_m: Number) -> Terrain:
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
-    corners = terrain.corners()[:, :2] - (x, y)
-    noise = OpenSimplex(seed=seed)
+    corners = terrain.corners()[:, :2] - at
+    noise = OpenSimplex(seed=site.recipe.seed)
     angle = np.arctan2(corners[:, 1], corners[:, 0])
     wave = np.array([noise.noise2(1.5 * float(np.cos(a)), 1.5 * float(np.sin(a))) for a in angle])
     r = np.hypot(corners[:, 0], corners[:, 1]) / (radius_m * (1.0 + 0.14 * wave))
@@ -58,7 +64,8 @@ def crater(terrain: Terrain, x: float, y: float, radius_m: float, depth_m: float
     return replace(terrain, heights_m=terrain.heights_m + change)
 
 
-def heaped(terrain: Terrain, area: Polygon, height_m: float, seed: int) -> Terrain:
+@ground_builder
+def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int) -> Terrain:
     """Pile rubble over an area: steep at its border, lumpy on top."""
     corners = terrain.corners()[:, :2]
     points = shapely.points(corners)
@@ -73,7 +80,8 @@ def heaped(terrain: Terrain, area: Polygon, height_m: float, seed: int) -> Terra
     return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
 
 
-def cracks(site: Site, starts: Sequence[tuple[float, float, float]], length_m: float, seed: int) -> None:
+@site_builder
+def cracks(site: Site, starts: list[tuple[Number, Number, Number]], length_m: Number, seed: int) -> None:
     """Paint jagged cracks that start at (x, y) and run along a direction in degrees, forking once."""
     rng = site.rng_for("cracks", seed)
     for x, y, yaw in starts:
@@ -95,21 +103,22 @@ def cracks(site: Site, starts: Sequence[tuple[float, float, float]], length_m: f
                 site.paint(band.simplify(0.04).intersection(site.extent), "#2b2926")
 
 
+@site_builder
 def strew_chunks(
     site: Site,
-    area: BaseGeometry,
-    spacing_m: float,
-    key: str,
+    area: Area,
+    spacing_m: Number,
+    stream: str,
     *,
-    plate: str = "concrete",
-    lump: str = "rubble",
-    brick: str = "brick",
-    beam: str = "concrete",
-    size_m: tuple[float, float] = (0.5, 1.9),
+    plate: Material = "concrete",
+    lump: Material = "rubble",
+    brick: Material = "brick",
+    beam: Material = "concrete",
+    size_m: tuple[Number, Number] = (0.5, 1.9),
     limit: int = 400,
 ) -> Instance | None:
     """Strew loose pieces over free ground of an area; larger pieces take their ground."""
-    rng = site.rng_for("chunks", key)
+    rng = site.rng_for("chunks", stream)
     kinds = (("slab", plate, 0.34), ("lump", lump, 0.3), ("brick", brick, 0.24), ("beam", beam, 0.12))
     parts: Parts = []
     for pose in poisson_disc(area, spacing_m, rng, limit=limit):
@@ -128,21 +137,32 @@ def strew_chunks(
     return site.add(None, "rubble_field", parts) if parts else None
 
 
+@site_builder
+def strew_about_heaps(
+    site: Site, *, heaps: list[Area], spacing_m: Number, margin_m: Number = 2.0, plate: Material = "concrete",
+    lump: Material = "rubble", brick: Material = "brick", beam: Material = "concrete",
+) -> None:  # fmt: skip
+    """Strew loose pieces over heaps of rubble and `margin_m` about each."""
+    for k, area in enumerate(heaps):
+        around = area.buffer(margin_m)
+        strew_chunks(site, around, spacing_m, f"heap{k}", plate=plate, lump=lump, brick=brick, beam=beam)
+
+
+@site_builder
 def slab_pile(
     site: Site,
-    x: float,
-    y: float,
-    yaw_deg: float,
-    size_m: tuple[float, float],
+    at: At,
+    yaw_deg: Number,
+    size_m: tuple[Number, Number],
     count: int,
-    key: str,
+    stream: str,
     *,
-    base_m: float | None = None,
-    gap_m: float = 0.75,
-    floor: str = "concrete",
-    wall: str = "plaster",
-    tilt_deg: float = 5.0,
-    top: str | None = None,
+    base_m: Number | None = None,
+    gap_m: Number = 0.75,
+    floor: Material = "concrete",
+    wall: Material = "plaster",
+    tilt_deg: Number = 5.0,
+    top: Material | None = None,
     node: str | None = None,
 ) -> float:
     """Pile up the floors of a pancaked building, crushed walls between them; the top one lies level.
@@ -151,13 +171,13 @@ def slab_pile(
     ----------
     site : Site
         Where.
-    x, y, yaw_deg : float
+    at, yaw_deg : (x, y), float
         Middle of the pile, metres, and the direction of its length.
     size_m : (float, float)
         Length and width of the lowest floor, metres.
     count : int
         Number of floors.
-    key : str
+    stream : str
         Of the draws.
     base_m : float, optional
         Height of its foot; the ground's in the middle by default.
@@ -175,7 +195,8 @@ def slab_pile(
     float
         Height of the level top, metres.
     """
-    rng = site.rng_for("pile", key)
+    rng = site.rng_for("pile", stream)
+    x, y = at
     base = site.ground_z(x, y) if base_m is None else base_m
     turn = np.radians(yaw_deg)
     parts: Parts = []
@@ -188,10 +209,12 @@ def slab_pile(
         )
         shift = rng.uniform(-0.7, 0.7, size=2) * (0.0 if level else 1.0)
         shrink = 1.0 - 0.035 * k
-        at = (x + float(shift[0]), y + float(shift[1]), z)
+        middle = (x + float(shift[0]), y + float(shift[1]), z)
         size = (size_m[0] * shrink, size_m[1] * shrink)
         yaw = yaw_deg + float(rng.uniform(-4, 4))
-        parts.append(((top or floor) if level else floor, tilted_plate(size, 0.26, at, (tilt[0], tilt[1]), yaw, rng)))
+        parts.append(
+            ((top or floor) if level else floor, tilted_plate(size, 0.26, middle, (tilt[0], tilt[1]), yaw, rng))
+        )
         for _ in range(int(sum(size_m) / 1.3)):
             # Crushed wall and columns look out between the floors all around.
             edge, s = int(rng.integers(4)), float(rng.uniform(-0.45, 0.45))

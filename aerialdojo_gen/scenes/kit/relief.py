@@ -6,15 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from shapely.geometry import Point, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import settled_z
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import Parts
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
+from aerialdojo_gen.scenes.kit.wreckage import Parts
+from aerialdojo_gen.scenes.kit.wrecks import Wreck
 from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import Area, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -77,8 +78,9 @@ def stand_on_floor(
     return out
 
 
+@site_builder
 def strew_things(
-    site: Site, place: str, area: BaseGeometry, categories: Sequence[str], key: str, clear_m: float = 1.4
+    site: Site, place: str, area: Area, categories: list[str], stream: str, clear_m: Number = 1.4
 ) -> list[Instance]:
     """Set things out where an area has room for them and for a drone around them, a spot each.
 
@@ -90,14 +92,14 @@ def strew_things(
         As in `stand`.
     area : shapely geometry
         World frame, metres.
-    categories : sequence of str
+    categories : list of str
         In the order of placing; what finds no room is left out.
-    key : str
+    stream : str
         Of the draws.
     clear_m : float
         Room kept around each, metres.
     """
-    rng = site.rng_for("strew", key)
+    rng = site.rng_for("strew", stream)
     spots = poisson_disc(area, 1.1, rng, limit=2000)
     out: list[Instance] = []
     for category in categories:
@@ -116,7 +118,8 @@ def strew_things(
     return out
 
 
-def leaning_poles(site: Site, poles: Sequence[tuple[float, float, float, float]], height_m: float = 8.0) -> None:
+@site_builder
+def leaning_poles(site: Site, poles: list[tuple[Number, Number, Number, Number]], height_m: Number = 8.0) -> None:
     """Put up a line of poles that lean by degrees towards a direction (x, y, lean, yaw), with slack wires between.
 
     They are structure: poles that stand askew are told apart by nobody.

@@ -1,19 +1,21 @@
-"""Industrial structure after a blast: halls with bent frames and torn cladding, burst tanks, broken pipe bridges."""
+"""What a blast leaves of industrial structure: bent halls, burst tanks, broken bridges, bent lamps, torn walls."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from shapely.geometry import Point, Polygon
+from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, columns, railing
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import XY, Parts, tilted_plate, torn_wall
+from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -25,8 +27,6 @@ class Hall:
 
     Attributes
     ----------
-    frame : Frame
-        Middle of its plan, and the direction of its length.
     length_m, depth_m, eaves_m, ridge_m : float
         Its size; the ridge runs along x.
     blast : (x, y)
@@ -39,20 +39,21 @@ class Hall:
         Materials.
     """
 
-    frame: Frame
-    length_m: float
-    depth_m: float
-    eaves_m: float
-    ridge_m: float
-    blast: XY
-    reach_m: float
-    gallery_m: float = 0.0
-    cladding: str = "corrugated:#7d8f96"
-    steel: str = "rust"
+    length_m: Number
+    depth_m: Number
+    eaves_m: Number
+    ridge_m: Number
+    blast: At
+    reach_m: Number
+    gallery_m: Number = 0.0
+    cladding: Material = "corrugated:#7d8f96"
+    steel: Material = "rust"
 
 
-def steel_hall(site: Site, hall: Hall, base_m: float, node: str) -> Instance:
-    """Put up what a blast left of a steel hall: frames bent away from it, sheets torn off or hanging."""
+@site_builder
+def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: Hall) -> float:
+    """Put up what a blast left of a steel hall: bent frames, sheets torn off or hanging; gives its floor's height."""
+    base = site.ground_z(*at)
     rng = site.rng_for("hall", node)
     count = max(round(hall.length_m / 5.0), 2)
     stations = np.linspace(-hall.length_m / 2, hall.length_m / 2, count + 1)
@@ -71,7 +72,8 @@ def steel_hall(site: Site, hall: Hall, base_m: float, node: str) -> Instance:
     parts.append(("concrete", merge([block(-x, s * y - 0.15, x, s * y + 0.15, -0.8, 0.5) for s in (1,)])))
     if hall.gallery_m:
         parts += _gallery(hall)
-    return site.add(node, "wrecked_hall", hall.frame.parts(parts, base_m))
+    site.add(node, "wrecked_hall", Frame(*at, yaw_deg).parts(parts, base))
+    return base
 
 
 def _portal(hall: Hall, x: float, rng: np.random.Generator) -> list[np.ndarray]:
@@ -143,11 +145,13 @@ def _gallery(hall: Hall) -> Parts:
     return parts
 
 
+@site_builder
 def burst_tank(
-    site: Site, x: float, y: float, radius_m: float, height_m: float, blast: XY, node: str, shell: str = "sheet_metal"
-) -> Instance:
+    site: Site, *, node: str, at: At, radius_m: Number, height_m: Number, blast: At, shell: Material = "sheet_metal"
+) -> None:
     """Put up a tank that burst: its shell torn down and folded out on the blast's side, its lid fallen in."""
     rng = site.rng_for("tank", node)
+    x, y = at
     base = site.ground_z(x, y)
     n = 26
     toward = float(np.arctan2(blast[1] - y, blast[0] - x))
@@ -171,8 +175,8 @@ def burst_tank(
                 box(size=[height_m * 0.45, length * 1.3, 0.07], taper=(0.6, 1.0)), (height_m * 0.2, 0, 0)
             )
             turn = rotation(0.0, float(rng.uniform(-25, 30)), float(np.degrees(mid)))
-            at = (radius_m * float(np.cos(mid)), radius_m * float(np.sin(mid)), max(top, 0.9) * 0.95)
-            parts.append(("rust", translated(rotated(plate, turn), at)))
+            edge = (radius_m * float(np.cos(mid)), radius_m * float(np.sin(mid)), max(top, 0.9) * 0.95)
+            parts.append(("rust", translated(rotated(plate, turn), edge)))
     for band in (0.35, 0.65, 0.95):
         arc = [toward + np.radians(d) for d in np.linspace(70, 290, 12)]
         ring = [
@@ -189,23 +193,24 @@ def burst_tank(
     )
     parts.append(("rust", lid))
     area = Point(x, y).buffer(radius_m + 0.6, quad_segs=6)
-    return site.add(node, "burst_tank", Frame(x, y).parts(parts, base), footprint=area)
+    site.add(node, "burst_tank", Frame(x, y).parts(parts, base), footprint=area)
 
 
-def pipe_bridge(
-    site: Site, a: XY, b: XY, z_m: float, gap: tuple[float, float], node: str, walkway_m: float = 2.2,
-    pipes: bool = True, category: str = "pipe_bridge",
-) -> Instance:  # fmt: skip
-    """Put up a pipe bridge at a height over its foot, with a walkway, broken between two shares of its length.
+@site_builder
+def broken_bridge(
+    site: Site, *, node: str, ends: tuple[At, At], over: list[At], clear_m: Number, gap: tuple[Number, Number],
+    walkway_m: Number = 2.2, pipes: bool = True, category: str = "pipe_bridge",
+) -> float:  # fmt: skip
+    """Put up a bridge with a walkway, broken between two shares of its length; gives the walkway's height, metres.
 
     Parameters
     ----------
-    a, b : (x, y)
+    ends : two of (x, y)
         Its ends, metres.
-    z_m : float
-        World height of the walkway, metres.
+    over : list of (x, y)
+        Points of the ground; the walkway lies `clear_m` over the highest.
     gap : (float, float)
-        Where it is broken, shares of the length from `a`.
+        Where it is broken, shares of the length from its first end.
     walkway_m : float
         Width of the walkway, metres.
     pipes : bool
@@ -214,6 +219,7 @@ def pipe_bridge(
         As in `Site.add`.
     """
     rng = site.rng_for("bridge", node)
+    (a, b), z_m = ends, max(site.ground_z(*point) for point in over) + clear_m
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     frame = Frame(a[0], a[1], float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
     steel, deck = [], []
@@ -249,14 +255,16 @@ def pipe_bridge(
     parts += [(colour, merge(bodies)) for colour, bodies in runs.items()]
     for s0, s1 in ((0.0, gap[0] * length), (gap[1] * length, length)):
         parts += railing([(s0, walkway_m / 2), (s1, walkway_m / 2)], z_m, pane="chain_link", frame="steel")
-    return site.add(node, category, frame.parts(parts))
+    site.add(node, category, frame.parts(parts))
+    return z_m
 
 
-def twisted_steel(site: Site, places: Sequence[tuple[float, float, float]], key: str) -> Instance:
+@site_builder
+def twisted_steel(site: Site, *, beams: list[tuple[Number, Number, Number]], stream: str) -> None:
     """Strew bent beams that a blast threw: (x, y, length) each, metres."""
-    rng = site.rng_for("twisted", key)
+    rng = site.rng_for("twisted", stream)
     bodies = []
-    for x, y, length in places:
+    for x, y, length in beams:
         yaw, z = float(rng.uniform(0, 2 * np.pi)), site.ground_z(x, y)
         path = []
         for t in np.linspace(0.0, 1.0, 5):
@@ -267,4 +275,108 @@ def twisted_steel(site: Site, places: Sequence[tuple[float, float, float]], key:
             path.append((px, py, max(z, site.ground_z(px, py)) + lift))
         bodies.append(sweep(path=path, section=(0.22, 0.28)))
         site.occupy(Point(x, y).buffer(length * 0.35), z - 1.0, z + 1.5)
-    return site.add(None, "twisted_steel", [("rust", merge(bodies))])
+    site.add(None, "twisted_steel", [("rust", merge(bodies))])
+
+
+@site_builder
+def scorch_rays(
+    site: Site, *, at: At, radius_m: Number, count: int, reach: tuple[Number, Number],
+    spread: tuple[Number, Number], material: Material,
+) -> None:  # fmt: skip
+    """Paint rays of soot about a crater: `reach` in radii of its crest, half their width in radians."""
+    rng = site.rng_for("rays")
+    rays = []
+    for _ in range(count):
+        a, r = float(rng.uniform(0, 2 * np.pi)), radius_m * float(rng.uniform(*reach))
+        w = float(rng.uniform(*spread))
+        points = [
+            (at[0] + q * float(np.cos(b)), at[1] + q * float(np.sin(b)))
+            for q, b in ((radius_m, a - w), (r, a), (radius_m, a + w))
+        ]
+        rays.append(Polygon(points))
+    site.paint(unary_union(rays), material)
+
+
+@site_builder
+def crater_rim(site: Site, *, at: At, radius_m: Number) -> None:
+    """Stand the slabs of a broken pavement up around a crater."""
+    rng = site.rng_for("rim")
+    plates, steel = [], []
+    for k in range(15):
+        a = 2 * np.pi * k / 15 + float(rng.uniform(-0.12, 0.12))
+        r = radius_m * float(rng.uniform(0.98, 1.22))
+        x, y = at[0] + r * float(np.cos(a)), at[1] + r * float(np.sin(a))
+        size = (float(rng.uniform(1.2, 2.3)), float(rng.uniform(1.0, 1.9)))
+        top = (x, y, site.ground_z(x, y) + 0.4)
+        tilt = (float(rng.uniform(-9, 9)), -float(rng.uniform(20, 42)))
+        plates.append(tilted_plate(size, 0.2, top, tilt, float(np.degrees(a)), rng))
+        steel.append(bars((x, y), top[2] - 0.1, float(np.degrees(a)) + float(rng.uniform(-40, 40)), rng, 1.3))
+        site.occupy(disc(x, y, 0.9, 8))
+    site.add("crater_rim", "crater_rim", [("concrete", merge(plates)), ("rust", merge(steel))])
+
+
+@site_builder
+def torn_yard_wall(site: Site, *, runs: list[Line], hole: Bite, brick: Material, height_m: Number = 2.8) -> None:
+    """Put up a wall of straight runs about a yard, with a hole whose heights count from the ground."""
+    parts: Parts = []
+    for k, (a, b) in enumerate(runs):
+        low = min(site.ground_z(*a), site.ground_z(*b))
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        top = max(site.ground_z(*a), site.ground_z(*b)) + height_m
+        face = Polygon([(0, low - 0.6), (length, low - 0.6), (length, top), (0, top)])
+        tear = replace(hole, z0_m=low + hole.z0_m, z1_m=low + hole.z1_m)
+        body = torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)
+        if body is not None:
+            parts.append((brick, body))
+    site.add("yard_wall", "yard_wall", parts)
+    for a, b in runs:
+        corners = [(a[0] - 0.4, a[1] - 0.4), (b[0] + 0.4, a[1] - 0.4), (b[0] + 0.4, b[1] + 0.4),
+                   (a[0] - 0.4, b[1] + 0.4)]  # fmt: skip
+        site.occupy(Polygon(corners).buffer(0.01))
+
+
+@site_builder
+def step_walls(site: Site, *, y: Number, spans: list[tuple[Number, Number]]) -> None:
+    """Put up retaining walls along x at a step of the ground that falls to the south; between them it is open."""
+    parts: Parts = []
+    for x0, x1 in spans:
+        low, high = site.ground_z((x0 + x1) / 2, y - 1.5), site.ground_z((x0 + x1) / 2, y + 1.5)
+        face = Polygon([(0, low - 0.5), (x1 - x0, low - 0.5), (x1 - x0, high + 0.5), (0, high + 0.5)])
+        body = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
+        if body is not None:
+            parts.append(("concrete", body))
+        site.occupy(rectangle(x0, y - 1.0, x1, y + 0.4))
+    site.add("retaining_wall", "retaining_wall", parts)
+
+
+@site_builder
+def bent_lamps(site: Site, *, feet: list[At], blast: At) -> None:
+    """Put up street lamps that a blast bent away from it, the more the nearer they stand."""
+    bodies, heads = [], []
+    for x, y in feet:
+        away = np.array([x - blast[0], y - blast[1]])
+        d = float(np.hypot(*away))
+        lean = 5.5 * float(np.exp(-((d / 12.0) ** 2)))
+        u = away / d
+        z = site.ground_z(x, y) - 0.2
+        path = [(x, y, z), (x + 0.1 * lean * u[0], y + 0.1 * lean * u[1], z + 3.0),
+                (x + 0.55 * lean * u[0], y + 0.55 * lean * u[1], z + 6.2 - 0.3 * lean),
+                (x + (lean + 0.4) * u[0], y + (lean + 0.4) * u[1], z + 7.4 - 0.75 * lean)]  # fmt: skip
+        bodies.append(sweep(path=path, radius=0.09, sides=6))
+        end = path[-1]
+        arm = [end, (end[0] + 0.7 * u[0], end[1] + 0.7 * u[1], end[2] - 0.1)]
+        heads.append(sweep(path=arm, section=(0.3, 0.14)))
+        site.occupy(disc(x, y, 0.4, 8))
+    site.add("bent_lamps", "bent_lamps", [("#4a5055", merge(bodies)), ("#c9cdc8", merge(heads))])
+
+
+@site_builder
+def burst_main(site: Site, *, at: At) -> None:
+    """Lay the two ends of a burst water main bare in a crater."""
+    z = site.ground_z(*at) + 0.9
+    main = []
+    for side in (-1, 1):
+        path = [(at[0] + side * 5.6, at[1] + 0.6, z), (at[0] + side * 2.2, at[1] + 0.4, z - 0.1),
+                (at[0] + side * 1.5, at[1] + 0.2, z + 0.35 * side)]  # fmt: skip
+        main.append(sweep(path=path, radius=0.32, sides=10))
+    site.add("water_main", "water_main", [("rust", merge(main))])

@@ -1,6 +1,6 @@
 """Broken structure: what a collapse tears out of walls and floors, bared reinforcement, hanging slabs, loose chunks.
 
-Buildings are made in a frame of their own, z = 0 at their ground floor; see `buildings`.
+Buildings are made in a frame of their own, z = 0 at their ground floor; see `ruins`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Number
 from aerialdojo_gen.scenes.shapes import box, crown
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 
@@ -46,12 +47,12 @@ class Bite:
         Of its ragged edge.
     """
 
-    x: float
-    y: float
-    foot_m: float
-    head_m: float
-    z0_m: float = 0.4
-    z1_m: float = 15.0
+    x: Number
+    y: Number
+    foot_m: Number
+    head_m: Number
+    z0_m: Number = 0.4
+    z1_m: Number = 15.0
     seed: int = 0
 
     def area(self, z_m: float) -> Polygon:

@@ -1,6 +1,6 @@
 """Buildings after a disaster: torn open, pancaked, leaning, or stripped to their frame.
 
-Everything is made in the building's own frame; see `aerialdojo_gen.scenes.layouts.disaster.parts.wrecks`.
+Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.wrecks`.
 """
 
 from __future__ import annotations
@@ -10,10 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 from shapely.geometry import Point, Polygon
 
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block
-from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import (
+from aerialdojo_gen.scenes.kit.wreckage import (
     XY,
+    Bite,
     Parts,
     bars,
     broken_edge,
@@ -22,15 +25,30 @@ from aerialdojo_gen.scenes.layouts.disaster.parts.wreckage import (
     torn_floor,
     torn_wall,
 )
-from aerialdojo_gen.scenes.layouts.disaster.parts.wrecks import Wreck
+from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.values import At, Number
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.scenes.site import Site
 
 _FOOT_M = 0.9
 _PARAPET_M = 0.6
+
+
+@site_builder
+def damaged_building(
+    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, length_m: Number, depth_m: Number, storeys: int,
+    style: Style, bites: tuple[Bite, ...] = (), lean_deg: Number = 0.0, ridge_m: Number = 0.0, rooms_m: Number = 6.8,
+    balconies: bool = False, category: str = "damaged_building",
+) -> float:  # fmt: skip
+    """Put up what a disaster left of a building; gives the height of its ground floor; see `Wreck`."""
+    frame = Frame(*at, yaw_deg)
+    base = site.ground_z(*at)
+    wreck = Wreck(frame, length_m, depth_m, storeys, style, bites, lean_deg, ridge_m, rooms_m, balconies)
+    put_up(site, wreck, base, node, category)
+    return base
 
 
 def put_up(

@@ -1,0 +1,37 @@
+"""Streets: carriageways with marks and pavements, zebra crossings, rows of parking bays."""
+
+from __future__ import annotations
+
+from aerialdojo_gen.scenes import grammar_streets
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.site import Site
+
+
+@site_builder
+def streets(
+    site: Site, *, paths: list[Line], lanes: int = 2, lane_m: Number = 3.25, pavement_m: Number = 2.0,
+    surface: Material = "asphalt", pavement: Material = "paving", marks: bool = True,
+) -> None:  # fmt: skip
+    """Paint streets that may cross, along their middle lines."""
+    grammar_streets.streets(
+        site, paths, lanes=lanes, lane_m=lane_m, pavement_m=pavement_m, surface=surface, pavement=pavement,
+        marks=marks,
+    )  # fmt: skip
+
+
+@site_builder
+def crossing(
+    site: Site, *, at: At, yaw_deg: Number, length_m: Number, width_m: Number = 3.0, surface: Material = "asphalt"
+) -> None:
+    """Paint a zebra crossing, walked along `yaw_deg`."""
+    grammar_streets.crossing(site, *at, yaw_deg, length_m, width_m, surface)
+
+
+@site_builder
+def parking_row(
+    site: Site, *, at: At, yaw_deg: Number, count: int, bay_m: tuple[Number, Number] = (2.6, 5.2),
+    material: Material = "marking",
+) -> None:  # fmt: skip
+    """Mark a row of parking bays; `at` is the middle of the closed side, which they face."""
+    grammar_streets.parking_row(site, *at, yaw_deg, count, bay_m=bay_m, material=material)
