@@ -5,8 +5,11 @@ import pytest
 import shapely
 from support.layout_checks import catalogue, each_scene, props_of
 
+from aerialdojo_gen.scenes.grammar_houses import HouseStyle
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.infrastructure.harbor.quays import HIGH_M, LONG_M, QUAY_M, container_block, quay
+from aerialdojo_gen.scenes.kit.houses import house_row
+from aerialdojo_gen.scenes.kit.quays import quay
+from aerialdojo_gen.scenes.kit.yards import HIGH_M, LONG_M, Stack, container_stacks
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site, footprint
@@ -52,10 +55,21 @@ def test_the_port_has_every_category_of_harbours_and_vehicles(scene_of):
 
 def test_containers_are_stacked_in_tiers():
     site = Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
-    quay(site, rectangle(-30, -30, 30, 30))
-    plan = container_block(site, -20.0, -5.0, [[3, 1], [0, 2]])
+    quay(site, area=rectangle(-30, -30, 30, 30), height_m=2.0)
+    container_stacks(site, stacks=[Stack((-20.0, -5.0), [[3, 1], [0, 2]])], on=2.0)
     stack = site.instances[-1]
-    assert stack.bounds[1, 2] == pytest.approx(QUAY_M + 3 * HIGH_M, abs=0.1)
-    assert plan.bounds[2] - plan.bounds[0] == pytest.approx(2 * LONG_M + 0.5)
+    assert stack.bounds[1, 2] == pytest.approx(2.0 + 3 * HIGH_M, abs=0.1)
+    assert np.ptp(stack.bounds[:, 0]) == pytest.approx(2 * LONG_M + 0.5, abs=0.1)
     assert not site.is_free(-10.0, -3.0, 0.3)
     assert site.is_free(-10.0, 6.0, 0.3)
+
+
+def test_houses_of_a_row_take_turns():
+    site = Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    row = [(-20.0, 0.0), (0.0, 0.0), (20.0, 0.0)]
+    house_row(site, at=row, yaw_deg=0.0, style=HouseStyle(), on=2.0, walls=("brick", "planks"), storeys=(1, 2, 3))
+    assert [{"brick", "planks"} & {part.material for part in i.parts} for i in site.instances] == [
+        {"brick"}, {"planks"}, {"brick"},
+    ]  # fmt: skip
+    tops = [float(i.bounds[1, 2]) for i in site.instances]
+    assert tops == sorted(set(tops))

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.plans.build import build_plan, is_plan
 from aerialdojo_gen.scenes.plans.schema import schema_text
 from aerialdojo_gen.scenes.plans.text import plan_text
+from aerialdojo_gen.scenes.plans.values import PlanNames
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 PLANS = [path for path in sorted((ASSETS / "scenes").glob("*.toml")) if is_plan(path)]
@@ -167,6 +169,12 @@ def test_any_order_builds_or_ends_in_one_line(tmp_path_factory, catalogue, order
         return
     scene = build(folder, catalogue, plan)
     assert {"barn", "hive", "ground"} <= {instance.node for instance in scene.instances}
+
+
+def test_an_area_is_made_of_another(catalogue):
+    names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 4, 2)})
+    assert names.area({"area": "yard", "offset_m": 1}).equals(rectangle(-1, -1, 5, 3))
+    assert names.area({"area": "yard", "minus": [0, 0, 1, 2]}).equals(rectangle(1, 0, 4, 2))
 
 
 def test_every_builder_says_what_it_builds():

@@ -1,4 +1,4 @@
-"""Fences and railings on uneven ground."""
+"""Fences and railings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
-from aerialdojo_gen.scenes.plans.values import At, Material
+from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -35,3 +35,14 @@ def railings(
     for a, b in runs:
         parts += railing([a, b], min(site.ground_z(*a), site.ground_z(*b)), pane=pane, frame=frame)
     site.add(node, category, parts)
+
+
+@site_builder
+def mesh_fences(
+    site: Site, *, lines: list[Line], on: Number = 0.0, height_m: Number = 2.2, material: Material = "chain_link",
+    category: str = "mesh_fence",
+) -> None:  # fmt: skip
+    """Put up fences of wire mesh along lines, on a floor at the height `on`."""
+    for line in lines:
+        path = [(x, y, on + height_m / 2) for x, y in line]
+        site.add(None, category, [(material, sweep(path=path, section=(0.06, height_m)))])

@@ -171,6 +171,11 @@ def _union(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     return shapely.union_all([names.area(one) for one in value["union"]])
 
 
+def _named(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    """Give another area, of which the other keys make a new one."""
+    return names.area(value["area"])
+
+
 def _plus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
     for other in others if isinstance(others, list) and not _is_box(others) else [others]:
         area = area.union(names.area(other))
@@ -187,12 +192,20 @@ def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
     return area.buffer(names.number(by_m))
 
 
+def _offset(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
+    """Grow an area with sharp corners, or shrink it."""
+    return area.buffer(names.number(by_m), join_style="mitre")
+
+
 def _is_box(value: Sequence[Any]) -> bool:
     return len(value) == 4 and all(isinstance(one, int | float) for one in value)
 
 
-_AREAS = {"box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon, "union": _union}
-_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown}
+_AREAS = {
+    "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
+    "union": _union,
+}  # fmt: skip
+_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown, "offset_m": _offset}
 
 
 def _refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:
