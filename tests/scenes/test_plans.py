@@ -109,6 +109,27 @@ def test_things_stand_in_a_frame_and_settle_on_a_slope(tmp_path, catalogue):
         ({"paint": {"blob": [0, 0, 3]}, "material": "mud"}, r"blob is \[x, y, radius, seed\] or"),
         ({"paint": ["yard", "yrd"], "material": "mud"}, "no area 'yrd'"),
         ({"make": "flat_hose"}, r"site\[0\] \(make\): no site builder 'flat_hose'.*flat_house"),
+        (
+            {
+                "make": "scorch_rays",
+                "at": [0, 0],
+                "radius_m": 4,
+                "count": 0,
+                "reach": [2, 3],
+                "spread": [0.1, 0.2],
+                "material": "asphalt",
+            },
+            "'scorch_rays': .*count",
+        ),
+        (
+            {
+                "make": "torn_yard_wall",
+                "brick": "brick",
+                "hole": {"x": 0, "y": 0, "foot_m": 1, "head_m": 2},
+                "runs": [[[0, 0], [5, 0], [5, 5]]],
+            },
+            "'torn_yard_wall': .*runs",
+        ),
         ({"make": "wires", "headz": []}, r"site\[0\] \(make\) 'wires': .*unknown key 'headz'"),
         ({"make": "wires", "heads": [[0, 0]]}, r"site\[0\] \(make\) 'wires': .*heads"),
         ({"make": "wires", "heads": [[0, 0, 5], [9, 0, 5]], "as": "top"}, "returns no height"),

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.rubble import Breadth
+from aerialdojo_gen.scenes.kit.ruins import Extent
 from aerialdojo_gen.scenes.kit.structures import block, columns, railing
 from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -39,12 +43,12 @@ class Hall:
         Materials.
     """
 
-    length_m: Number
-    depth_m: Number
-    eaves_m: Number
-    ridge_m: Number
+    length_m: Extent
+    depth_m: Extent
+    eaves_m: Extent
+    ridge_m: Extent
     blast: At
-    reach_m: Number
+    reach_m: Extent
     gallery_m: Number = 0.0
     cladding: Material = "corrugated:#7d8f96"
     steel: Material = "rust"
@@ -147,7 +151,7 @@ def _gallery(hall: Hall) -> Parts:
 
 @site_builder
 def burst_tank(
-    site: Site, *, node: str, at: At, radius_m: Number, height_m: Number, blast: At, shell: Material = "sheet_metal"
+    site: Site, *, node: str, at: At, radius_m: Breadth, height_m: Breadth, blast: At, shell: Material = "sheet_metal"
 ) -> None:
     """Put up a tank that burst: its shell torn down and folded out on the blast's side, its lid fallen in."""
     rng = site.rng_for("tank", node)
@@ -198,8 +202,8 @@ def burst_tank(
 
 @site_builder
 def broken_bridge(
-    site: Site, *, node: str, ends: tuple[At, At], over: list[At], clear_m: Number, gap: tuple[Number, Number],
-    walkway_m: Number = 2.2, pipes: bool = True, category: str = "pipe_bridge",
+    site: Site, *, node: str, ends: tuple[At, At], over: Annotated[list[At], Field(min_length=1)], clear_m: Number,
+    gap: tuple[Number, Number], walkway_m: Number = 2.2, pipes: bool = True, category: str = "pipe_bridge",
 ) -> float:  # fmt: skip
     """Put up a bridge with a walkway, broken between two shares of its length; gives the walkway's height, metres.
 
@@ -260,7 +264,9 @@ def broken_bridge(
 
 
 @site_builder
-def twisted_steel(site: Site, *, beams: list[tuple[Number, Number, Number]], stream: str) -> None:
+def twisted_steel(
+    site: Site, *, beams: Annotated[list[tuple[Number, Number, Number]], Field(min_length=1)], stream: str
+) -> None:
     """Strew bent beams that a blast threw: (x, y, length) each, metres."""
     rng = site.rng_for("twisted", stream)
     bodies = []
@@ -280,7 +286,7 @@ def twisted_steel(site: Site, *, beams: list[tuple[Number, Number, Number]], str
 
 @site_builder
 def scorch_rays(
-    site: Site, *, at: At, radius_m: Number, count: int, reach: tuple[Number, Number],
+    site: Site, *, at: At, radius_m: Number, count: Annotated[int, Field(ge=1, le=500)], reach: tuple[Number, Number],
     spread: tuple[Number, Number], material: Material,
 ) -> None:  # fmt: skip
     """Paint rays of soot about a crater: `reach` in radii of its crest, half their width in radians."""
@@ -316,7 +322,9 @@ def crater_rim(site: Site, *, at: At, radius_m: Number) -> None:
 
 
 @site_builder
-def torn_yard_wall(site: Site, *, runs: list[Line], hole: Bite, brick: Material, height_m: Number = 2.8) -> None:
+def torn_yard_wall(
+    site: Site, *, runs: list[tuple[At, At]], hole: Bite, brick: Material, height_m: Number = 2.8
+) -> None:
     """Put up a wall of straight runs about a yard, with a hole whose heights count from the ground."""
     parts: Parts = []
     for k, (a, b) in enumerate(runs):
@@ -350,14 +358,14 @@ def step_walls(site: Site, *, y: Number, spans: list[tuple[Number, Number]]) -> 
 
 
 @site_builder
-def bent_lamps(site: Site, *, feet: list[At], blast: At) -> None:
+def bent_lamps(site: Site, *, feet: Annotated[list[At], Field(min_length=1)], blast: At) -> None:
     """Put up street lamps that a blast bent away from it, the more the nearer they stand."""
     bodies, heads = [], []
     for x, y in feet:
         away = np.array([x - blast[0], y - blast[1]])
         d = float(np.hypot(*away))
         lean = 5.5 * float(np.exp(-((d / 12.0) ** 2)))
-        u = away / d
+        u = away / max(d, 0.1)
         z = site.ground_z(x, y) - 0.2
         path = [(x, y, z), (x + 0.1 * lean * u[0], y + 0.1 * lean * u[1], z + 3.0),
                 (x + 0.55 * lean * u[0], y + 0.55 * lean * u[1], z + 6.2 - 0.3 * lean),

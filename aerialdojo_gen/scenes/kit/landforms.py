@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
@@ -16,8 +17,9 @@ from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
 @ground_builder
 def rolling_ground(
-    site: Site, _terrain: Terrain, *, cell_m: Number, height_m: Number, wavelength_m: Number, octaves: int = 4
-) -> Terrain:
+    site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)], height_m: Number,
+    wavelength_m: Annotated[Number, Field(gt=0)], octaves: Annotated[int, Field(ge=1, le=8)] = 4,
+) -> Terrain:  # fmt: skip
     """Make rolling ground by noise of the plan's seed, in place of what was there."""
     return rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, height_m, wavelength_m, octaves)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import shapely
+from pydantic import Field
 from shapely.affinity import rotate, scale, translate
 from shapely.geometry import LineString, Polygon
 
@@ -20,9 +21,11 @@ from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
+Breadth = Annotated[Number, Field(ge=0.1)]
+
 
 @ground_builder
-def fault(_site: Site, terrain: Terrain, path: Line, drop_m: Number, width_m: Number = 1.6) -> Terrain:
+def fault(_site: Site, terrain: Terrain, path: Line, drop_m: Number, width_m: Breadth = 1.6) -> Terrain:
     """Let the ground right of a path sink by `drop_m`; the scarp is `width_m` wide. The path crosses the site."""
     line = LineString(path)
     corners = terrain.corners()[:, :2]
@@ -45,13 +48,13 @@ def rises(
     corners = terrain.corners()[:, "xy".index(axis)]
     rise = np.zeros(len(corners))
     for start, end, height in stations:
-        t = np.clip((corners - start) / (end - start), 0.0, 1.0)
+        t = np.clip((corners - start) / max(end - start, 0.1), 0.0, 1.0)
         rise += height * t * t * (3.0 - 2.0 * t)
     return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
 
 
 @ground_builder
-def crater(site: Site, terrain: Terrain, at: At, radius_m: Number, depth_m: Number, rim_m: Number) -> Terrain:
+def crater(site: Site, terrain: Terrain, at: At, radius_m: Breadth, depth_m: Number, rim_m: Number) -> Terrain:
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
     corners = terrain.corners()[:, :2] - at
     noise = OpenSimplex(seed=site.recipe.seed)
@@ -107,7 +110,7 @@ def cracks(site: Site, starts: list[tuple[Number, Number, Number]], length_m: Nu
 def strew_chunks(
     site: Site,
     area: Area,
-    spacing_m: Number,
+    spacing_m: Breadth,
     stream: str,
     *,
     plate: Material = "concrete",
@@ -115,7 +118,7 @@ def strew_chunks(
     brick: Material = "brick",
     beam: Material = "concrete",
     size_m: tuple[Number, Number] = (0.5, 1.9),
-    limit: int = 400,
+    limit: Annotated[int, Field(ge=1, le=2000)] = 400,
 ) -> Instance | None:
     """Strew loose pieces over free ground of an area; larger pieces take their ground."""
     rng = site.rng_for("chunks", stream)
@@ -139,7 +142,7 @@ def strew_chunks(
 
 @site_builder
 def strew_about_heaps(
-    site: Site, *, heaps: list[Area], spacing_m: Number, margin_m: Number = 2.0, plate: Material = "concrete",
+    site: Site, *, heaps: list[Area], spacing_m: Breadth, margin_m: Number = 2.0, plate: Material = "concrete",
     lump: Material = "rubble", brick: Material = "brick", beam: Material = "concrete",
 ) -> None:  # fmt: skip
     """Strew loose pieces over heaps of rubble and `margin_m` about each."""
@@ -154,7 +157,7 @@ def slab_pile(
     at: At,
     yaw_deg: Number,
     size_m: tuple[Number, Number],
-    count: int,
+    count: Annotated[int, Field(ge=1, le=40)],
     stream: str,
     *,
     base_m: Number | None = None,

@@ -6,8 +6,10 @@ Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
@@ -33,15 +35,16 @@ from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.scenes.site import Site
 
+Extent = Annotated[Number, Field(ge=3, le=200)]
 _FOOT_M = 0.9
 _PARAPET_M = 0.6
 
 
 @site_builder
 def damaged_building(
-    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, length_m: Number, depth_m: Number, storeys: int,
-    style: Style, bites: tuple[Bite, ...] = (), lean_deg: Number = 0.0, ridge_m: Number = 0.0, rooms_m: Number = 6.8,
-    balconies: bool = False, category: str = "damaged_building",
+    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, length_m: Extent, depth_m: Extent,
+    storeys: Annotated[int, Field(ge=1, le=40)], style: Style, bites: tuple[Bite, ...] = (), lean_deg: Number = 0.0,
+    ridge_m: Number = 0.0, rooms_m: Extent = 6.8, balconies: bool = False, category: str = "damaged_building",
 ) -> float:  # fmt: skip
     """Put up what a disaster left of a building; gives the height of its ground floor; see `Wreck`."""
     frame = Frame(*at, yaw_deg)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from pydantic import Field
+
 from aerialdojo_gen.scenes import grammar_streets
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
@@ -10,8 +14,8 @@ from aerialdojo_gen.scenes.site import Site
 
 @site_builder
 def streets(
-    site: Site, *, paths: list[Line], lanes: int = 2, lane_m: Number = 3.25, pavement_m: Number = 2.0,
-    surface: Material = "asphalt", pavement: Material = "paving", marks: bool = True,
+    site: Site, *, paths: list[Line], lanes: Annotated[int, Field(ge=1, le=12)] = 2, lane_m: Number = 3.25,
+    pavement_m: Number = 2.0, surface: Material = "asphalt", pavement: Material = "paving", marks: bool = True,
 ) -> None:  # fmt: skip
     """Paint streets that may cross, along their middle lines."""
     grammar_streets.streets(
@@ -30,8 +34,8 @@ def crossing(
 
 @site_builder
 def parking_row(
-    site: Site, *, at: At, yaw_deg: Number, count: int, bay_m: tuple[Number, Number] = (2.6, 5.2),
-    material: Material = "marking",
+    site: Site, *, at: At, yaw_deg: Number, count: Annotated[int, Field(ge=1, le=200)],
+    bay_m: tuple[Number, Number] = (2.6, 5.2), material: Material = "marking",
 ) -> None:  # fmt: skip
     """Mark a row of parking bays; `at` is the middle of the closed side, which they face."""
     grammar_streets.parking_row(site, *at, yaw_deg, count, bay_m=bay_m, material=material)

@@ -7,7 +7,9 @@ where its yaw is 0). z = 0 is the ground floor.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
+from pydantic import Field
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
@@ -47,12 +49,17 @@ class Style:
     wall: Material = "plaster:#cfc3ab"
     band: Material = "concrete"
     floor: Material = "concrete"
-    inner: tuple[Material, ...] = ("plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a")
+    inner: Annotated[tuple[Material, ...], Field(min_length=4)] = (
+        "plaster:#b9c7b0",
+        "plaster:#c9b0a0",
+        "plaster:#a9b6c4",
+        "plaster:#d3c79a",
+    )
     roof: Material = "gravel:#8f8a82"
-    storey_m: Number = 3.1
-    bay_m: Number = 3.4
+    storey_m: Annotated[Number, Field(ge=2, le=20)] = 3.1
+    bay_m: Annotated[Number, Field(ge=1, le=50)] = 3.4
     window_m: tuple[Number, Number, Number] = (1.5, 0.9, 2.3)
-    wall_m: Number = 0.28
+    wall_m: Annotated[Number, Field(ge=0.05, le=2)] = 0.28
     columns: bool = True
     shops: bool = False
     panes: Number = 0.55
