@@ -198,6 +198,13 @@ def test_an_area_is_made_of_another(catalogue):
     assert names.area({"area": "yard", "minus": [0, 0, 1, 2]}).equals(rectangle(1, 0, 4, 2))
 
 
+def test_the_plan_of_the_contributors_page_is_built(tmp_path, catalogue):
+    text = (ASSETS.parent / "CONTRIBUTING.md").read_text().partition("```toml\n#:schema")[2].partition("```")[0]
+    (tmp_path / "U_Farm_0.toml").write_text(text.partition("\n")[2])
+    scene = build_plan(tmp_path / "U_Farm_0.toml", catalogue)
+    assert {"barn", "tractor_000", "beehive_000"} <= {instance.node for instance in scene.instances}
+
+
 def test_every_builder_says_what_it_builds():
     for name, one in kit().items():
         assert one.summary.endswith("."), name
