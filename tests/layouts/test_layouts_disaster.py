@@ -6,12 +6,12 @@ import shapely
 from shapely.geometry import Polygon
 from support.layout_checks import catalogue, clashes, floating, props_of
 
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit.relief import stand, stand_on_floor, strew_things
-from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, slab_pile
-from aerialdojo_gen.scenes.kit.ruins import put_up
+from aerialdojo_gen.scenes.kit.landforms import level_area
+from aerialdojo_gen.scenes.kit.relief import strew_things
+from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile
+from aerialdojo_gen.scenes.kit.ruins import Shored, broken_arcade, damaged_building, put_up, raking_shores
 from aerialdojo_gen.scenes.kit.wreckage import Bite, broken_edge, torn_floor, torn_wall
 from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.recipe import Recipe
@@ -77,24 +77,48 @@ def test_a_leaning_building_tips_over_its_front():
     assert leaning.bounds[1, 2] > straight.bounds[1, 2]
 
 
-def test_nothing_is_stood_where_a_floor_is_gone():
+def test_a_floor_bears_nothing_where_it_is_gone():
     site = blank()
     wreck = Wreck(Frame(0.0, 0.0, 90.0), 16.0, 10.0, 3, Style(), (Bite(0.0, -5.0, 3.0, 6.0, seed=5),))
     put_up(site, wreck, 0.0)
     assert wreck.bears(6.0, 3.0, 2)
     assert not wreck.bears(0.0, -4.0, 2)
-    (chair,) = stand_on_floor(site, wreck, 0.0, 2, "upstairs", [("rocking_chair", 6.0, 3.0, 0.0)])
-    assert chair.bounds[0, 2] == pytest.approx(2 * wreck.style.storey_m + 0.03, abs=0.01)
-    assert chair.centroid[:2] == pytest.approx(wreck.frame.at(6.0, 3.0), abs=0.3)
-    with pytest.raises(AssetError, match="no floor for rocking_chair"):
-        stand_on_floor(site, wreck, 0.0, 2, "upstairs", [("rocking_chair", 0.0, -4.0, 0.0)])
 
 
-def test_taken_ground_is_refused_by_name():
+def test_an_arcade_stands_on_its_posts_and_shores_reach_a_leaning_front():
     site = blank()
-    stand(site, "on the square", [("bench", 0.0, 0.0, 0.0)])
-    with pytest.raises(AssetError, match=r"no room for stretcher at \(0.2, 0\)"):
-        stand(site, "on the square", [("stretcher", 0.2, 0.0, 0.0)])
+    posts = [(x, y) for x in (-3.0, 3.0) for y in (-8.0, 0.0, 8.0)]
+    roof = broken_arcade(
+        site, node="arcade", plan=rectangle(-3.5, -9.0, 3.5, 9.0), at=(0.0, 0.0), height_m=4.0, hole=Bite(3, 8, 2, 3),
+        posts=posts, material="stone", stubs=[(3.0, 5.0, 1.0)],
+    )  # fmt: skip
+    base = damaged_building(
+        site, node="house", at=(15.0, 0.0), yaw_deg=90.0, size_m=(12.0, 8.0), storeys=3, style=Style(), lean_deg=6.0,
+        sunk_m=0.5,
+    )  # fmt: skip
+    raking_shores(site, node="shores", fronts=[Shored((15.0, 0.0), 8.0, [-3.0, 0.0, 3.0], 90.0, leans=True)])
+    arcade, _, shores = site.instances
+    assert roof == pytest.approx(site.ground_z(0.0, 0.0) + 4.0)
+    assert base == pytest.approx(site.ground_z(15.0, 0.0) - 0.5)
+    assert arcade.bounds[1, 2] == pytest.approx(roof)
+    assert shores.bounds[0, 0] > 15.0
+    assert shores.bounds[1, 2] == pytest.approx(site.ground_z(15.0, 0.0) + 5.4, abs=0.2)
+    assert not site.is_free(3.0, 5.0, 0.2)
+    assert not floating(site.scene())
+
+
+def test_a_terrace_is_levelled_above_a_point_of_the_old_ground():
+    site = blank()
+    ground = rises(site, rolling_terrain((60.0, 60.0), 1.0, 1, 0.0, 20.0), [(-30.0, 30.0, 6.0)], "y")
+    high = float(ground.z(0.0, 10.0)) + 0.7
+    areas = [rectangle(-10, 5, -4, 12), rectangle(4, 5, 10, 12)]
+    level = level_area(site, ground, area=areas, above=(0.0, 10.0, 0.7), blend_m=2.0)
+    assert level.z([-7.0, 7.0], [8.0, 8.0]) == pytest.approx(high)
+
+
+def test_things_are_strewn_where_there_is_room():
+    site = blank()
+    site.place("bench", 0.0, 0.0)
     placed = strew_things(site, "on the square", rectangle(-8, -8, 8, 8), ["bench", "stretcher", "bench"], "t")
     assert [i.category for i in placed] == ["bench", "stretcher", "bench"]
     assert not clashes(site.scene())
@@ -105,7 +129,7 @@ def test_the_top_of_a_pile_is_level_and_free():
     z = slab_pile(site, (0.0, 0.0), 30.0, (14.0, 9.0), 4, "t")
     assert site.is_free(1.0, 0.0, 0.5, z=z)
     assert not site.is_free(1.0, 0.0, 0.5, z=z - 1.0)
-    stand(site, "on top", [("bench", 1.0, 0.0, 0.0)], z=z)
+    site.place("bench", 1.0, 0.0, z=z)
     assert not floating(site.scene())
 
 

@@ -196,6 +196,7 @@ def test_an_area_is_made_of_another(catalogue):
     names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 4, 2)})
     assert names.area({"area": "yard", "offset_m": 1}).equals(rectangle(-1, -1, 5, 3))
     assert names.area({"area": "yard", "minus": [0, 0, 1, 2]}).equals(rectangle(1, 0, 4, 2))
+    assert names.area({"box": [-1, 1, 2, 9], "within": "yard"}).equals(rectangle(0, 1, 2, 2))
 
 
 def test_the_plan_of_the_contributors_page_is_built(tmp_path, catalogue):

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
-from aerialdojo_gen.scenes.plans.values import Area, At, Number
+from aerialdojo_gen.scenes.plans.values import Areas, At, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
@@ -32,10 +32,19 @@ def hill(_site: Site, terrain: Terrain, *, at: At, radius_m: Number, height_m: N
 
 @ground_builder
 def level_area(
-    _site: Site, terrain: Terrain, *, area: Area, to_m: Number | None = None, blend_m: Number = 4.0
-) -> Terrain:
-    """Level an area, at its mean height by default, with a slope about it back to the old ground."""
-    return terrain.flattened(area, to_m, blend_m)
+    _site: Site, terrain: Terrain, *, area: Areas, to_m: Number | None = None, blend_m: Number = 4.0,
+    above: tuple[Number, Number, Number] | None = None,
+) -> Terrain:  # fmt: skip
+    """Level an area, or several in turn, with a slope about each back to the old ground.
+
+    Each gets the height `to_m`, or one `above` the ground at a point (x, y, by how much), or its own mean height.
+    """
+    if above is not None:
+        x, y, more_m = above
+        to_m = float(terrain.z(x, y)) + more_m
+    for one in area:
+        terrain = terrain.flattened(one, to_m, blend_m)
+    return terrain
 
 
 @ground_builder

@@ -1,81 +1,19 @@
-"""Who and what comes to a disaster: things set out in places that have a name, on the ground and on broken floors."""
+"""Things strewn where there is room, and lines of leaning poles."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.kit.wreckage import Parts
-from aerialdojo_gen.scenes.kit.wrecks import Wreck
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
-
-Row = tuple[str, float, float, float]
-_FINISH_M = 0.03
-
-
-def stand(site: Site, place: str, rows: Sequence[Row], *, z: float | None = None, sink_m: float = 0.0) -> None:
-    """Set things out on the ground or at a height, always the variant that is rarest so far.
-
-    Parameters
-    ----------
-    site : Site
-        Where.
-    place : str
-        What descriptions say of where they are, e.g. ``"on the square"``.
-    rows : sequence of (category, x, y, yaw)
-        Metres and degrees, world frame.
-    z : float, optional
-        Height of what they stand on; the ground by default.
-    sink_m : float
-        How deep they sit in it.
-
-    Raises
-    ------
-    AssetError
-        Names a thing whose room is taken.
-    """
-    for category, x, y, yaw in rows:
-        base = settled_z(site, x, y) if z is None else z
-        thing = site.try_place(
-            category, x, y, yaw, z=base - sink_m, variant=next_variant(site, category), attributes={"place": place}
-        )
-        if thing is None:
-            raise AssetError(f"{site.name}: no room for {category} at ({x:g}, {y:g})")
-
-
-def stand_on_floor(
-    site: Site, wreck: Wreck, base_m: float, storey: int, place: str, rows: Sequence[Row]
-) -> list[Instance]:
-    """Set things out on a floor of a damaged building; rows are in the building's own frame.
-
-    Raises
-    ------
-    AssetError
-        Names a thing that has no floor beneath it.
-    """
-    out = []
-    for category, u, v, yaw in rows:
-        if not wreck.bears(u, v, storey, 0.35):
-            raise AssetError(f"{site.name}: no floor for {category} at ({u:g}, {v:g}) in storey {storey}")
-        x, y, turned = wreck.frame.pose(u, v, yaw)
-        finish = _FINISH_M if storey else 0.0
-        out.append(
-            site.place(
-                category, x, y, turned, z=base_m + storey * wreck.style.storey_m + finish,
-                variant=next_variant(site, category), attributes={"place": place},
-            )
-        )  # fmt: skip
-    return out
 
 
 @site_builder
@@ -89,7 +27,7 @@ def strew_things(
     site : Site
         Where.
     place : str
-        As in `stand`.
+        What descriptions say of where they are, e.g. ``"on the square"``.
     area : shapely geometry
         World frame, metres.
     categories : list of str

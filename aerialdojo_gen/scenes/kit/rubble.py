@@ -84,6 +84,20 @@ def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int)
 
 
 @site_builder
+def scarp(
+    site: Site,
+    *,
+    path: Line,
+    width_m: Breadth,
+    material: Material,
+    slips: Annotated[list[Area], Field(max_length=500)],
+) -> None:
+    """Paint the bare earth along a fault, and where more of it slipped."""
+    bare = LineString(path).buffer(width_m / 2, quad_segs=2).union(shapely.union_all(slips))
+    site.paint(bare.intersection(site.extent), material)
+
+
+@site_builder
 def cracks(site: Site, starts: list[tuple[Number, Number, Number]], length_m: Number, seed: int) -> None:
     """Paint jagged cracks that start at (x, y) and run along a direction in degrees, forking once."""
     rng = site.rng_for("cracks", seed)

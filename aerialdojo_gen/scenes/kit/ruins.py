@@ -6,16 +6,17 @@ Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from shapely.geometry import Point, Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import block
+from aerialdojo_gen.scenes.kit.structures import block, columns
 from aerialdojo_gen.scenes.kit.wreckage import (
     XY,
     Bite,
@@ -30,9 +31,9 @@ from aerialdojo_gen.scenes.kit.wreckage import (
 from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.plans.values import At, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 Extent = Annotated[Number, Field(ge=3, le=200)]
@@ -42,14 +43,15 @@ _PARAPET_M = 0.6
 
 @site_builder
 def damaged_building(
-    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, length_m: Extent, depth_m: Extent,
+    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, size_m: tuple[Extent, Extent],
     storeys: Annotated[int, Field(ge=1, le=40)], style: Style, bites: tuple[Bite, ...] = (), lean_deg: Number = 0.0,
     ridge_m: Number = 0.0, rooms_m: Extent = 6.8, balconies: bool = False, category: str = "damaged_building",
+    sunk_m: Number = 0.0,
 ) -> float:  # fmt: skip
-    """Put up what a disaster left of a building; gives the height of its ground floor; see `Wreck`."""
+    """Put up what a disaster left of a building, `sunk_m` deep; gives its ground floor's height; see `Wreck`."""
     frame = Frame(*at, yaw_deg)
-    base = site.ground_z(*at)
-    wreck = Wreck(frame, length_m, depth_m, storeys, style, bites, lean_deg, ridge_m, rooms_m, balconies)
+    base = site.ground_z(*at) - sunk_m
+    wreck = Wreck(frame, *size_m, storeys, style, bites, lean_deg, ridge_m, rooms_m, balconies)
     put_up(site, wreck, base, node, category)
     return base
 
@@ -73,6 +75,76 @@ def put_up(
         parts = [(m, translated(rotated(translated(b, edge), turn), -edge)) for m, b in parts]
     footprint = wreck.frame.area(remains(wreck.plan, 0.5, wreck.bites))
     return site.add(node, category, wreck.frame.parts(parts, base_m), footprint=footprint)
+
+
+@site_builder
+def broken_arcade(
+    site: Site, *, node: str, plan: Area, at: At, height_m: Extent, hole: Bite, material: Material,
+    posts: Annotated[list[At], Field(min_length=1, max_length=200)],
+    stubs: Annotated[list[tuple[Number, Number, Number]], Field(max_length=200)],
+) -> float:  # fmt: skip
+    """Put up an arcade with a hole in its flat roof; gives the height of that roof, metres.
+
+    Parameters
+    ----------
+    plan : area
+        Of the roof.
+    at : (x, y)
+        Where the ground has the height that its floor lies at.
+    posts, stubs : list of (x, y), list of (x, y, height)
+        Columns that reach the roof, and those that end below it, metres.
+    hole : Bite
+        World frame; torn at all heights below its head.
+    """
+    base = site.ground_z(*at)
+    top = base + height_m
+    parts: Parts = []
+    roof = torn_floor(plan, top, [replace(hole, z0_m=-99.0)], 0.45)
+    if roof is not None:
+        parts.append((material, roof))
+    parts.append((material, columns(posts, base - 0.6, top - 0.4, 0.36, 10)))
+    if stubs:
+        rest = [columns([(x, y)], base - 0.6, base + h, 0.36, 10) for x, y, h in stubs]
+        parts.append((material, merge(rest)))
+    site.add(node, "arcade", parts)
+    for x, y in [*posts, *((x, y) for x, y, _ in stubs)]:
+        site.occupy(disc(x, y, 0.5, 8), -100.0, top - 0.3)
+    return top
+
+
+@dataclass(frozen=True)
+class Shored:
+    """A damaged building whose front is propped, as of `damaged_building`; `props` are at x of its own frame."""
+
+    at: At
+    depth_m: Extent
+    props: Annotated[list[Number], Field(min_length=1, max_length=50)]
+    yaw_deg: Number = 0.0
+    leans: bool = False
+
+
+@site_builder
+def raking_shores(
+    site: Site,
+    *,
+    node: str,
+    fronts: Annotated[list[Shored], Field(min_length=1, max_length=100)],
+    height_m: Number = 5.4,
+) -> None:
+    """Prop leaning and cracked fronts with raking timbers that reach `height_m` over the ground floor."""
+    timber = []
+    for front in fronts:
+        frame, v = Frame(*front.at, front.yaw_deg), -front.depth_m / 2
+        reach = 3.2 + (1.1 if front.leans else 0.0)
+        for u in front.props:
+            foot, head = frame.at(u, v - reach), frame.at(u, v - (0.75 if front.leans else 0.1))
+            z0, z1 = site.ground_z(*foot), site.ground_z(*frame.at(u, 0.0)) + height_m
+            timber.append(sweep(path=[(*foot, z0 - 0.2), (*head, z1)], section=(0.2, 0.24)))
+            low = frame.at(u, v - 0.25)
+            tie = [(*frame.at(u, v - reach * 0.55), z0 + 2.2), (*low, z0 + 2.3)]
+            timber.append(sweep(path=tie, section=(0.14, 0.16)))
+            site.occupy(LineString([foot, head]).buffer(0.3))
+    site.add(node, "shores", [("wood", merge(timber))])
 
 
 def _edges(wreck: Wreck) -> list[tuple[XY, XY]]:

@@ -188,6 +188,11 @@ def _minus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
     return area
 
 
+def _within(names: PlanNames, area: BaseGeometry, other: Any) -> BaseGeometry:
+    """Keep what lies in another area."""
+    return area.intersection(names.area(other))
+
+
 def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
     return area.buffer(names.number(by_m))
 
@@ -205,7 +210,7 @@ _AREAS = {
     "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
     "union": _union,
 }  # fmt: skip
-_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown, "offset_m": _offset}
+_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown, "offset_m": _offset, "within": _within}
 
 
 def _refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:

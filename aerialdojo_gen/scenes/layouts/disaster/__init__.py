@@ -1,1 +1,0 @@
-"""Layouts of disasters, one folder a type."""
