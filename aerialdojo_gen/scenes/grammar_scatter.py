@@ -40,6 +40,21 @@ def smooth_path(path: Polyline, rounds: int = 3) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in points]
 
 
+def s_curve(a: Sequence[float], b: Sequence[float], steps: int = 10) -> list[tuple[float, float]]:
+    """Lead a line from `a` to a parallel one at `b`, both running along x, metres."""
+    t = np.linspace(0.0, 1.0, steps + 1)
+    y = a[1] + (b[1] - a[1]) * t * t * (3.0 - 2.0 * t)
+    return [(float(u), float(v)) for u, v in zip(a[0] + (b[0] - a[0]) * t, y, strict=True)]
+
+
+def eased_path(path: Polyline, steps: int) -> list[tuple[float, float]]:
+    """Replace every leg of a polyline that is not along x by an S-curve of so many steps, as tracks change lanes."""
+    out = [(float(path[0][0]), float(path[0][1]))]
+    for a, b in pairwise(path):
+        out += s_curve(a, b, steps if a[1] != b[1] else 1)[1:]
+    return out
+
+
 def along(
     path: Polyline,
     spacing_m: float,

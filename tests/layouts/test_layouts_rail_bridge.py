@@ -6,15 +6,9 @@ from shapely.geometry import Polygon
 from support.layout_checks import catalogue, each_scene, props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.scenes.grammar_scatter import s_curve
 from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
-from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import (
-    RAIL_M,
-    arcade,
-    ballast,
-    s_curve,
-    track,
-    upright,
-)
+from aerialdojo_gen.scenes.kit.rail import RAIL_M, arcade, ballast, tracks, upright
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
@@ -58,8 +52,9 @@ def test_one_can_fly_under_the_bridge_and_not_through_its_road(scene_of, name):
 def test_tracks_carry_rails_at_their_height():
     site = blank()
     path = [(-20.0, -3.0), *s_curve((-8.0, -3.0), (12.0, 4.0))]
-    ballast(site, [path])
-    laid = track(site, path)
+    ballast(site, lines=[path])
+    tracks(site, lines=[path])
+    laid = site.instances[-1]
     assert laid.bounds[1, 2] == pytest.approx(RAIL_M)
     rails = laid.vertices[laid.vertices[:, 2] > RAIL_M - 0.01]
     line = np.array(path)

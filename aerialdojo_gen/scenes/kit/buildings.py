@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from shapely.geometry import Polygon
@@ -27,6 +28,7 @@ def building(
     parapet_m: Number = 0.6,
     on: Number | None = None,
     category: str = "building",
+    attributes: dict[str, str] = {},  # noqa: B006
     extra: Bodies = [],  # noqa: B006
 ) -> float:
     """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
@@ -35,6 +37,24 @@ def building(
     z = min(site.ground_z(x, y) for x, y in outline.exterior.coords) if on is None else on
     grammar_buildings.building(
         site, outline, wall=wall, roof=roof, storeys=storeys, storey_m=storey_m, roof_kind=roof_kind, roof_m=roof_m,
-        parapet_m=parapet_m, z=z, category=category, extra=extra,
+        parapet_m=parapet_m, z=z, category=category, attributes=attributes, extra=extra,
     )  # fmt: skip
     return z + storeys * storey_m
+
+
+@dataclass(frozen=True)
+class Block:
+    """One of several plain buildings."""
+
+    outline: Area
+    wall: Material
+    storeys: int = 2
+
+
+@site_builder
+def town_blocks(
+    site: Site, *, blocks: list[Block], roof: Material, on: Number | None = None, category: str = "town_block"
+) -> None:
+    """Put up plain flat-roofed buildings, each on its own outline."""
+    for one in blocks:
+        building(site, outline=one.outline, wall=one.wall, storeys=one.storeys, roof=roof, on=on, category=category)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
@@ -33,6 +35,15 @@ def block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> M
 def columns(points: Sequence[Point], z0: float, z1: float, radius_m: float = 0.25, segments: int = 8) -> Mesh:
     """Make round columns at points, from `z0` to `z1`, metres."""
     return merge([translated(cylinder(radius=radius_m, height=z1 - z0, segments=segments), (*p, z0)) for p in points])
+
+
+@part_builder
+def round_columns(
+    *, at: list[At], z: tuple[Number, Number], material: Material, radius_m: Number = 0.25,
+    segments: Annotated[int, Field(ge=3, le=64)] = 8,
+) -> Parts:  # fmt: skip
+    """Make round columns at points, between two heights."""
+    return [(material, columns(at, *z, radius_m, segments))]
 
 
 @part_builder

@@ -21,7 +21,7 @@ from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar_frames import Parts
-from aerialdojo_gen.scenes.grammar_scatter import smooth_path
+from aerialdojo_gen.scenes.grammar_scatter import eased_path, smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.materials import MaterialLibrary
@@ -64,23 +64,28 @@ class PlanNames:
         return self.number(value[0]), self.number(value[1])
 
     def line(self, value: Any) -> list[Point]:
-        """Resolve the name of a line, its points, or ``{points, smooth}``."""
+        """Resolve the name of a line, its points, or ``{points, smooth}``, ``{points, eased}``.
+
+        `smooth` rounds the corners so many times; `eased` makes S-curves of so many steps of the legs across x.
+        """
         if isinstance(value, str):
             if value not in self.lines:
                 raise ValueError(unknown("no line", value, self.lines))
             return self.lines[value]
-        smooth = 0
+        smooth = eased = 0
         if isinstance(value, dict):
-            _refuse_unknown(value, ("points", "smooth"))
-            smooth, value = value.get("smooth", 0), value.get("points")
+            _refuse_unknown(value, ("points", "smooth", "eased"))
+            smooth, eased, value = value.get("smooth", 0), value.get("eased", 0), value.get("points")
             if not isinstance(smooth, int) or not 0 <= smooth <= 6:
                 raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
+            if not isinstance(eased, int) or not 0 <= eased <= 20:
+                raise ValueError(f"eased must be from 0 to 20, got {eased!r}")
         if not isinstance(value, list | tuple) or not 2 <= len(value) <= _MAX_POINTS:
             raise ValueError(f"a line has from 2 to {_MAX_POINTS:,} points [x, y]")
         points = [self.point(point) for point in value]
         if min(math.dist(a, b) for a, b in pairwise(points)) < _SHORTEST_M:
             raise ValueError(f"consecutive points of a line must be {_SHORTEST_M:g} m apart")
-        return smooth_path(points, smooth)
+        return smooth_path(eased_path(points, eased) if eased else points, smooth)
 
     def area(self, value: Any) -> BaseGeometry:
         """Resolve the name of an area, ``[x0, y0, x1, y1]``, or a table with one of the keys of `_AREAS`."""
@@ -238,7 +243,7 @@ Line = Annotated[
     PlainValidator(lambda value, info: _names(info).line(value)),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _POINT_SCHEMA}, {"type": "object"}]}),
 ]
-"""The name of a line, its points, or ``{points, smooth}``."""
+"""The name of a line, its points, or ``{points, smooth}`` or ``{points, eased}``."""
 Area = Annotated[
     BaseGeometry,
     PlainValidator(lambda value, info: _names(info).area(value)),

@@ -1,1 +1,1 @@
-"""A railway: a city station in a walled cutting with a goods yard, or a country station at a viaduct."""
+"""A railway: a country station at a viaduct."""

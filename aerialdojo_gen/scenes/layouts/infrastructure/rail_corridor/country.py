@@ -16,20 +16,11 @@ from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
 from aerialdojo_gen.scenes.grammar_props import put
-from aerialdojo_gen.scenes.grammar_scatter import place_along
+from aerialdojo_gen.scenes.grammar_scatter import place_along, s_curve
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.kit.rail import BED_M, arcade, ballast, butterfly_roof, rail_platform, tracks, upright
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, canopy, letters
 from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.country_things import furnish_country
-from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import (
-    BED_M,
-    arcade,
-    ballast,
-    platform,
-    s_curve,
-    shed_roof,
-    track,
-    upright,
-)
 from aerialdojo_gen.scenes.mesh import Floats, merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
@@ -108,10 +99,10 @@ def _line(site: Site) -> None:
     loop: list[Point] = [*s_curve((-57.0, 0.0), (-44.0, 4.6)), *s_curve((3.0, 4.6), (13.5, 0.0))]
     siding: list[Point] = [(-28.0, -8.6), *s_curve((-5.0, -8.6), (13.0, 0.0))]
     gap = rectangle(ROAD_X - 2.9, -9, ROAD_X + 2.9, 9)
-    ballast(site, [[west, (_ENDS[0] + 0.5, 0.0)], [(_ENDS[1] - 0.5, 0.0), east], loop, siding])
-    track(site, [west, east], clear=gap)
-    track(site, loop, clear=rectangle(-far, -1.4, far, 1.4).union(gap))
-    track(site, siding, clear=rectangle(-far, -1.4, far, 1.4))
+    ballast(site, lines=[[west, (_ENDS[0] + 0.5, 0.0)], [(_ENDS[1] - 0.5, 0.0), east], loop, siding])
+    tracks(site, lines=[[west, east]], clear=gap)
+    tracks(site, lines=[loop], clear=rectangle(-far, -1.4, far, 1.4).union(gap))
+    tracks(site, lines=[siding], clear=rectangle(-far, -1.4, far, 1.4))
     # Planks between and beside the rails let the road cross.
     planks = []
     for y in (0.0, 4.6):
@@ -153,8 +144,8 @@ def _circle(x: float, z: float, radius: float) -> BaseGeometry:
 
 def _station(site: Site) -> None:
     floor = site.material("platform", "paving:#b0a694")
-    platform(site, -30.0, 6.35, 2.0, 10.9, PLATFORM_M, floor)
-    platform(site, -27.0, -6.85, -6.0, -1.75, PLATFORM_M, floor)
+    rail_platform(site, box=(-30.0, 6.35, 2.0, 10.9), top_m=PLATFORM_M, floor=floor)
+    rail_platform(site, box=(-27.0, -6.85, -6.0, -1.75), top_m=PLATFORM_M, floor=floor)
     frame = site.material("canopy_frame", "#7a3f38")
     plan: Polygon = rectangle(-22, 11.0, -9, 18.2)
     wall, roof = site.material("station", "plaster:#dcc9a0"), site.material("station_roof", "roof_tiles:#a5523f")
@@ -175,8 +166,11 @@ def _station(site: Site) -> None:
     extra.append(("marking", letters("MILLBROOK", 0.55, (-15.5, 18.29, 3.5), 90.0, 0.04)))
     building(site, plan, wall=wall, roof=roof, storeys=2, storey_m=3.3, roof_kind="gable", roof_m=3.0, z=0.0,
              category="station_house", attributes={"colour": "yellow"}, extra=extra)  # fmt: skip
-    site.add(None, "platform_canopy", shed_roof(-25.0, -6.4, -15.0, -2.3, 4.2, PLATFORM_M, spacing_m=4.0,
-                                                roof="corrugated:#8a5a4c", frame=frame))  # fmt: skip
+    roofs = butterfly_roof(
+        box=(-25.0, -6.4, -15.0, -2.3), z_m=4.2, foot_m=PLATFORM_M, spacing_m=4.0, roof="corrugated:#8a5a4c",
+        frame=frame,
+    )  # fmt: skip
+    site.add(None, "platform_canopy", roofs)
     shed: Parts = [("planks:#8a5a42", merge([block(-27, -22, -26.8, -17, 0, 4), block(-20.2, -22, -20, -17, 0, 4),
                                              block(-27, -22, -20, -21.8, 0, 4), block(-27, -17.2, -25, -17, 0, 4),
                                              block(-22, -17.2, -20, -17, 0, 4), block(-25, -17.2, -22, -17, 3, 4)])),

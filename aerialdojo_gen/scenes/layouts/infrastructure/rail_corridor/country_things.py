@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from shapely.geometry import LineString
 
@@ -10,7 +10,8 @@ from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.natural_ground import keep_clear, place_wild, settled_z
-from aerialdojo_gen.scenes.layouts.infrastructure.rail_corridor.rail import RAIL_M, things, train
+from aerialdojo_gen.scenes.kit.rail import RAIL_M
+from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 
 _PLATFORM_M = 1.05
@@ -133,3 +134,22 @@ def _trees(site: Site, brook_x: Callable[[float], float]) -> None:
         kind = kinds[count % len(kinds)]
         if count < 74 and site.is_free(pose.x, pose.y, 2.4, z=settled_z(site, pose.x, pose.y)):
             count += site.try_place(kind, *pose, z=settled_z(site, pose.x, pose.y)) is not None
+
+
+def train(
+    site: Site, y: float, cars: Sequence[tuple[str, str | None, float, float]], *, place: str, z: float = RAIL_M
+) -> list[Instance]:
+    """Put vehicles on a track along x: (category, variant or None for the rarest, x, yaw in degrees) each."""
+    out = []
+    for category, variant, x, yaw in cars:
+        options = {} if variant is None else {"variant": variant}
+        out.append(put(site, category, x, y, yaw, place, z=z, **options))
+    return out
+
+
+def things(
+    site: Site, place: str, spots: Sequence[tuple[str, float, float, float]], z: float | None = None,
+) -> None:  # fmt: skip
+    """Set out props, (category, x, y, yaw) each, on the ground or on a floor at `z`."""
+    for category, x, y, yaw in spots:
+        put(site, category, x, y, yaw, place, z=z)

@@ -1,4 +1,4 @@
-"""Railways for layouts: tracks on ballast, platforms, overhead lines, trains.
+"""Railways: tracks on ballast, platforms with roofs, overhead lines, arcades of viaducts.
 
 Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above the ground that a track is laid on.
 """
@@ -6,19 +6,22 @@ Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
+from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.shapes import box, cylinder
+from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
+from aerialdojo_gen.scenes.shapes import box as cuboid
+from aerialdojo_gen.scenes.shapes import cylinder
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -27,62 +30,61 @@ RAIL_M = 0.56
 _GAUGE_M = 1.44
 _SLEEPER_M = (0.26, 2.4, 0.2)
 _SPACING_M = 0.7
+_Box = tuple[Number, Number, Number, Number]
 
 
-def ballast(site: Site, paths: Sequence[Sequence[Point]], material: str = "gravel:#867e74") -> None:
+@site_builder
+def ballast(site: Site, *, lines: list[Line], material: Material = "gravel:#867e74") -> None:
     """Paint the beds of tracks, a low shoulder about a higher middle; beds that meet become one."""
-    beds = shapely.unary_union([ribbon(p, 4.4) for p in paths])
+    beds = shapely.unary_union([ribbon(line, 4.4) for line in lines])
     site.paint(beds, material, BED_M / 2, material)
-    site.paint(shapely.unary_union([ribbon(p, 3.2) for p in paths]), material, BED_M, material)
+    site.paint(shapely.unary_union([ribbon(line, 3.2) for line in lines]), material, BED_M, material)
 
 
-def track(
-    site: Site,
-    path: Sequence[Point],
-    *,
-    bed_z: float = BED_M,
-    clear: BaseGeometry | None = None,
-    sleeper: str = "planks:#5f4a38",
-) -> Instance:
-    """Lay sleepers and rails.
+@site_builder
+def tracks(
+    site: Site, *, lines: list[Line], on: Number = BED_M, clear: Area | None = None,
+    sleeper: Material = "planks:#5f4a38", rail: Material = "rust:#7a6a5e",
+) -> None:  # fmt: skip
+    """Lay sleepers and rails along middle lines.
 
     Parameters
     ----------
     site : Site
         Where.
-    path : sequence of (x, y)
-        Middle line, metres.
-    bed_z : float
+    lines : list of line
+        The middle of each track.
+    on : float
         Height of the ballast's top; the rails' top lies `RAIL_M` - `BED_M` above it.
-    clear : shapely geometry, optional
+    clear : area, optional
         Where another track has sleepers already.
-    sleeper : str
-        Material of the sleepers.
+    sleeper, rail : str
+        Materials.
     """
-    line = LineString(path)
-    top = bed_z + RAIL_M - BED_M
-    tie = translated(box(size=_SLEEPER_M), (0.0, 0.0, bed_z - 0.15))
+    for line in lines:
+        site.add(None, "track", _track(line, on, clear, sleeper, rail))
+
+
+def _track(line: Sequence[Point], on: float, clear: Area | None, sleeper: str, rail: str) -> Parts:
+    middle = LineString(line)
+    top = on + RAIL_M - BED_M
+    tie = translated(cuboid(size=_SLEEPER_M), (0.0, 0.0, on - 0.15))
     ties = []
-    for pose in along(path, _SPACING_M, start_m=0.2, end_m=0.2):
+    for pose in along(line, _SPACING_M, start_m=0.2, end_m=0.2):
         if clear is None or not shapely.contains_xy(clear, pose.x, pose.y):
             ties.append(translated(rotated(tie, rotation(0.0, 0.0, pose.yaw_deg)), (pose.x, pose.y, 0.0)))
     rails = []
     for side in (-1, 1):
-        run = line.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
+        run = middle.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
         rails.append(sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)))
-    return site.add(None, "track", [(sleeper, merge(ties)), ("rust:#7a6a5e", merge(rails))] if ties else
-                    [("rust:#7a6a5e", merge(rails))])  # fmt: skip
+    laid: Parts = [(rail, merge(rails))]
+    return [(sleeper, merge(ties)), *laid] if ties else laid
 
 
-def s_curve(a: Point, b: Point, steps: int = 10) -> list[Point]:
-    """Lead a track from `a` to a parallel one at `b`, both running along x, metres."""
-    t = np.linspace(0.0, 1.0, steps + 1)
-    y = a[1] + (b[1] - a[1]) * t * t * (3.0 - 2.0 * t)
-    return [(float(u), float(v)) for u, v in zip(a[0] + (b[0] - a[0]) * t, y, strict=True)]
-
-
-def platform(site: Site, x0: float, y0: float, x1: float, y1: float, z1: float, floor: str, z0: float = 0.0) -> None:
+@site_builder
+def rail_platform(site: Site, *, box: _Box, top_m: Number, floor: Material, foot_m: Number = 0.0) -> None:
     """Build a platform with a coping and a yellow line along both edges that run along x."""
+    (x0, y0, x1, y1), z0, z1 = box, foot_m, top_m
     parts: Parts = [("blocks:#8f8a82", block(x0, y0, x1, y1, z0, z1 - 0.2))]
     parts.append((floor, block(x0, y0 + 0.6, x1, y1 - 0.6, z1 - 0.2, z1)))
     parts.append(("concrete:#c4c0b6", merge([block(x0, y0 - 0.06, x1, y0 + 0.6, z1 - 0.2, z1),
@@ -93,15 +95,17 @@ def platform(site: Site, x0: float, y0: float, x1: float, y1: float, z1: float, 
     site.occupy(rectangle(x0, y0, x1, y1), z0, z1 - 0.05)
 
 
-def shed_roof(
-    x0: float, y0: float, x1: float, y1: float, z_m: float, foot_m: float, *, roof: str, frame: str,
-    spacing_m: float = 8.0, rows: Sequence[float] = (),
+@part_builder
+def butterfly_roof(
+    *, box: _Box, z_m: Number, foot_m: Number, roof: Material, frame: Material,
+    spacing_m: Annotated[Number, Field(ge=0.5)] = 8.0, rows: Sequence[Number] = (),
 ) -> Parts:  # fmt: skip
-    """Make a platform canopy that falls to a gutter in its middle (a butterfly), on posts in `rows` (y, metres)."""
+    """Make a platform's roof that falls to a gutter in its middle, on posts in `rows` (y, metres)."""
+    x0, y0, x1, y1 = box
     middle, rise = (y0 + y1) / 2, 0.55
     half = (y1 - y0) / 2
     pitch = float(np.degrees(np.arctan2(rise, half)))
-    leaf = box(size=(x1 - x0, float(np.hypot(half, rise)), 0.14))
+    leaf = cuboid(size=(x1 - x0, float(np.hypot(half, rise)), 0.14))
     wing = [
         translated(
             rotated(leaf, rotation(s * pitch, 0.0, 0.0)), ((x0 + x1) / 2, middle + s * half / 2, z_m + rise / 2)
@@ -124,12 +128,24 @@ def shed_roof(
     return [(roof, merge(wing)), (frame, merge([*posts, *arms, *rim]))]
 
 
-def portal(
-    site: Site, x: float, y0: float, y1: float, tracks: Sequence[float], *, foot: tuple[float, float],
-    z_m: float, wire_m: float,
+@site_builder
+def overhead_portals(
+    site: Site, *, at_x: list[Number], posts: tuple[Number, Number], feet: list[tuple[Number, Number]],
+    tracks: list[Number], z_m: Number, wire_m: Number,
 ) -> None:  # fmt: skip
-    """Put up a lattice portal across tracks (y, metres) that carries their wires at `wire_m`."""
-    steel = "#7b8288"
+    """Put up lattice portals across tracks along x (y, metres) that carry their wires at `wire_m`.
+
+    Each portal has two posts (y, metres), which stand on its own two `feet` (heights).
+    """
+    for x, foot in zip(at_x, feet, strict=False):
+        _portal(site, x, posts, foot, tracks, z_m, wire_m)
+
+
+def _portal(
+    site: Site, x: float, posts: tuple[float, float], foot: tuple[float, float], tracks: Sequence[float], z_m: float,
+    wire_m: float,
+) -> None:  # fmt: skip
+    steel, (y0, y1) = "#7b8288", posts
     bars = [block(x - 0.17, y - 0.17, x + 0.17, y + 0.17, f, z_m + 0.7) for y, f in zip((y0, y1), foot, strict=True)]
     bars += [block(x - 0.09, min(y0, y1), x + 0.09, max(y0, y1), z, z + 0.12) for z in (z_m, z_m + 0.58)]
     count = max(round(abs(y1 - y0) / 1.4), 2)
@@ -152,7 +168,8 @@ def portal(
         site.occupy(rectangle(x - 0.5, y - 0.5, x + 0.5, y + 0.5), f, f + 7.0)
 
 
-def wires(site: Site, x0: float, x1: float, tracks: Sequence[float], wire_m: float) -> None:
+@site_builder
+def overhead_wires(site: Site, *, x0: Number, x1: Number, tracks: list[Number], wire_m: Number) -> None:
     """Hang a contact wire and a carrying wire over tracks that run along x, metres."""
     bodies: list[Mesh] = []
     for y in tracks:
@@ -164,27 +181,10 @@ def wires(site: Site, x0: float, x1: float, tracks: Sequence[float], wire_m: flo
     site.add(None, "overhead_wire", [("#33373b", merge(bodies))])
 
 
-def train(
-    site: Site, y: float, cars: Sequence[tuple[str, str | None, float, float]], *, place: str, z: float = RAIL_M
-) -> list[Instance]:
-    """Put vehicles on a track along x: (category, variant or None for the rarest, x, yaw in degrees) each."""
-    out = []
-    for category, variant, x, yaw in cars:
-        options = {} if variant is None else {"variant": variant}
-        out.append(put(site, category, x, y, yaw, place, z=z, **options))
-    return out
-
-
-def things(
-    site: Site, place: str, spots: Sequence[tuple[str, float, float, float]], z: float | None = None,
-) -> None:  # fmt: skip
-    """Set out props, (category, x, y, yaw) each, on the ground or on a floor at `z`."""
-    for category, x, y, yaw in spots:
-        put(site, category, x, y, yaw, place, z=z)
-
-
-def footbridge_roof(x0: float, y0: float, x1: float, y1: float, floor_m: float, *, roof: str, frame: str) -> Parts:
+@part_builder
+def footbridge_roof(*, box: _Box, on: Number, roof: Material, frame: Material) -> Parts:
     """Make a light roof on posts over a footbridge that runs along y."""
+    (x0, y0, x1, y1), floor_m = box, on
     posts = [block(x - 0.07, y - 0.07, x + 0.07, y + 0.07, floor_m, floor_m + 2.7)
              for x in (x0 + 0.1, x1 - 0.1)
              for y in np.linspace(y0 + 0.2, y1 - 0.2, max(round((y1 - y0) / 4.5), 1) + 1)]  # fmt: skip
