@@ -8,7 +8,8 @@ from support.layout_checks import catalogue, each_scene, props_of
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.grammar_scatter import s_curve
 from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
-from aerialdojo_gen.scenes.kit.rail import RAIL_M, arcade, ballast, tracks, upright
+from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
+from aerialdojo_gen.scenes.kit.viaducts import arcade, upright
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site

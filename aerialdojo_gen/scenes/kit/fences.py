@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Annotated, Literal
 
+import numpy as np
+from pydantic import Field
+
+from aerialdojo_gen.scenes.grammar_fences import fence
+from aerialdojo_gen.scenes.grammar_scatter import place_along
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
@@ -46,3 +51,21 @@ def mesh_fences(
     for line in lines:
         path = [(x, y, on + height_m / 2) for x, y in line]
         site.add(None, category, [(material, sweep(path=path, section=(0.06, height_m)))])
+
+
+@site_builder
+def garden_fences(
+    site: Site, *, lines: list[Line], kind: Literal["picket", "board", "hedge", "wall", "railing"]
+) -> None:
+    """Put up fences about gardens, each on the lowest ground of its line."""
+    for line in lines:
+        fence(site, line, kind)
+
+
+@site_builder
+def fence_panels(
+    site: Site, *, of: str, lines: list[Line], panel_m: Annotated[Number, Field(ge=0.2)], turn_deg: Number = 90.0
+) -> None:
+    """Set a panel of the catalogue in the middle of every stretch of lines, turned with them."""
+    for line in lines:
+        place_along(site, of, line, panel_m, turn_deg=turn_deg)

@@ -1,10 +1,12 @@
-"""A rocky gorge along y through ground at z = 0, and the stream at its bottom."""
+"""A rocky gorge or a soft valley along y through ground at z = 0, and the stream at its bottom."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
@@ -20,14 +22,15 @@ from aerialdojo_gen.scenes.terrain import Terrain
 
 @dataclass(frozen=True)
 class Stream:
-    """A stream that winds northwards about x = 0."""
+    """A stream that winds northwards."""
 
     swing_m: Number = 3.2  # To either side
-    bend_m: Number = 11.0  # Northing a radian of its waves
+    bend_m: Annotated[Number, Field(gt=0)] = 11.0  # Northing a radian of its waves
+    x_m: Number = 0.0  # What it winds about
 
     def x(self, y: float) -> float:
         """Where it runs, metres east, at a northing in metres."""
-        return self.swing_m * float(np.sin(y / self.bend_m))
+        return self.x_m + self.swing_m * float(np.sin(y / self.bend_m))
 
 
 _STREAM = Stream()
@@ -42,7 +45,7 @@ def gorge(
     rough = OpenSimplex(seed=seed + 5).noise2array(x[0] / 7.0, y[:, 0] / 7.0)
     ledge = OpenSimplex(seed=seed + 6).noise2array(x[0] / 15.0, y[:, 0] / 12.0)
     beyond = np.clip((np.abs(y) - 5.0) / 6.0, 0.0, 1.0)
-    middle = stream.swing_m * np.sin(y / stream.bend_m)
+    middle = stream.x_m + stream.swing_m * np.sin(y / stream.bend_m)
     away = np.abs(x - middle * beyond) + beyond * (1.6 * rough + 2.2 * ledge)
     drop = 0.56 * smooth((half_m - away) / 4.6) + 0.44 * smooth((ledge_m - away) / 5.5)
     bed = 0.7 * smooth((4.0 - np.abs(x - middle)) / 1.6)
@@ -86,3 +89,30 @@ def by_stream(
         instance = place(site, Placement(category, x, y, yaw, z=z, place=phrase))
         if on is None and instance is not None:
             keep_clear(site, instance, 1.6)
+
+
+@ground_builder
+def valley(
+    _site: Site, terrain: Terrain, *, depth_m: Number, half_m: Number, stream: Stream,
+    slope_m: Annotated[Number, Field(gt=0)], bed_m: Number = 0.6,
+) -> Terrain:  # fmt: skip
+    """Cut a valley with soft slopes along a stream, whose bed lies a little lower."""
+    x, y = grid(terrain)
+    away = np.abs(x - (stream.x_m + stream.swing_m * np.sin(y / stream.bend_m)))
+    deep = smooth((half_m - away) / slope_m)
+    bed = smooth((4.4 - away) / 2.0) * bed_m
+    return replace(terrain, heights_m=terrain.heights_m * (1.0 - deep) - depth_m * deep - bed)
+
+
+@site_builder
+def paint_brook(
+    site: Site, *, stream: Stream, bank: Material, water: Material, path: Material, path_offset_m: Number,
+    width_m: Number = 4.6, free_z: tuple[Number, Number] = (-100.0, 1000.0),
+) -> None:  # fmt: skip
+    """Paint a brook with gravel banks and a path beside it; nothing grows in it between two heights."""
+    half = site.recipe.size_m[1] / 2
+    line = [(stream.x(float(y)), float(y)) for y in np.arange(-half, half + 1.0, 3.0)]
+    site.paint(ribbon(line, width_m + 2.0), bank)
+    site.paint(ribbon(line, width_m), water)
+    site.paint(ribbon([(x + path_offset_m, y) for x, y in line], 1.6), path)
+    site.occupy(LineString(line).buffer(width_m / 2 + 1.1), *free_z)

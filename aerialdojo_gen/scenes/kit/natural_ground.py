@@ -9,7 +9,6 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
-from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 
@@ -119,18 +118,3 @@ def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, c
     wave = np.array([noise.noise2(1.3 * float(np.cos(a)), 1.3 * float(np.sin(a))) for a in angles])
     r = radius_m * (1.0 + ragged * wave / 0.6)
     return Polygon(np.column_stack([x + r * np.cos(angles), y + r * np.sin(angles)]))
-
-
-def place_wild(site: Site, place: str, spots: Sequence[tuple[str, float, float, float]]) -> None:
-    """Set out props on uneven ground and keep the room around them."""
-    for category, x, y, yaw in spots:
-        instance = site.place(
-            category,
-            x,
-            y,
-            yaw,
-            z=settled_z(site, x, y),
-            variant=next_variant(site, category),
-            attributes={"place": place},
-        )
-        keep_clear(site, instance, 1.6)

@@ -1,4 +1,4 @@
-"""Railways: tracks on ballast, platforms with roofs, overhead lines, arcades of viaducts.
+"""Railways: tracks on ballast, platforms with roofs, overhead lines.
 
 Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above the ground that a track is laid on.
 """
@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 from pydantic import Field
 from shapely.geometry import LineString
-from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translate
 from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.shapes import cylinder
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
 BED_M = 0.35
@@ -102,6 +102,8 @@ def butterfly_roof(
 ) -> Parts:  # fmt: skip
     """Make a platform's roof that falls to a gutter in its middle, on posts in `rows` (y, metres)."""
     x0, y0, x1, y1 = box
+    if x1 <= x0 or y1 <= y0:
+        raise AssetError(f"box is [x0, y0, x1, y1] with x0 < x1 and y0 < y1, got {list(box)}")
     middle, rise = (y0 + y1) / 2, 0.55
     half = (y1 - y0) / 2
     pitch = float(np.degrees(np.arctan2(rise, half)))
@@ -137,7 +139,9 @@ def overhead_portals(
 
     Each portal has two posts (y, metres), which stand on its own two `feet` (heights).
     """
-    for x, foot in zip(at_x, feet, strict=False):
+    if len(feet) != len(at_x):
+        raise AssetError(f"feet: {len(feet)} pairs of heights for {len(at_x)} portals")
+    for x, foot in zip(at_x, feet, strict=True):
         _portal(site, x, posts, foot, tracks, z_m, wire_m)
 
 
@@ -190,40 +194,3 @@ def footbridge_roof(*, box: _Box, on: Number, roof: Material, frame: Material) -
              for y in np.linspace(y0 + 0.2, y1 - 0.2, max(round((y1 - y0) / 4.5), 1) + 1)]  # fmt: skip
     top = slab(rectangle(x0 - 0.3, y0, x1 + 0.3, y1), floor_m + 2.7, floor_m + 2.86)
     return [(frame, merge(posts)), (roof, top)]
-
-
-def arcade(
-    x0: float,
-    x1: float,
-    z0: float,
-    z1: float,
-    arches: Sequence[tuple[float, float, float]],
-    width_m: float,
-    y: float = 0.0,
-) -> Mesh:
-    """Make a wall of round arches that runs along x.
-
-    Parameters
-    ----------
-    x0, x1, z0, z1 : float
-        Ends, foot and top, metres.
-    arches : sequence of (middle, radius, springing)
-        Each opening reaches from the foot up to its springing and half a circle beyond, metres.
-    width_m : float
-        Across, about `y`.
-    """
-    face: BaseGeometry = rectangle(x0, z0, x1, z1)
-    for middle, radius, spring in arches:
-        face = face.difference(rectangle(middle - radius, z0 - 1.0, middle + radius, spring))
-        face = face.difference(shapely.Point(middle, spring).buffer(radius, quad_segs=8))
-    return upright(face, width_m, y)
-
-
-def upright(face: BaseGeometry, width_m: float, y: float = 0.0) -> Mesh:
-    """Extrude a side view, polygons of (x, z) in metres, along y, centred on `y`."""
-    bodies = []
-    for piece in getattr(face, "geoms", [face]):
-        flat = extrude(piece, width_m)
-        u, v, w = flat.vertices.T
-        bodies.append(Mesh(np.column_stack([u, y + width_m / 2 - w, v]), flat.faces))
-    return merge(bodies)

@@ -164,6 +164,23 @@ def parapet(plan: BaseGeometry, z_m: float, height_m: float = 1.0, gaps: Sequenc
     return merge([slab(p, z_m, z_m + height_m) for p in getattr(band, "geoms", [band]) if p.area > 1e-6])
 
 
+@part_builder
+def sash_windows(
+    *, at_x: list[Number], walls: list[tuple[Number, Number]], sills: list[Number], frame: Material,
+    pane: Material = "window",
+) -> Parts:  # fmt: skip
+    """Make windows with sill and mullion on walls along x: (y, -1 or 1 for the side that it faces)."""
+    parts: Parts = []
+    for x in at_x:
+        for y, s in walls:
+            a, b = sorted((y - s * 0.05, y + s * 0.08))
+            for z in sills:
+                parts.append((pane, block(x - 0.55, a, x + 0.55, b, z, z + 1.6)))
+                parts.append((frame, merge([block(x - 0.7, a, x + 0.7, b + 0.04, z - 0.15, z),
+                                            block(x - 0.04, a, x + 0.04, b + 0.03, z, z + 1.6)])))  # fmt: skip
+    return parts
+
+
 def letters(
     line: str, height_m: float, at: tuple[float, float, float], yaw_deg: float, depth_m: float = 0.12
 ) -> Mesh:

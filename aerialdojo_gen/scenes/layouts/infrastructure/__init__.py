@@ -1,1 +1,0 @@
-"""Layouts of infrastructure, one folder a type."""

@@ -1,1 +1,0 @@
-"""A railway: a country station at a viaduct."""
