@@ -126,7 +126,8 @@ class _Building:
         arguments = self._read(found.arguments, {k: v for k, v in body.items() if k != "make"}, f"{where} {name!r}")
         try:
             return found.function(*fixed, **{key: getattr(arguments, key) for key in found.arguments.model_fields})
-        except AssetError as error:
+        except (AssetError, ValueError, ArithmeticError) as error:
+            # Numbers that are each within bounds and make no body together.
             raise AssetError(f"{where} {name!r}: {error}") from error
 
     def _ground(self, body: Mapping[str, Any]) -> None:
