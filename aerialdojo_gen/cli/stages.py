@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli.common import (
     Address,
@@ -35,7 +37,7 @@ from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 app = typer.Typer()
 
 # Stages whose command has options of its own.
-_WITH_OPTIONS = ("plan", "split", "render")
+_WITH_OPTIONS = ("build-scenes", "plan", "split", "render")
 
 
 def _stage_command(name: str) -> Callable[..., None]:
@@ -55,6 +57,41 @@ def _stage_command(name: str) -> Callable[..., None]:
 for _stage in STAGES:
     if _stage.name not in _WITH_OPTIONS:
         app.command(_stage.name, help=_stage.help)(_stage_command(_stage.name))
+
+
+@app.command("build-scenes", help=BY_NAME["build-scenes"].help)
+def build_scenes(
+    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    executor: ExecutorName = "local", address: Address = None,
+    watch: Annotated[
+        Path | None, typer.Option("--watch", help="Show this plan in the browser, built again when it is saved.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+) -> None:  # fmt: skip
+    """Build meshes from plans."""
+    if watch is not None:
+        _watch(watch, pipeline, port, browser)
+        return
+    run_until(
+        "build-scenes", data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, force=force, quiet=quiet,
+        verbose=verbose, options=RunOptions(workers, executor, address),
+    )  # fmt: skip
+
+
+def _watch(plan: Path, pipeline: Path | None, port: int, browser: bool) -> None:
+    from aerialdojo_gen.studio.web.serving import open_socket, require_web, serve, url_of
+
+    require_web()
+    from aerialdojo_gen.studio.view.plan_page import plan_app
+
+    if not plan.is_file():
+        raise UsageError(f"no file {plan}: --watch takes a scene's TOML")
+    _, roots = open_pipeline(pipeline, "data")
+    page, listener = plan_app(plan, roots.scene_assets), open_socket(port)
+    print(f"{plan}: {url_of(listener)}  (Ctrl-C ends it)", flush=True)
+    serve(page, listener, browser)
 
 
 @app.command("plan", help=BY_NAME["plan"].help)

@@ -43,13 +43,15 @@ _HEAD_KEYS = (
 )
 
 
-def build_plan(path: Path, catalogue: Catalogue) -> Scene:
-    """Build the scene of a plan; an `AssetError` names file, entry and key."""
+def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, int] | None = None) -> Scene:
+    """Build the scene of a plan, and fill in the entry of each node; an `AssetError` names file, entry and key."""
     head = validated(PlanHead, read_toml(path, AssetError), str(path))
     recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
     names = _names(head, catalogue, str(path))
     site = Site(path.stem, recipe, catalogue)
-    _Building(site, names, str(path)).build(head)
+    made = _Building(site, names, str(path)).build(head)
+    if entries is not None:
+        entries.update(made)
     scene = site.scene()
     check_inventory(scene, recipe, path)
     return scene
@@ -93,9 +95,10 @@ class _Building:
         self._site, self._names, self._where = site, names, where
         names.make_parts = self._all_parts
 
-    def build(self, head: PlanHead) -> None:
-        """Make the ground and then every entry, in order."""
+    def build(self, head: PlanHead) -> dict[str, int]:
+        """Make the ground and then every entry, in order; returns the entry of each node."""
         self._ground(head.ground)
+        made: dict[str, int] = {}
         kinds: dict[str, Callable[[dict[str, Any], str], None]] = {
             "paint": self._paint, "make": self._make, "parts": self._structure, "place": self._place,
             "pattern": self._place,
@@ -109,6 +112,8 @@ class _Building:
                 kinds[kind](entry, f"{where} ({kind})")
             except ShapeError as error:
                 raise AssetError(f"{where} ({kind}): {error}") from error
+            made |= {instance.node: number for instance in self._site.instances[len(made) :]}
+        return made
 
     def _read(self, model: type[Model], body: Mapping[str, Any], where: str) -> Model:
         try:

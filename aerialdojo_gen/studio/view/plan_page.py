@@ -1,0 +1,91 @@
+"""`build-scenes --watch`: a plan in the browser, built again whenever its file is saved."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Response
+
+from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.plans.build import build_plan
+from aerialdojo_gen.studio.web.payload import scene_payload
+from aerialdojo_gen.studio.web.serving import local_app, one_line
+
+
+@dataclass(frozen=True)
+class _Built:
+    """What came of one version of the files: a scene, or the last one that was built and an error."""
+
+    payload: bytes
+    state: dict[str, Any]
+
+
+class WatchedPlan:
+    """A plan's file, and the scene of its present text."""
+
+    def __init__(self, path: Path, assets: Path) -> None:
+        self.path, self._assets = path, assets
+        self._lock = threading.Lock()
+        self._seen: object = None
+        self._built = _Built(b"", {})
+        self._version = 0
+
+    def current(self) -> _Built:
+        """Build if a file changed since the last call."""
+        with self._lock:
+            seen = self._stamp()
+            if seen != self._seen:
+                self._seen = seen
+                self._version += 1
+                self._built = self._build()
+            return self._built
+
+    def _stamp(self) -> object:
+        files = [self.path, *sorted(self._assets.rglob("*.toml"))]
+        return [(file, stat.st_mtime_ns, stat.st_size) for file in files if (stat := _stat(file))]
+
+    def _build(self) -> _Built:
+        head: dict[str, Any] = {"version": self._version, "file": str(self.path), "name": self.path.stem}
+        before, entries = time.perf_counter(), dict[str, int]()
+        try:
+            scene = build_plan(self.path, load_catalogue(self._assets), entries)
+            lines = _entry_lines(self.path.read_text(encoding="utf-8"))
+        except (AerialDojoError, OSError) as error:
+            return _Built(self._built.payload, {**self._built.state, **head, "error": one_line(str(error))})
+        counts = {"n_triangles": scene.n_triangles, "n_instances": len(scene.instances)}
+        where = {node: {"entry": k, "line": lines[k]} for node, k in entries.items()}
+        seconds = round(time.perf_counter() - before, 2)
+        return _Built(scene_payload(scene), {**head, **counts, "seconds": seconds, "error": "", "entries": where})
+
+
+def _stat(file: Path) -> Any:
+    try:
+        return file.stat()
+    except OSError:
+        # An editor that saves replaces the file.
+        return None
+
+
+def _entry_lines(text: str) -> list[int]:
+    return [number for number, line in enumerate(text.splitlines(), 1) if line.strip() == "[[site]]"]
+
+
+def plan_app(path: Path, assets: Path) -> FastAPI:
+    """Make the app of a plan: one page that follows the file."""
+    watched = WatchedPlan(path, assets)
+    app = local_app("plan.html", f"aerialdojo-gen build-scenes --watch {path}")
+
+    @app.get("/api/state")
+    def get_state() -> dict[str, Any]:
+        return watched.current().state
+
+    @app.get("/api/scene", response_model=None)
+    def get_scene() -> Response:
+        return Response(watched.current().payload, media_type="application/octet-stream")
+
+    return app
