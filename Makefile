@@ -96,12 +96,13 @@ nightly: .venv/.dev  ## some hours: the nightly tests, fuzz with N=10000, tortur
 	@.venv/bin/python tests/golden/digests.py $(DATA) | diff tests/golden/release.sha256 -
 NIGHT = $(or $(SEED),$(shell date +%Y%m%d))
 
-lint: .venv/.dev  ## ruff, the import contracts, mypy --strict, and vulture for what nothing uses
+lint: .venv/.dev  ## ruff, the import contracts, mypy --strict, vulture for what nothing uses, the plans by their schema
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
 	@.venv/bin/lint-imports --no-cache --no-logo
 	@.venv/bin/mypy
 	@! .venv/bin/vulture | grep '^aerialdojo_gen/'
+	@.venv/bin/python -m pytest -q -n 0 -k schema tests/scenes/test_plans.py
 
 format: .venv/.dev  ## let ruff format the code
 	@.venv/bin/ruff check --fix-only --quiet .

@@ -1,8 +1,10 @@
 """Plans: what a scene's TOML says is built in its order, or named in one line."""
 
+import json
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,6 +55,38 @@ def build(tmp_path, catalogue, plan):
 def test_the_schema_is_that_of_the_code():
     """`python -c "from aerialdojo_gen.scenes.plans.schema import schema_text; print(schema_text(), end='')"`."""
     assert (ASSETS / "plan.schema.json").read_text() == schema_text()
+
+
+@pytest.fixture(scope="module")
+def schema():
+    schema = json.loads((ASSETS / "plan.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_the_schema_fits_every_plan(schema):
+    found = {path.stem: [e.json_path for e in schema.iter_errors(tomllib.loads(path.read_text()))] for path in PLANS}
+    assert {name: paths for name, paths in found.items() if paths} == {}
+    assert schema.is_valid(YARD)
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        {"paint": "yard", "material": "mud", "riser_m": 1},
+        {"make": "flat_hose", "outline": [0, 0, 4, 4]},
+        {"make": "wires", "headz": []},
+        {"node": "a", "parts": [{"shape": "blok", "role": "wood"}]},
+        {"node": "a", "parts": [{"make": "gable_ruf", "box": [0, 0, 1, 1]}]},
+        {"place": [["tractor", 0, 0]], "fit": "perhaps"},
+        {"place": [["tractor", 0, 0]], "settled_m": 1},
+    ],
+)
+def test_the_schema_marks_what_would_not_be_built(schema, tmp_path, catalogue, entry):
+    plan = {**YARD, "site": [entry]}
+    assert not schema.is_valid(plan)
+    with pytest.raises(AssetError):
+        build(tmp_path, catalogue, plan)
 
 
 @pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)

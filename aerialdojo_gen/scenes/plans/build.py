@@ -163,7 +163,9 @@ class _Building:
         parts = self._all_parts(entry.parts, f"{where} ")
         if entry.at != (0.0, 0.0) or entry.yaw_deg or entry.on:
             parts = Frame(*entry.at, entry.yaw_deg).parts(parts, entry.on)
-        self._site.add(entry.node, entry.category, parts, entry.attributes or None, footprint=entry.footprint)
+        self._site.add(
+            entry.node, entry.category or str(entry.node), parts, entry.attributes or None, footprint=entry.footprint
+        )
         for x, y, radius in entry.keep_clear:
             self._site.occupy(disc(x, y, radius, 8))
 

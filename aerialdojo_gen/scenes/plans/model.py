@@ -66,7 +66,7 @@ class Structure(BaseModel):
 
     parts: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=1000)]
     node: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")] | None = None
-    category: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")]
+    category: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")] = ""  # The node's name where absent
     at: At = (0.0, 0.0)  # Origin of the parts' frame
     yaw_deg: Number = 0.0
     on: Number = 0.0  # Height of that origin; the name of a floor is a number too
@@ -74,10 +74,11 @@ class Structure(BaseModel):
     footprint: Area | None = None  # Ground that it takes
     keep_clear: list[tuple[Number, Number, Number]] = []  # Discs of ground that it takes: x, y, radius
 
-    @model_validator(mode="before")
-    @classmethod
-    def _category_of_node(cls, body: Any) -> Any:
-        return {"category": body.get("node"), **body} if isinstance(body, dict) else body
+    @model_validator(mode="after")
+    def _named(self) -> Structure:
+        if not (self.node or self.category):
+            raise ValueError("a structure has a node or a category")
+        return self
 
 
 class Thing(BaseModel):

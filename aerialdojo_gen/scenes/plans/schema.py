@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure
+from aerialdojo_gen.scenes.vocabulary import SHAPES
 
 
 def plan_schema() -> dict[str, Any]:
@@ -21,7 +22,10 @@ def plan_schema() -> dict[str, Any]:
     }
     structure, place = _schema(Structure, definitions), _schema(Place, definitions)
     structure["properties"]["parts"]["items"] = {
-        "anyOf": [*builders["parts"], {"type": "object", "required": ["shape", "role"]}]
+        "anyOf": [
+            *builders["parts"],
+            {"type": "object", "required": ["shape", "role"], "properties": {"shape": {"enum": sorted(SHAPES)}}},
+        ]
     }
     ground = _schema(Ground, definitions)
     ground["properties"]["steps"]["items"] = {"anyOf": builders["ground"]}
@@ -39,7 +43,9 @@ def schema_text() -> str:
 
 def _schema(model: type[BaseModel], definitions: dict[str, Any]) -> dict[str, Any]:
     found = model.model_json_schema(mode="validation")
-    definitions.update(found.pop("$defs", {}))
+    for name, one in found.pop("$defs", {}).items():
+        if definitions.setdefault(name, one) != one:
+            raise ValueError(f"two classes of the kit's arguments are called {name}: rename one")
     return found
 
 
