@@ -244,3 +244,32 @@ def test_every_builder_says_what_it_builds():
     for name, one in kit().items():
         assert one.summary.endswith("."), name
         assert one.arguments.model_fields or one.kind == "ground", name
+
+
+def test_the_ground_under_a_thing_on_a_slope_is_levelled_and_its_room_kept(tmp_path, catalogue):
+    """What grows later keeps away; what looks for the things' places finds them by the name of the area."""
+    shed = {"place": [["garden_shed", 4, 3, 30]], "settle_m": 0.5, "frame": [2, 1, 20]}
+    strewn = {"pattern": {"of": ["sapling"], "scatter": [-12, -12, 12, 12], "spacing_m": 1.5}, "fit": "skip"}
+    keep = {"make": "keep_free", "areas": ["sheds"], "z": [0, 40]}
+    steps = [{"make": "rolling_ground", "cell_m": 1, "height_m": 6, "wavelength_m": 20}]
+
+    def scene(entry, more=()):
+        plan = {**HEAD, "ground": {"steps": [*steps, *more]}, "site": [entry, strewn]}
+        return build(tmp_path, catalogue, plan)
+
+    def saplings(built):
+        return sum(i.category == "sapling" for i in built.instances)
+
+    def unevenness(built):
+        x, y = built.instances[1].bounds[:, :2].mean(axis=0)
+        vertices = built.instances[0].vertices
+        near = vertices[((vertices[:, :2] - (x, y)) ** 2).sum(axis=1) < 1.0]
+        return float(near[:, 2].max() - near[:, 2].min())
+
+    plain = scene(shed)
+    level = scene({**shed, "level": True, "room_m": 4.0}, [{"make": "level_under_things"}])
+    assert unevenness(level) < 0.01 < unevenness(plain)
+    assert saplings(level) < saplings(plain)
+    with pytest.raises(AssetError, match="no area 'sheds'"):
+        build(tmp_path, catalogue, {**HEAD, "site": [shed, keep]})
+    build(tmp_path, catalogue, {**HEAD, "site": [{**shed, "spots": "sheds"}, keep]})

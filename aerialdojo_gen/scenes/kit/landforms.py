@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
-from aerialdojo_gen.scenes.plans.values import Areas, At, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
@@ -71,6 +72,45 @@ def slope(
     t = smooth((along - start_m) / (end_m - start_m))
     inside = (along > within[0]) & (along <= within[1])
     return replace(terrain, heights_m=np.where(inside, terrain.heights_m * (1 - t) + to_m * t, terrain.heights_m))
+
+
+@ground_builder
+def level_along(
+    _site: Site, terrain: Terrain, *, lines: list[Line], width_m: Number, blend_m: Number = 3.0,
+    smooth_m: Annotated[Number, Field(gt=0)] = 12.0,
+) -> Terrain:  # fmt: skip
+    """Lay ways into the ground, each level across, and smoothed along over `smooth_m`."""
+    for line in lines:
+        terrain = terrain.graded(line, width_m, blend_m, smooth_m)
+    return terrain
+
+
+@ground_builder
+def sink_area(
+    _site: Site, terrain: Terrain, *, area: Area, depth_m: Number, blend_m: Annotated[Number, Field(gt=0)]
+) -> Terrain:
+    """Sink an area, such as the bed of a stream, with slopes inside its border."""
+    return terrain.lowered(area, depth_m, blend_m)
+
+
+@ground_builder
+def level_under_things(site: Site, terrain: Terrain, *, blend_m: Number = 3.0) -> Terrain:
+    """Level the ground under every thing of the places that say `level`, in their order."""
+    for outline in site.footings:
+        terrain = terrain.flattened(outline, blend_m=blend_m)
+    return terrain
+
+
+@ground_builder
+def bank_scree(
+    _site: Site, terrain: Terrain, *, areas: list[Area], rise_m: Number, reach_m: Annotated[Number, Field(gt=0)]
+) -> Terrain:
+    """Let the ground rise towards the feet of rocks."""
+    places = shapely.points(terrain.corners()[:, :2])
+    for area in areas:
+        t = np.clip(1.0 - shapely.distance(area, places) / reach_m, 0.0, 1.0) ** 2
+        terrain = replace(terrain, heights_m=terrain.heights_m + rise_m * t.reshape(terrain.heights_m.shape))
+    return terrain
 
 
 @site_builder

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from shapely.geometry import Point
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError, brief
 from aerialdojo_gen.base.explain import explain
@@ -20,7 +21,7 @@ from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
-from aerialdojo_gen.scenes.plans.placing import Placement, place, poses_of, prop_height
+from aerialdojo_gen.scenes.plans.placing import Placement, outline_of, place, poses_of, prop_height
 from aerialdojo_gen.scenes.plans.values import PlanNames
 from aerialdojo_gen.scenes.recipe import Recipe, validated
 from aerialdojo_gen.scenes.site import Site
@@ -97,6 +98,7 @@ class _Building:
 
     def build(self, head: PlanHead) -> dict[str, int]:
         """Make the ground and then every entry, in order; returns the entry of each node."""
+        self._footings(head.site)
         self._ground(head.ground)
         made: dict[str, int] = {}
         kinds: dict[str, Callable[[dict[str, Any], str], None]] = {
@@ -134,6 +136,19 @@ class _Building:
         except (AssetError, ValueError, ArithmeticError) as error:
             # Numbers that are each within bounds and make no body together.
             raise AssetError(f"{where} {name!r}: {error}") from error
+
+    def _footings(self, entries: Sequence[Mapping[str, Any]]) -> None:
+        """Outline the things that the ground is to be levelled under, before it is made."""
+        for number, body in enumerate(entries):
+            if not body.get("level"):
+                continue
+            where = f"{self._where}: site[{number}] (place)"
+            # Heights that builders return are not known yet.
+            entry = self._read(Place, {key: body[key] for key in ("place", "frame") if key in body}, where)
+            for raw in entry.place:
+                thing = self._thing(raw[:4] if isinstance(raw, list) else {**raw, "on": None}, where)
+                category, variant, pose = self._pose(thing, entry, where)
+                self._site.footings.append(outline_of(self._site, category, variant, pose[:2], pose[2]))
 
     def _ground(self, body: Mapping[str, Any]) -> None:
         ground = self._read(Ground, body, f"{self._where}: [ground]")
@@ -205,12 +220,17 @@ class _Building:
             raise AssetError(f"{where}: a thing is a list or a table, got {raw!r}")
         return self._read(Thing, raw, where)
 
-    def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
+    def _pose(self, thing: Thing, entry: Place, where: str) -> tuple[str, str | None, tuple[float, float, float]]:
+        """Category, variant and world pose of a thing."""
         category, _, variant = thing.what.partition(":")
         if category not in self._site.catalogue:
             raise AssetError(f"{where}: unknown category {category!r}{nearest(category, self._site.catalogue)}")
         frame = Frame(*entry.frame)
-        x, y, yaw_deg = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
+        pose = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
+        return category, variant or None, pose
+
+    def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
+        category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
         z = thing.on if thing.on is not None else entry.on
         if entry.settle_m is not None:
             z = settled_z(self._site, x, y, entry.settle_m) + entry.above_ground_m
@@ -218,14 +238,18 @@ class _Building:
             z = self._site.ground_z(x, y) + entry.above_ground_m
         if entry.sunk is not None:
             share, most_m = entry.sunk
-            height_m = prop_height(self._site, category, variant or None, x, y)
+            height_m = prop_height(self._site, category, variant, x, y)
             z = (z or 0.0) - min(share * height_m, most_m)
         given = {key: getattr(thing, key) for key in ("scale", "roles", "params", "attributes")}
         options = {key: value for key, value in given.items() if value and value != 1.0}
         if not thing.solid:
             options["solid"] = False
-        one = Placement(category, x, y, yaw_deg, variant or None, z, entry.phrase, thing.node, options)
+        one = Placement(category, x, y, yaw_deg, variant, z, entry.phrase, thing.node, options)
         try:
-            return place(self._site, one, entry.fit, entry.clear_m, entry.margin_m) is not None
+            placed = place(self._site, one, entry.fit, entry.clear_m, entry.margin_m, entry.room_m) is not None
         except AssetError as error:
             raise AssetError(f"{where}: {error}") from error
+        if placed and entry.spots:
+            others = self._names.areas.get(entry.spots, Point())
+            self._names.areas[entry.spots] = others.union(Point(x, y))
+        return placed

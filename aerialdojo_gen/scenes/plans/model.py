@@ -141,3 +141,6 @@ class Place(BaseModel):
     fit: Literal["as_is", "skip", "must"] = "as_is"  # Where there is no room: placed all the same, left out, an error
     clear_m: Annotated[Number, Field(ge=0)] = 0.0  # Ground about them that stays free of what follows
     margin_m: Annotated[Number, Field(ge=0)] = 0.0  # The same, about the rectangle that each takes
+    room_m: Annotated[Number, Field(ge=0)] = 0.0  # The same, about its outline, from 1 m below it to 6 m above it
+    level: bool = False  # Whether `level_under_things` among the ground's steps levels the ground under each
+    spots: str = ""  # Name of an area that the points where they stand are added to

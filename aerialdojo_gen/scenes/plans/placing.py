@@ -6,6 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from shapely.affinity import rotate, translate
+from shapely.geometry import MultiPoint
+from shapely.geometry.base import BaseGeometry
+
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar_props import next_variant
@@ -34,7 +38,7 @@ class Placement:
 
 
 def place(
-    site: Site, thing: Placement, fit: Fit = "as_is", clear_m: float = 0.0, margin_m: float = 0.0
+    site: Site, thing: Placement, fit: Fit = "as_is", clear_m: float = 0.0, margin_m: float = 0.0, room_m: float = 0.0
 ) -> Instance | None:
     """Place a thing; with ``fit="skip"`` None where it has no room, with ``"must"`` an `AssetError`."""
     options = dict(thing.options)
@@ -53,7 +57,24 @@ def place(
         site.occupy(disc(thing.x, thing.y, clear_m))
     if margin_m:
         keep_clear(site, instance, margin_m)
+    if room_m:
+        low, high = instance.bounds[:, 2]
+        room = outline_of(site, thing.category, variant, (thing.x, thing.y), thing.yaw_deg).buffer(
+            room_m, quad_segs=2
+        )
+        site.occupy(room, float(low) - 1.0, float(high) + 6.0)
     return instance
+
+
+def outline_of(
+    site: Site, category: str, variant: str | None, at: tuple[float, float], yaw_deg: float
+) -> BaseGeometry:
+    """Outline of a thing on the ground, grown by 0.1 m, world frame."""
+    trial = site.catalogue.instantiate(
+        category, "outline", site.rng_for("outline", category, variant), variant=variant
+    )
+    shape = MultiPoint(trial.vertices[:, :2]).convex_hull.buffer(0.1, quad_segs=2)
+    return translate(rotate(shape, yaw_deg, origin=(0, 0)), *at)
 
 
 def prop_height(site: Site, category: str, variant: str | None, x: float, y: float) -> float:

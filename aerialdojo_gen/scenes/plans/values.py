@@ -14,13 +14,14 @@ from typing import Annotated, Any
 
 import shapely
 from pydantic import BeforeValidator, PlainValidator, ValidationInfo, WithJsonSchema
+from shapely.affinity import rotate, scale
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import evaluate
-from aerialdojo_gen.scenes.grammar_frames import Parts
+from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.grammar_scatter import eased_path, smooth_path
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
 from aerialdojo_gen.scenes.kit.natural_ground import blob
@@ -97,7 +98,7 @@ class PlanNames:
             value = {"box": value}
         if not isinstance(value, dict):
             raise ValueError(f"an area is a name, [x0, y0, x1, y1] or a table, got {value!r}")
-        _refuse_unknown(value, (*_AREAS, *_CHANGES, "width_m", "round_ends"))
+        _refuse_unknown(value, (*_AREAS, *_CHANGES, "width_m", "round_ends", "long"))
         kinds = [key for key in _AREAS if key in value]
         if len(kinds) != 1:
             raise ValueError(f"an area has one of {', '.join(_AREAS)}, got {', '.join(kinds) or 'none'}")
@@ -152,10 +153,18 @@ def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
 
 def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     given = value["blob"]
-    if not isinstance(given, list) or len(given) not in (4, 5):
-        raise ValueError(f"blob is [x, y, radius, seed] or [x, y, radius, seed, ragged], got {given!r}")
+    if not isinstance(given, list) or len(given) not in (4, 5, 6):
+        raise ValueError(f"blob is [x, y, radius, seed] or that with ragged, corners, got {given!r}")
     x, y, radius, seed, ragged = (names.number(one) for one in (*given, 0.25)[:5])
-    return blob(x, y, radius, int(seed), ragged)
+    area = blob(x, y, radius, int(seed), ragged, min(max(int(names.number(given[5])), 3), _MAX_POINTS)
+                if len(given) == 6 else 28)  # fmt: skip
+    if "long" not in value:
+        return area
+    # Length over width, and the direction of the length.
+    long, yaw_deg = names.point(value["long"])
+    if long < 1.0:
+        raise ValueError(f"long is [length over width, degrees], the first 1 or more, got {long:g}")
+    return rotate(scale(area, math.sqrt(long), 1.0 / math.sqrt(long), origin=(x, y)), yaw_deg, origin=(x, y))
 
 
 def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
@@ -199,7 +208,18 @@ def _within(names: PlanNames, area: BaseGeometry, other: Any) -> BaseGeometry:
 
 
 def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
-    return area.buffer(names.number(by_m))
+    """Grow an area by metres, or by ``[metres, steps of a round corner]``."""
+    if not isinstance(by_m, list):
+        return area.buffer(names.number(by_m))
+    by, steps = names.point(by_m)
+    return area.buffer(by, quad_segs=min(max(int(steps), 1), 64))
+
+
+def _framed(names: PlanNames, area: BaseGeometry, pose: Any) -> BaseGeometry:
+    """Take an area for one in the frame ``[x, y, yaw]``."""
+    if not isinstance(pose, list) or len(pose) != 3:
+        raise ValueError(f"frame is [x, y, yaw], got {pose!r}")
+    return Frame(*(names.number(one) for one in pose)).area(area)
 
 
 def _offset(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
@@ -215,7 +235,14 @@ _AREAS = {
     "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
     "union": _union,
 }  # fmt: skip
-_CHANGES = {"plus": _plus, "minus": _minus, "grow_m": _grown, "offset_m": _offset, "within": _within}
+_CHANGES = {
+    "frame": _framed,
+    "plus": _plus,
+    "minus": _minus,
+    "grow_m": _grown,
+    "offset_m": _offset,
+    "within": _within,
+}
 
 
 def _refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:
