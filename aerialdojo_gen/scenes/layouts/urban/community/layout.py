@@ -15,10 +15,10 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters
 from aerialdojo_gen.scenes.layouts.urban.community.estate import Slab, furnish_balconies, furnish_roof, put_up
 from aerialdojo_gen.scenes.layouts.urban.community.terraces import build_terraces
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 

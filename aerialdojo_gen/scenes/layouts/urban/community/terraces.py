@@ -10,8 +10,8 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes_extruded import prism
 from aerialdojo_gen.scenes.site import Site

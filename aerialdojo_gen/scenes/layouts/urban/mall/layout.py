@@ -14,6 +14,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.parking import deck_cars, park_cars, parking_deck
 from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
@@ -27,7 +28,6 @@ from aerialdojo_gen.scenes.kit.structures import (
 from aerialdojo_gen.scenes.layouts.urban.mall.outlets import build_outlets
 from aerialdojo_gen.scenes.layouts.urban.mall.shops import STOREY_M, anchor_store, shop_names, shop_row, shopping_hall
 from aerialdojo_gen.scenes.layouts.urban.parts.furniture import Furniture, furnish
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars, parking_deck
 from aerialdojo_gen.scenes.site import Site
 
 HALL = unary_union([rectangle(-58, 20, 34, 46), rectangle(-58, -12, -36, 20), rectangle(14, -12, 34, 20)])
@@ -67,12 +67,13 @@ def build(site: Site) -> None:
     _hall(site)
     _courtyard(site)
     _yard(site)
-    floors = parking_deck(site, 50.0, 10.0, 82.0, 46.0)
+    deck_box = (50.0, 10.0, 82.0, 46.0)
+    deck_wall = site.material("deck_wall", "concrete:#c9c2b4")
+    parking_deck(site, box=deck_box, phrase="east of the mall", wall=deck_wall)
     _restaurant(site)
     _park(site)
     furnish(site, parameters.furniture)
-    for z, floor, bays in zip(floors.levels_m, ("ground floor", "middle floor", "roof"), floors.bays, strict=True):
-        park_cars(site, bays, 0.3, f"on the {floor} of the parking deck", z=z or None)
+    deck_cars(site, box=deck_box, occupancy=0.3)
     _car_park(site, parameters.occupancy)
 
 

@@ -16,6 +16,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
@@ -27,7 +28,6 @@ from aerialdojo_gen.scenes.kit.structures import (
     stairs,
 )
 from aerialdojo_gen.scenes.layouts.urban.mall.shops import STOREY_M, anchor_store, shop_names, shop_row, shopping_hall
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.site import Site
 
 _HALF_STREET_M = 8.0

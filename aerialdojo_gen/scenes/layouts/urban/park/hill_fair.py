@@ -14,9 +14,9 @@ from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.grammar_streets import parking_row
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import Parts, block
 from aerialdojo_gen.scenes.layouts.urban.park.rides import booths, entrance_gate, light_strings, pavilion, queue_rails
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain

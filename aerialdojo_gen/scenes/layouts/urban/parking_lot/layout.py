@@ -14,9 +14,9 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.kit.parking import deck_cars, park_cars, parking_deck
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters
 from aerialdojo_gen.scenes.layouts.urban.parking_lot import park_and_ride
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars, parking_deck
 from aerialdojo_gen.scenes.site import Site
 
 _LOT = (-54.0, 20.0)
@@ -56,7 +56,10 @@ def build(site: Site) -> None:
 def _city(site: Site, occupancy: float) -> None:
     _ground(site)
     bays, shaded = _bays(site)
-    deck = parking_deck(site, 31.0, 2.0, 59.0, 36.0, place="beside the car park")
+    deck_box = (31.0, 2.0, 59.0, 36.0)
+    top = parking_deck(site, box=deck_box, phrase="beside the car park", wall=site.material("deck_wall", "concrete"),
+                       band=site.material("deck_band", "concrete"),
+                       tower=site.material("deck_tower", "concrete"))  # fmt: skip
     _islands(site)
     _solar_roofs(site)
     _offices(site)
@@ -67,17 +70,14 @@ def _city(site: Site, occupancy: float) -> None:
     _furnish(site)
     park_cars(site, shaded, 0.5, "under the solar roof")
     park_cars(site, bays, occupancy, "in the car park")
-    top = len(deck.levels_m) - 1
     stalls = ["market_stall", "ice_cream_cart", "cafe_table", "food_truck", "stage", "cotton_candy_stand", "planter",
               "carousel", "kiosk", "balloon_stand", "vending_machine", "bench", "motorcycle",
               "ev_charger"]  # fmt: skip
     spots = [
         Pose(34.5 + 5.2 * k, y, 90.0 * (1 - 2 * row)) for row, y in enumerate((6.0, 13.4, 24.6)) for k in range(5)
     ]
-    deal(site, stalls, spots, "in the market on the roof of the parking deck", z=deck.levels_m[top])
-    for k, (z, poses) in enumerate(zip(deck.levels_m, deck.bays, strict=True)):
-        floor = "ground floor" if k == 0 else "roof" if k == top else "middle floor"
-        park_cars(site, poses, 0.34, f"on the {floor} of the parking deck", z=z or None)
+    deal(site, stalls, spots, "in the market on the roof of the parking deck", z=top)
+    deck_cars(site, box=deck_box, occupancy=0.34)
 
 
 def _ground(site: Site) -> None:

@@ -11,6 +11,7 @@ from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, streets
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import (
     Parts,
     block,
@@ -21,7 +22,6 @@ from aerialdojo_gen.scenes.kit.structures import (
     railing,
     stairs,
 )
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 

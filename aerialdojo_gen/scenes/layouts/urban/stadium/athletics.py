@@ -16,8 +16,8 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import parking_row
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters, railing, stairs
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.layouts.urban.stadium.stand_shells import back_wall, end_walls, platform, roof_parts
 from aerialdojo_gen.scenes.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.mesh import merge

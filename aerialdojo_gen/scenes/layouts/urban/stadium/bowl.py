@@ -13,8 +13,8 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.grammar_streets import arrow, crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle
+from aerialdojo_gen.scenes.kit.parking import park_cars
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, columns, letters
-from aerialdojo_gen.scenes.layouts.urban.parts.parking import park_cars
 from aerialdojo_gen.scenes.layouts.urban.stadium.stand_shells import back_wall, end_walls, platform, roof_parts
 from aerialdojo_gen.scenes.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.site import Site
