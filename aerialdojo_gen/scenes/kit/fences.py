@@ -7,12 +7,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_scatter import place_along
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
-from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -55,11 +56,20 @@ def mesh_fences(
 
 @site_builder
 def garden_fences(
-    site: Site, *, lines: list[Line], kind: Literal["picket", "board", "hedge", "wall", "railing"]
-) -> None:
+    site: Site, *, lines: list[Line], kind: Literal["picket", "board", "hedge", "wall", "railing"],
+    material: Material | None = None,
+) -> None:  # fmt: skip
     """Put up fences about gardens, each on the lowest ground of its line."""
     for line in lines:
-        fence(site, line, kind)
+        fence(site, line, kind, material)
+
+
+@site_builder
+def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Area) -> None:
+    """Plant a hedge around a disc ``[x, y, radius]``, with an opening."""
+    left = ground.disc(*disc, 12).exterior.difference(opening)
+    for leg in getattr(left, "geoms", [left]):
+        fence(site, [(float(x), float(y)) for x, y in leg.coords], "hedge")
 
 
 @site_builder

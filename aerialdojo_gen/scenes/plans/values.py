@@ -23,7 +23,7 @@ from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.grammar_scatter import eased_path, smooth_path
-from aerialdojo_gen.scenes.ground import disc, rectangle, ribbon
+from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, ribbon
 from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.materials import MaterialLibrary
 
@@ -171,6 +171,12 @@ def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     return ribbon(names.line(value["ribbon"]), names.number(value.get("width_m")), bool(value.get("round_ends")))
 
 
+def _outline(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    """Draw a line of a width along the edge of an area, its outer corners round."""
+    edges = [piece.exterior for piece in polygons_of(names.area(value["outline"]))]
+    return shapely.union_all([edge.buffer(names.number(value.get("width_m")) / 2) for edge in edges])
+
+
 def _polygon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     points: list[Point] = []
     for one in value["polygon"]:
@@ -233,7 +239,7 @@ def _is_box(value: Sequence[Any]) -> bool:
 
 _AREAS = {
     "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
-    "union": _union,
+    "outline": _outline, "union": _union,
 }  # fmt: skip
 _CHANGES = {
     "frame": _framed,

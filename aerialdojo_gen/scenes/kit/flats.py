@@ -1,0 +1,81 @@
+"""Blocks of flats: slabs with stacked balconies and an archway through the ground storey."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from aerialdojo_gen.scenes.grammar_buildings import building
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
+from aerialdojo_gen.scenes.mesh import Mesh, merge
+from aerialdojo_gen.scenes.plans.values import At, Material, Number
+from aerialdojo_gen.scenes.site import Site
+
+_STOREY_M = 3.2
+# From one balcony to the next along the front, its depth and its width.
+_PITCH_M, _DEPTH_M, _WIDE_M = 6.4, 1.6, 3.2
+
+
+@site_builder
+def flats(
+    site: Site, *, at: At, yaw_deg: Number, size_m: tuple[Number, Number],
+    storeys: Annotated[int, Field(ge=2, le=30)], wall: Material, band: Material, name: str,
+    arch_m: Number = 6.0, base: Material = "blocks:#8d867a", paving: Material = "paving",
+    roof: Material = "gravel:#a09a90",
+) -> float:  # fmt: skip
+    """Put up flats, with balconies along the front and a passage through the middle; gives the height of the roof.
+
+    `at` is the middle, `yaw_deg` what the front looks along, `size_m` the length of the front and the depth; the last
+    word of the `name` stands on the front.
+    """
+    frame = Frame(*at, yaw_deg)
+    half, d, gap = size_m[0] / 2, size_m[1] / 2, arch_m / 2
+    top = storeys * _STOREY_M
+    low = rectangle(-d, -half, d, -gap).union(rectangle(-d, gap, d, half))
+    site.paint(frame.area(rectangle(-d - 1.2, -gap, d + 4.5, gap)), paving)
+    parts: Parts = [
+        (base, block(-d, -half, d, -gap, 0.0, _STOREY_M)),
+        (base, block(-d, gap, d, half, 0.0, _STOREY_M)),
+        ("concrete", block(-d - 0.12, -half - 0.12, d + 0.12, half + 0.12, _STOREY_M - 0.2, _STOREY_M)),
+        (band, columns([(s * (d - 0.4), 0.0) for s in (-1, 1)], 0.0, _STOREY_M - 0.2, 0.3)),
+    ]
+    for s in (-1, 1):
+        for side in (-1, 1):
+            v = side * (gap + (half - gap) / 2)
+            parts.append(("window", _leaf(s * (d - 0.05), s * (d + 0.05), v - 0.8, v + 0.8, 0.0, 2.3)))
+            parts.append((band, _leaf(s * d, s * (d + 1.5), v - 1.4, v + 1.4, 2.5, 2.65)))
+            for k in (-1, 1):
+                w = v + k * (half - gap) * 0.3
+                parts.append(("glass", _leaf(s * (d - 0.05), s * (d + 0.04), w - 0.7, w + 0.7, 1.0, 2.2)))
+    site.add(None, "flats_base", frame.parts(parts), {"place": name}, footprint=frame.area(low))
+    sign: Parts = [("marking", letters(name.split()[-1], 1.8, (d + 0.02, half - 2.4, top - 2.6), 0.0, 0.08))]
+    building(
+        site, frame.area(rectangle(-d, -half, d, half)), wall=wall, roof=roof, storeys=storeys - 1,
+        storey_m=_STOREY_M, z=_STOREY_M, category="flats", attributes={"place": name},
+        extra=[*frame.parts(sign), *frame.parts(_balconies(size_m[0], d, storeys, band))],
+    )  # fmt: skip
+    return top
+
+
+def _balconies(length_m: float, d: float, storeys: int, band: str) -> Parts:
+    floors, panels, doors = [], [], []
+    count = int((length_m - 2.0) // _PITCH_M)
+    along = [(k - (count - 1) / 2) * _PITCH_M for k in range(count)]
+    for v, z in [(v, _STOREY_M * (s + 1)) for s in range(storeys - 1) for v in along]:
+        a, b = v - _WIDE_M / 2, v + _WIDE_M / 2
+        floors.append(block(d, a, d + _DEPTH_M, b, z - 0.2, z))
+        # Bars in place of parapets: what stands on a balcony is seen.
+        for low, high in ((0.0, 0.16), (0.42, 0.46), (0.69, 0.73), (0.94, 1.02)):
+            panels.append(block(d + _DEPTH_M - 0.08, a, d + _DEPTH_M, b, z + low, z + high))
+            panels += [block(d, w, d + _DEPTH_M - 0.08, w + 0.06, z + low, z + high) for w in (a, b - 0.06)]
+        panels += [block(d + _DEPTH_M - 0.08, w, d + _DEPTH_M, w + 0.08, z, z + 1.0) for w in (a, b - 0.08)]
+        doors.append(block(d - 0.05, v - 1.1, d + 0.05, v + 1.1, z, z + 2.2))
+    return [("concrete", merge(floors)), (band, merge(panels)), ("glass", merge(doors))]
+
+
+def _leaf(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Mesh:
+    return block(min(x0, x1), y0, max(x0, x1), y1, z0, z1)
