@@ -59,7 +59,7 @@ def garden_fences(
     site: Site, *, lines: list[Line], kind: Literal["picket", "board", "hedge", "wall", "railing"],
     material: Material | None = None,
 ) -> None:  # fmt: skip
-    """Put up fences about gardens, each on the lowest ground of its line."""
+    """Put up fences about gardens, each on the lowest ground of its line; the kind has a material of its own."""
     for line in lines:
         fence(site, line, kind, material)
 

@@ -1,4 +1,4 @@
-"""Streets: carriageways with marks and pavements, zebra crossings, rows of parking bays."""
+"""Streets: carriageways with marks and pavements, zebra crossings, arrows, rows of parking bays."""
 
 from __future__ import annotations
 
@@ -30,6 +30,25 @@ def crossing(
 ) -> None:
     """Paint a zebra crossing, walked along `yaw_deg`."""
     grammar_streets.crossing(site, *at, yaw_deg, length_m, width_m, surface)
+
+
+@site_builder
+def crossings(
+    site: Site, *, at: list[tuple[Number, Number, Number, Number]], width_m: Number = 3.0,
+    surface: Material = "asphalt",
+) -> None:  # fmt: skip
+    """Paint zebra crossings: middle, direction of walking and length of each (x, y, yaw_deg, length_m)."""
+    for one in at:
+        grammar_streets.crossing(site, *one, width_m, surface)
+
+
+@site_builder
+def arrows(
+    site: Site, *, at: list[tuple[Number, Number, Number]], length_m: Number = 3.0, material: Material = "marking"
+) -> None:
+    """Paint straight arrows on the ground: middle and direction of each (x, y, yaw_deg)."""
+    for one in at:
+        grammar_streets.arrow(site, *one, length_m, material)
 
 
 @site_builder

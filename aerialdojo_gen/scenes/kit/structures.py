@@ -19,7 +19,7 @@ from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder
 from aerialdojo_gen.scenes.lettering import text
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
 
@@ -75,18 +75,11 @@ def railing(
     return [body] if pane is None else [(pane, merge(panes)), body]
 
 
+@part_builder
 def deck(
-    plan: BaseGeometry,
-    z_m: float,
-    *,
-    floor: str,
-    under: str = "plaster",
-    thickness_m: float = 0.3,
-    posts: Sequence[Point] = (),
-    foot_m: float = 0.0,
-    post: str = "plaster",
-    post_radius_m: float = 0.28,
-) -> Parts:
+    plan: Area, z_m: Number, *, floor: Material, under: Material = "plaster", thickness_m: Number = 0.3,
+    posts: Sequence[At] = (), foot_m: Number = 0.0, post: Material = "plaster", post_radius_m: Number = 0.28,
+) -> Parts:  # fmt: skip
     """Make a floor at `z_m` (its top) on round columns that stand on `foot_m`."""
     parts: Parts = [
         (floor, slab(plan, z_m - 0.05, z_m)),
