@@ -10,8 +10,8 @@ from support.layout_checks import props_of
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.layouts.urban.stadium.stand_shells import platform
-from aerialdojo_gen.scenes.layouts.urban.stadium.stands import Tier, gangways, passage, tier_parts
+from aerialdojo_gen.scenes.kit.stand_shells import stand_platforms
+from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["U_Stadium_0", "U_Stadium_1", "U_Park_0", "U_Park_1"]
@@ -66,9 +66,11 @@ def test_gangways_lead_straight_out_from_the_front_edge():
 def test_seats_keep_off_gangways_portals_and_what_is_to_stay_clear():
     portal = passage(gangways(one_tier(), 6.0)[0], 3.0, 9.0)
     clear = rectangle(4, 10, 9, 14)
-    tier = one_tier(portals=(portal,), clear=(clear,))
+    tier = one_tier(portals=[portal])
     feet = gangways(tier, 6.0)
-    parts = dict(tier_parts(tier, feet, concrete="concrete", step="steps", seat=lambda x, y, row: "seat"))
+    parts = dict(
+        tier_parts(tier, feet, concrete="concrete", step="steps", seat=lambda x, y, row: "seat", clear=clear)
+    )
     seats = parts["seat"].vertices
     assert len(seats) > 16 * 200
     low = seats[seats[:, 2] < tier.head_m]
@@ -80,7 +82,7 @@ def test_seats_keep_off_gangways_portals_and_what_is_to_stay_clear():
 
 
 def test_platforms_are_level_and_end_at_their_height():
-    parts = dict(platform(rectangle(0, 0, 3, 2), 0.5, 2.0, floor="floor", rim="rim"))
+    parts = dict(stand_platforms(areas=[rectangle(0, 0, 3, 2)], z=(0.5, 2.0), floor="floor", rim="rim"))
     assert parts["floor"].vertices[:, 2].min() == 0.5
     assert parts["floor"].vertices[:, 2].max() == 2.0
     assert parts["rim"].vertices[:, 2].max() == pytest.approx(2.12)

@@ -6,14 +6,15 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
+from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_scatter import place_along
+from aerialdojo_gen.scenes.grammar_scatter import place_along, slab
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -70,6 +71,19 @@ def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Are
     left = ground.disc(*disc, 12).exterior.difference(opening)
     for leg in getattr(left, "geoms", [left]):
         fence(site, [(float(x), float(y)) for x, y in leg.coords], "hedge")
+
+
+@site_builder
+def yard_walls(
+    site: Site, *, boxes: Areas, height_m: Number, wall: Material, coping: Material = "concrete",
+    coping_m: Number = 0.15, on: Number = 0.0, node: str | None = None, attributes: dict[str, str] | None = None,
+    more: Bodies | None = None,
+) -> None:  # fmt: skip
+    """Put up walls with a coping on the floor `on` as one structure; `more` belongs to it, such as pillars."""
+    top = on + height_m
+    parts: Parts = [(wall, slab(box, on, top)) for box in boxes]
+    parts += [(coping, slab(box.buffer(0.08, join_style="mitre"), top, top + coping_m)) for box in boxes]
+    site.add(node, "wall", parts + (more or []), attributes, footprint=unary_union(boxes))
 
 
 @site_builder

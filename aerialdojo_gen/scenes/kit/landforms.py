@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -23,6 +24,25 @@ def rolling_ground(
 ) -> Terrain:  # fmt: skip
     """Make rolling ground by noise of the plan's seed, in place of what was there."""
     return rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, height_m, wavelength_m, octaves)
+
+
+@ground_builder
+def level_ground(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
+    """Make level ground at z = 0 of so large cells, fine enough for what comes after, in place of what was there."""
+    x, y = site.recipe.size_m
+    columns, rows = math.ceil(x / cell_m - 1e-9), math.ceil(y / cell_m - 1e-9)
+    return Terrain(-x / 2, -y / 2, max(x / columns, y / rows), np.zeros((rows + 1, columns + 1)))
+
+
+@ground_builder
+def bank_about(
+    _site: Site, terrain: Terrain, *, area: Area, start_m: Number, end_m: Number, to_m: Number,
+    fade_x: tuple[Number, Number],
+) -> Terrain:  # fmt: skip
+    """Raise a bank about an area, which rises between two distances from it, and comes up between two x."""
+    away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
+    t, fade = smooth((away - start_m) / (end_m - start_m)), (grid(terrain)[0] - fade_x[0]) / (fade_x[1] - fade_x[0])
+    return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t * smooth(fade)))
 
 
 @ground_builder
@@ -64,12 +84,18 @@ def slope(
     start_m: Number,
     end_m: Number,
     to_m: Number,
-    within: tuple[Number, Number],
+    within: tuple[Number, Number] = (-2000.0, 2000.0),
     axis: Literal["x", "y"] = "x",
+    only_up: bool = False,
 ) -> Terrain:
-    """Let the ground slope along an axis from its own height to another, level beyond; only within two limits."""
+    """Let the ground slope along an axis from its own height to another, level beyond; only within two limits.
+
+    With `only_up` it slopes from z = 0, and higher ground stays as it is.
+    """
     along = grid(terrain)["xy".index(axis)]
     t = smooth((along - start_m) / (end_m - start_m))
+    if only_up:
+        return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t))
     inside = (along > within[0]) & (along <= within[1])
     return replace(terrain, heights_m=np.where(inside, terrain.heights_m * (1 - t) + to_m * t, terrain.heights_m))
 

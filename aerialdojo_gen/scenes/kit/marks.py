@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
@@ -35,12 +37,14 @@ def dashed_marks(
 
 @site_builder
 def outline_marks(
-    site: Site, *, areas: list[Area], width_m: Number = 0.16, material: Material = "marking", rise_m: Number = 0.0
-) -> None:
-    """Paint lines around areas, such as bays or places of stacks."""
+    site: Site, *, areas: list[Area], width_m: Number = 0.16, material: Material = "marking", rise_m: Number = 0.0,
+    join: Literal["mitre", "round"] = "mitre", within: Area | None = None,
+) -> None:  # fmt: skip
+    """Paint lines around areas, such as bays, places of stacks or courts; only `within` an area."""
     for area in areas:
         for piece in polygons_of(area):
-            ring = Polygon(piece.exterior).exterior.buffer(width_m / 2, join_style="mitre")
+            ring = Polygon(piece.exterior).exterior.buffer(width_m / 2, join_style=join)
+            ring = ring if within is None else ring.intersection(within)
             site.paint(ring, material, rise_m, material)
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import shapely
 from pydantic import BeforeValidator, PlainValidator, ValidationInfo, WithJsonSchema
 from shapely.affinity import rotate, scale
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
@@ -168,7 +168,11 @@ def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
 
 
 def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    return ribbon(names.line(value["ribbon"]), names.number(value.get("width_m")), bool(value.get("round_ends")))
+    """Make the area about a line; `round_ends` is true, or the steps of a quarter of its round ends."""
+    line, width_m, ends = names.line(value["ribbon"]), names.number(value.get("width_m")), value.get("round_ends")
+    if ends is None or isinstance(ends, bool):
+        return ribbon(line, width_m, bool(ends))
+    return LineString(line).buffer(width_m / 2, quad_segs=min(max(int(names.number(ends)), 1), 64))
 
 
 def _outline(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:

@@ -1,15 +1,14 @@
-"""Stands of sports grounds: stepped tiers round any front edge, seats, gangways and portals.
-
-Every function returns meshes in world coordinates with their materials, to be given to `Site.add`.
-"""
+"""Stands of sports grounds: stepped tiers round any front edge, with seats, gangways and portals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import Field
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
@@ -18,59 +17,37 @@ from shapely.ops import unary_union
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
+from aerialdojo_gen.scenes.plans.values import Area, Areas, Bodies, Material, Number
 from aerialdojo_gen.scenes.shapes import box
+from aerialdojo_gen.scenes.site import Site
 
 SEAT_M = 0.6
 AISLE_M = 1.2
-_QUARTER = 8
+QUARTER = 8
 _PARAPET_M = 0.95
 
 
 @dataclass(frozen=True)
 class Tier:
-    """Rows of steps round a front edge; every row lies one tread farther out and one riser higher than the last.
+    """Rows of steps round a front edge; every row lies one tread farther out and one riser higher than the last."""
 
-    Attributes
-    ----------
-    core : Polygon
-        Its outline, grown by `front_m` with round corners, is the front edge; world frame, metres.
-    front_m : float
-        Distance from the core to the front edge.
-    rows : int
-        Number of rows.
-    z_m : float
-        Height of the first row.
-    foot_m : float
-        Where the front wall stands.
-    tread_m, riser_m : float
-        Depth and height of a row.
-    region : shapely geometry or None
-        Only what lies in it is built.
-    portals : tuple of Polygon
-        Passages through the tier from front to back: rows lower than `head_m` leave them open.
-    head_m : float
-        Least height of what spans a portal.
-    clear : tuple of shapely geometry
-        Where no seats stand: platforms, rooms, things.
-    """
-
-    core: Polygon
-    front_m: float
-    rows: int
-    z_m: float
-    foot_m: float = 0.0
-    tread_m: float = 0.85
-    riser_m: float = 0.42
-    region: BaseGeometry | None = None
-    portals: tuple[Polygon, ...] = ()
-    head_m: float = 3.2
-    clear: tuple[BaseGeometry, ...] = field(default=())
+    core: Area  # Its outline, grown by `front_m` with round corners, is the front edge
+    front_m: Number  # Distance from the core to the front edge
+    rows: Annotated[int, Field(ge=1, le=60)]
+    z_m: Number  # Height of the first row
+    foot_m: Number = 0.0  # Where the front wall stands
+    tread_m: Annotated[Number, Field(ge=0.3)] = 0.85  # Depth of a row
+    riser_m: Annotated[Number, Field(ge=0.1)] = 0.42  # Height of a row over the last
+    region: Area | None = None  # Only what lies in it is built
+    portals: Areas = field(default_factory=list)  # Passages from front to back
+    head_m: Number = 3.2  # Rows lower than this leave the portals open
 
     def edge(self, row: float) -> Polygon:
         """Outline of what lies in front of a row, metres."""
-        return self.core.buffer(self.front_m + row * self.tread_m, quad_segs=_QUARTER)
+        return self.core.buffer(self.front_m + row * self.tread_m, quad_segs=QUARTER)
 
     def level_m(self, row: int) -> float:
         """Height of a row, metres."""
@@ -92,6 +69,48 @@ class Tier:
         """Ground under all rows."""
         area = self.edge(self.rows).difference(self.edge(0))
         return area if self.region is None else area.intersection(self.region)
+
+
+@dataclass(frozen=True)
+class Stripes:
+    """How the colours of seats follow one another in turn: by stripes over the plan, and by blocks of rows."""
+
+    along: tuple[Number, Number] = (1.0, 1.0)  # Weights of x and y; the stripes run across this direction
+    width_m: Annotated[Number, Field(ge=0.1)] = 6.0
+    shift_m: Number = 0.0  # By how much the stripes move on in every row
+    block: Annotated[int, Field(ge=1)] = 1000  # Rows after which the colours change
+
+    def number(self, x: float, y: float, row: int) -> int:
+        """Count the stripes up to a seat."""
+        stripe = (self.along[0] * x + self.along[1] * y + self.shift_m * row) // self.width_m
+        return int(stripe) + row // self.block
+
+
+_STRIPES = Stripes()
+
+
+@site_builder
+def stand(
+    site: Site,
+    *,
+    tier: Tier,
+    seats: Annotated[list[Material], Field(min_length=1)],
+    node: str | None = None,
+    stripes: Stripes = _STRIPES,
+    gangway_m: Annotated[Number, Field(ge=2.0)] = 8.2,
+    clear: Area | None = None,
+    concrete: Material = "concrete",
+    step: Material = "concrete",
+    more: Bodies | None = None,
+) -> None:
+    """Put up a tier of a stand, gangways `gangway_m` apart; no seats stand in `clear`, and `more` belongs to it."""
+
+    def colour(x: float, y: float, row: int) -> str:
+        return seats[stripes.number(x, y, row) % len(seats)]
+
+    parts = tier_parts(tier, gangways(tier, gangway_m), concrete=concrete, step=step, seat=colour, clear=clear)
+    plan = tier.plan.difference(unary_union(tier.portals))
+    site.add(node, "grandstand", parts + (more or []), {"material": "concrete"}, footprint=plan)
 
 
 def gangways(tier: Tier, spacing_m: float) -> list[Pose]:
@@ -126,7 +145,7 @@ def tier_parts(
     concrete: str,
     step: str,
     seat: Callable[[float, float, int], str],
-    parapet_m: float = _PARAPET_M,
+    clear: BaseGeometry | None = None,
 ) -> Parts:
     """Make a tier: steps, a front wall with a parapet, walls along portals, half steps in gangways, and seats.
 
@@ -140,8 +159,8 @@ def tier_parts(
         Materials of the rows and of the gangways' half steps.
     seat : callable
         ``(x, y, row) -> material`` of a seat.
-    parapet_m : float
-        Height of the front wall over the first row.
+    clear : shapely geometry, optional
+        Where no seats stand: platforms, rooms, things.
     """
     holes = unary_union(tier.portals) if tier.portals else Polygon()
     bodies: list[Mesh] = []
@@ -155,12 +174,12 @@ def tier_parts(
             lip = tier.edge(row + 0.25).difference(tier.edge(row)).intersection(holes)
             bodies += [slab(p, top - 0.2, top + 0.9) for p in polygons_of(lip.intersection(area))]
         bodies += [slab(p, top - tier.riser_m - 0.22, top) for p in polygons_of(area)]
-    front = tier.edge(0.0).difference(tier.core.buffer(tier.front_m - 0.22, quad_segs=_QUARTER))
+    front = tier.edge(0.0).difference(tier.core.buffer(tier.front_m - 0.22, quad_segs=QUARTER))
     if tier.region is not None:
         front = front.intersection(tier.region)
-    walls = [slab(p, tier.foot_m, tier.z_m + parapet_m) for p in polygons_of(front.difference(holes))]
+    walls = [slab(p, tier.foot_m, tier.z_m + _PARAPET_M) for p in polygons_of(front.difference(holes))]
     parts: Parts = [(concrete, merge(bodies)), (step, merge([*walls, *_half_steps(tier, feet, holes)]))]
-    return parts + _seats(tier, feet, holes, seat)
+    return parts + _seats(tier, feet, holes, seat, Polygon() if clear is None else clear)
 
 
 def _half_steps(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry) -> list[Mesh]:
@@ -176,9 +195,12 @@ def _half_steps(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry) -> list[M
     return [m for parts in out for _, m in parts]
 
 
-def _seats(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry, seat: Callable[[float, float, int], str]) -> Parts:
+def _seats(
+    tier: Tier, feet: Sequence[Pose], holes: BaseGeometry, seat: Callable[[float, float, int], str],
+    clear: BaseGeometry,
+) -> Parts:  # fmt: skip
     aisles = [passage(f, AISLE_M + SEAT_M, (tier.rows + 1) * tier.tread_m) for f in feet]
-    shut = unary_union([*aisles, *tier.clear])
+    shut = unary_union([*aisles, clear])
     # Beside a portal the seats keep off its cheeks, over it they stand as everywhere.
     low = shut.union(holes.buffer(0.6))
     inside = tier.region.buffer(-0.35) if tier.region is not None else tier.edge(tier.rows)

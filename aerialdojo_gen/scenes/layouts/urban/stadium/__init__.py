@@ -1,1 +1,0 @@
-"""A stadium: a football ground with stands all round, or an athletics ground with one main stand and grass banks."""
