@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes import grammar_streets
+from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
@@ -27,7 +28,7 @@ from aerialdojo_gen.scenes.kit.structures import (
     stairs,
 )
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
 # What people come in, and how often.
@@ -265,3 +266,51 @@ def _stair_tower(corner: Point, heights: tuple[float, ...], tower: str) -> Parts
         parts += deck(rectangle(x - 4.1, y + 0.3, x, y + 3.9), b, floor="concrete", thickness_m=0.25)
         parts += stairs((x - 2.2, y + 9.9), -90.0, 1.8, b - a, 6.0, z_m=a)
     return parts
+
+
+@site_builder
+def lockup_garages(
+    site: Site, *, at: At, count: _Count, doors: Annotated[list[Material], Field(min_length=1)],
+    open_doors: list[int] = [], bay_m: tuple[Number, Number] = (3.4, 6.0), height_m: Number = 2.9,  # noqa: B006
+    wall: Material = "brick:#a5664e", roof: Material = "sheet_metal:#70787a", phrase: str = "",
+) -> float:  # fmt: skip
+    """Put up a row of lock-up garages along x, their doors to the south; gives the height of their roof, metres.
+
+    Parameters
+    ----------
+    site : Site
+        Where; one can fly in by the doors that are open.
+    at : (x, y)
+        South-west corner, metres.
+    count : int
+        Number of garages.
+    doors : list of str
+        Materials of the doors, in turn.
+    open_doors : list of int
+        Which are open, the first being 0.
+    bay_m : (float, float)
+        Width and depth of a garage.
+    height_m, wall, roof, phrase : float, str, str, str
+        Of the walls, their materials, and where the garages are in words.
+    """
+    (x0, y0), (width, depth), high = at, bay_m, height_m
+    x1, back = x0 + count * width, y0 + depth
+    gaps = [(k * width + 0.35, (k + 1) * width - 0.35, 0.0, high - 0.5) for k in range(count)]
+    parts: Parts = [
+        (wall, wall_with_openings((x0, y0 + 0.12), (x1, y0 + 0.12), 0.0, high, gaps, 0.24)),
+        (wall, block(x0, back - 0.24, x1, back, 0.0, high)),
+        ("concrete", block(x0 - 0.25, y0 - 0.5, x1 + 0.25, back + 0.2, high, high + 0.25)),
+        (roof, block(x0, y0 - 0.2, x1, back, high + 0.25, high + 0.32)),
+    ]
+    for k in range(count + 1):
+        u = x0 + k * width
+        parts.append((wall, block(u - 0.12, y0 + 0.24, u + 0.12, back - 0.24, 0.0, high)))
+    for k in range(count):
+        a, b = x0 + k * width + 0.4, x0 + (k + 1) * width - 0.4
+        slats = [block(a - 0.04, y0 + 0.06, b + 0.04, y0 + 0.16 + 0.04 * (i % 2), 0.02 + 0.4 * i, 0.4 + 0.4 * i)
+                 for i in range(6)]  # fmt: skip
+        rolled_up = block(a, y0 + 0.3, b, y0 + 2.6, high - 0.44, high - 0.36)
+        parts.append((doors[k % len(doors)], rolled_up if k in open_doors else merge(slats)))
+    site.add("lockup_garages", "garages", parts, {"place": phrase})
+    site.occupy(rectangle(x0 - 0.3, y0 + 0.3, x1 + 0.3, back), high - 0.4, high + 0.3)
+    return high + 0.32
