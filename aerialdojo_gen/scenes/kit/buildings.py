@@ -26,6 +26,7 @@ def building(
     roof_kind: Literal["flat", "gable", "hip"] = "flat",
     roof_m: Number = 2.5,
     parapet_m: Number = 0.6,
+    overhang_m: Number = 0.4,
     on: Number | None = None,
     category: str = "building",
     attributes: dict[str, str] = {},  # noqa: B006
@@ -37,7 +38,7 @@ def building(
     z = min(site.ground_z(x, y) for x, y in outline.exterior.coords) if on is None else on
     grammar_buildings.building(
         site, outline, wall=wall, roof=roof, storeys=storeys, storey_m=storey_m, roof_kind=roof_kind, roof_m=roof_m,
-        parapet_m=parapet_m, z=z, category=category, attributes=attributes, extra=extra,
+        parapet_m=parapet_m, overhang_m=overhang_m, z=z, category=category, attributes=attributes, extra=extra,
     )  # fmt: skip
     return z + storeys * storey_m
 
@@ -49,12 +50,18 @@ class Block:
     outline: Area
     wall: Material
     storeys: int = 2
+    roof: Material | None = None  # Its own, and the kind of it
+    roof_kind: Literal["flat", "gable", "hip"] = "flat"
 
 
 @site_builder
 def town_blocks(
-    site: Site, *, blocks: list[Block], roof: Material, on: Number | None = None, category: str = "town_block"
-) -> None:
-    """Put up plain flat-roofed buildings, each on its own outline."""
+    site: Site, *, blocks: list[Block], roof: Material, storey_m: Number = 3.2, roof_m: Number = 2.5,
+    overhang_m: Number = 0.4, on: Number | None = None, category: str = "town_block",
+) -> None:  # fmt: skip
+    """Put up plain buildings, each on its own outline; their roofs are flat where they say no other kind."""
     for one in blocks:
-        building(site, outline=one.outline, wall=one.wall, storeys=one.storeys, roof=roof, on=on, category=category)
+        building(
+            site, outline=one.outline, wall=one.wall, storeys=one.storeys, storey_m=storey_m, roof=one.roof or roof,
+            roof_kind=one.roof_kind, roof_m=roof_m, overhang_m=overhang_m, on=on, category=category,
+        )  # fmt: skip

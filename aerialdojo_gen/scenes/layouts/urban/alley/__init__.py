@@ -1,1 +1,0 @@
-"""Alleys: a back alley among brick tenements, or the lanes of an old market town."""
