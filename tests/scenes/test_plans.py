@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely.geometry import Point
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
@@ -133,9 +134,25 @@ def test_things_stand_in_a_frame_and_settle_on_a_slope(tmp_path, catalogue):
     assert gravel.vertices[:, 0].max() > 8
 
 
+def test_things_are_strewn_by_a_field_made_of_others(tmp_path, catalogue):
+    fields = {"by_yard": {"near": "yard", "reach_m": 6}, "dense": "min(1, 2*by_yard)"}
+    bushes = {"make": "strew", "of": "bush", "area": [-19, -19, 19, 19], "spacing_m": 3, "limit": 40}
+    plan = {**YARD, "fields": fields, "site": [{**bushes, "density": "dense"}]}
+    yard = PlanNames(catalogue.materials).area(YARD["areas"]["yard"])
+    found = [instance.bounds[:, :2].mean(axis=0) for instance in build(tmp_path, catalogue, plan).instances[1:]]
+    assert len(found) >= 10
+    assert max(yard.distance(Point(*at)) for at in found) < 6.5
+    with pytest.raises(AssetError, match=r"'strew': density .*no field 'by_yard'"):
+        build(tmp_path, catalogue, {**plan, "fields": dict(reversed(fields.items()))})
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
+        (
+            {"make": "strew", "of": "fern", "area": "yard", "spacing_m": 2, "limit": 9, "density": {"reach_m": 2}},
+            "'strew': density .*a field has one of patches, near",
+        ),
         ({"paint": "yrd", "material": "mud"}, r"site\[0\] \(paint\): .*no area 'yrd'.*yard"),
         ({"paint": "yard", "material": "mudd"}, r"site\[0\] \(paint\): .*unknown material 'mudd'.*mud"),
         ({"paint": {"disc": [0, 0, 3], "minus": {"disc": [0, 0, 9]}}, "material": "mud"}, "the area is empty"),

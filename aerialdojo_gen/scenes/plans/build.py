@@ -72,7 +72,7 @@ def check_inventory(scene: Scene, recipe: Recipe, path: Path) -> None:
 
 
 def _names(head: PlanHead, catalogue: Catalogue, where: str) -> PlanNames:
-    names = PlanNames(catalogue.materials, head.palette)
+    names = PlanNames(catalogue.materials, head.palette, fields=head.fields)
     for role, spec in head.palette.items():
         catalogue.materials.check(spec, f"{where}: palette {role}")
     tables: list[tuple[str, Mapping[str, Any], dict[str, Any], Callable[[Any], Any]]] = [

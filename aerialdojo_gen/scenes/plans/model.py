@@ -35,6 +35,7 @@ class PlanHead(BaseModel):
     floor_m: dict[str, Any] = {}  # Named heights, metres; also in expressions
     lines: dict[str, Any] = {}
     areas: dict[str, Any] = {}
+    fields: dict[str, Any] = {}  # Named numbers that vary over the site; each may be made of those before it
     ground: dict[str, Any] = {}
     site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES)] = []
 

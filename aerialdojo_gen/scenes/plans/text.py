@@ -22,7 +22,7 @@ def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-_TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "ground")
+_TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "ground")
 
 
 def _pair(key: str, value: Any) -> Iterator[str]:

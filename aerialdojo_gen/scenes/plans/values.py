@@ -43,6 +43,7 @@ class PlanNames:
     heights: dict[str, float] = field(default_factory=dict)  # Metres
     lines: dict[str, list[Point]] = field(default_factory=dict)
     areas: dict[str, BaseGeometry] = field(default_factory=dict)
+    fields: Mapping[str, Any] = field(default_factory=dict)  # As given, see `plans.fields`
     make_parts: Callable[[list[Any]], Parts] = list  # Set by what builds the plan
 
     def number(self, value: Any) -> float:
@@ -75,7 +76,7 @@ class PlanNames:
             return self.lines[value]
         smooth = eased = 0
         if isinstance(value, dict):
-            _refuse_unknown(value, ("points", "smooth", "eased"))
+            refuse_unknown(value, ("points", "smooth", "eased"))
             smooth, eased, value = value.get("smooth", 0), value.get("eased", 0), value.get("points")
             if not isinstance(smooth, int) or not 0 <= smooth <= 6:
                 raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
@@ -98,7 +99,7 @@ class PlanNames:
             value = {"box": value}
         if not isinstance(value, dict):
             raise ValueError(f"an area is a name, [x0, y0, x1, y1] or a table, got {value!r}")
-        _refuse_unknown(value, (*_AREAS, *_CHANGES, "width_m", "round_ends", "long"))
+        refuse_unknown(value, (*_AREAS, *_CHANGES, "width_m", "round_ends", "long"))
         kinds = [key for key in _AREAS if key in value]
         if len(kinds) != 1:
             raise ValueError(f"an area has one of {', '.join(_AREAS)}, got {', '.join(kinds) or 'none'}")
@@ -255,13 +256,15 @@ _CHANGES = {
 }
 
 
-def _refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:
+def refuse_unknown(value: Mapping[str, Any], known: Sequence[str]) -> None:
+    """Raise a `ValueError` if a table has another key than the known ones."""
     for key in value:
         if key not in known:
             raise ValueError(unknown("unknown key", key, known))
 
 
-def _names(info: ValidationInfo) -> PlanNames:
+def names_of(info: ValidationInfo) -> PlanNames:
+    """Give the names of the plan that a value is resolved for."""
     assert isinstance(info.context, PlanNames)
     return info.context
 
@@ -270,36 +273,36 @@ _NUMBER_SCHEMA = {"type": ["number", "string"]}
 _POINT_SCHEMA = {"type": "array", "items": _NUMBER_SCHEMA, "minItems": 2, "maxItems": 2}
 
 Number = Annotated[
-    float, BeforeValidator(lambda value, info: _names(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
+    float, BeforeValidator(lambda value, info: names_of(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
 ]
 """A number, or an expression over the plan's heights such as ``"quay + 0.2"``."""
-At = Annotated[Point, PlainValidator(lambda value, info: _names(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
+At = Annotated[Point, PlainValidator(lambda value, info: names_of(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
 """A point ``[x, y]``, metres."""
 Line = Annotated[
     list[Point],
-    PlainValidator(lambda value, info: _names(info).line(value)),
+    PlainValidator(lambda value, info: names_of(info).line(value)),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _POINT_SCHEMA}, {"type": "object"}]}),
 ]
 """The name of a line, its points, or ``{points, smooth}`` or ``{points, eased}``."""
 Area = Annotated[
     BaseGeometry,
-    PlainValidator(lambda value, info: _names(info).area(value)),
+    PlainValidator(lambda value, info: names_of(info).area(value)),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _NUMBER_SCHEMA}, {"type": "object"}]}),
 ]
 """The name of an area, ``[x0, y0, x1, y1]``, or a table such as ``{disc = [x, y, radius], minus = "yard"}``."""
 Bodies = Annotated[
     Parts,
-    PlainValidator(lambda value, info: _names(info).bodies(value)),
+    PlainValidator(lambda value, info: names_of(info).bodies(value)),
     WithJsonSchema({"type": "array", "items": {"type": "object"}}),
 ]
 """Parts as of a structure, which a builder adds to what it makes."""
 Areas = Annotated[
     list[BaseGeometry],
-    PlainValidator(lambda value, info: _names(info).several(value)),
+    PlainValidator(lambda value, info: names_of(info).several(value)),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}, {"type": "object"}]}),
 ]
 """An area, or a list of areas."""
 Material = Annotated[
-    str, PlainValidator(lambda value, info: _names(info).material(value)), WithJsonSchema({"type": "string"})
+    str, PlainValidator(lambda value, info: names_of(info).material(value)), WithJsonSchema({"type": "string"})
 ]
 """A name of the palette, or a material such as ``"brick:#8a4638"``."""
