@@ -65,10 +65,4 @@ RECIPES: dict[str, dict[str, Any]] = {
                 {"category": "mailbox", "at": [5, 5], "z": 1.0}]}],
         },
     },
-    "U_Works_0": {
-        "layout": "factory", "seed": 8, "size_m": [96, 84], "ceiling_m": 24, "parameters": {
-            "plan": "brickworks", "sign": "KILN 4",
-            "places": [{"place": "in the yard", "things": [["bench", 0, -30, 0], ["mailbox/blue", 5, -35, 90]]}],
-        },
-    },
 }  # fmt: skip

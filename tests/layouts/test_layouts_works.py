@@ -8,10 +8,11 @@ from support.layout_checks import catalogue, each_scene, props_of
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
+from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
+from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import Frame, put_up_frame, scaffold
-from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, ramped, shaped
-from aerialdojo_gen.scenes.layouts.urban.parts.halls import Hall, flat_roof, put_up_hall
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import Place, guard_rails, set_out
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import Place, set_out
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
@@ -49,19 +50,22 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
 
 def test_pits_have_benches_and_ramps_lead_down():
     pit = rectangle(-15, -15, 15, 15)
-    ground = shaped(grid_terrain((60, 60), 1.0), pit, [(0, 0), (3, -2), (6, -2), (9, -5)])
+    site = blank()
+    flat = level_grid(site, site.terrain, cell_m=1.0)
+    ground = terraces(site, flat, area=pit, steps=[(0, 0), (3, -2), (6, -2), (9, -5)])
     assert ground.z(0, 0) == pytest.approx(-5.0)
     assert ground.z(-10.5, 0) == pytest.approx(-2.0, abs=0.1)
     assert ground.z(-20, 0) == 0.0
-    ground = ramped(ground, (-16, 0, 0.0), (4, 0, -5.0), 4.0)
+    ground = earth_ramp(site, ground, start=(-16, 0, 0.0), end=(4, 0, -5.0), width_m=4.0)
     profile = ground.z(np.linspace(-16, 4, 21), np.zeros(21))
     assert profile == pytest.approx(np.linspace(0.0, -5.0, 21), abs=0.15)
 
 
 def test_halls_are_entered_by_their_gates_alone():
     site = blank()
-    hall = Hall(-10, -6, 10, 6, 5.0, "brick", "gravel", {"s": ((8.0, 12.0, 0.0, 4.0),)})
-    put_up_hall(site, hall, "hall", flat_roof(hall))
+    gates = {"s": [(8.0, 12.0, 0.0, 4.0)]}
+    box = (-10.0, -6.0, 10.0, 6.0)
+    hall(site, category="hall", box=box, eaves_m=5.0, wall="brick", roof=HallRoof("gravel"), gates=gates)
     cast = RayCaster(site.scene())
     north = np.tile([0.0, 1.0, 0.0], (3, 1))
     distance, _ = cast.first_hit(np.array([[0.0, -12.0, 1.8], [-6.0, -12.0, 1.8], [6.0, -12.0, 1.0]]), north)
@@ -81,13 +85,14 @@ def test_scaffolds_take_the_side_left_of_their_line():
 
 def test_guard_rails_follow_every_line():
     lines = shapely.MultiLineString([[(0, 0), (6, 0)], [(0, 4), (0, 9)]])
-    bodies = dict(guard_rails(lines, 2.0))
+    bodies = dict(guard_rails(lines, 2.0, toe="planks"))
     rail = bodies["marking_yellow"].vertices
+    assert bodies["planks"].vertices[:, 2].max() == pytest.approx(2.2)
     assert rail[:, 2].min() == pytest.approx(2.0)
     assert rail[:, 2].max() == pytest.approx(3.1)
     assert rail[:, 0].max() == pytest.approx(6.0, abs=0.1)
     assert rail[:, 1].max() == pytest.approx(9.0, abs=0.1)
-    assert "planks" not in dict(guard_rails(lines, 2.0, toe=None))
+    assert "planks" not in dict(guard_rails(lines, 2.0))
 
 
 def test_what_has_no_room_is_named():

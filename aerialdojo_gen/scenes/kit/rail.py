@@ -6,6 +6,7 @@ Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -79,6 +80,24 @@ def _track(line: Sequence[Point], on: float, clear: Area | None, sleeper: str, r
         rails.append(sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)))
     laid: Parts = [(rail, merge(rails))]
     return [(sleeper, merge(ties)), *laid] if ties else laid
+
+
+@site_builder
+def light_tracks(site: Site, *, lines: list[Line], gauge_m: Number = 1.5, bed: Material = "gravel") -> None:
+    """Lay tracks of a works along lines of straight legs on level ground: a bed, rails and sleepers."""
+    for line in lines:
+        site.paint(ribbon(line, 3.4), bed)
+        z = site.ground_z(*line[0])
+        parts: Parts = []
+        for a, b in pairwise(line):
+            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+            turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+            rail = cuboid(size=[length, 0.08, 0.16])
+            rails = [translated(rail, (length / 2, s * gauge_m / 2, 0.0)) for s in (-1, 1)]
+            ties = [translated(cuboid(size=[0.25, 2.5, 0.06]), (s, 0.0, 0.0)) for s in np.arange(0.6, length, 1.2)]
+            for material, body in (("rust", merge(rails)), ("wood:#5b4634", merge(ties))):
+                parts.append((material, translated(rotated(body, turn), (*a, z))))
+        site.add(None, "railway_track", parts)
 
 
 @site_builder

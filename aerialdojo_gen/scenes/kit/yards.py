@@ -62,6 +62,19 @@ def bulk_heaps(
     site.add(None, "bulk_heaps", parts)
 
 
+@site_builder
+def brick_stacks(
+    site: Site, *, stacks: list[tuple[Number, Number, Number, Number, Material]], wide_m: Number = 1.8,
+    on: Number = 0.0,
+) -> None:  # fmt: skip
+    """Set up stacks of bricks along x, with a half layer on each: x, y, length, height and material of each."""
+    for x, y, long_m, high_m, material in stacks:
+        u, v, z = long_m / 2, wide_m / 2, on + high_m
+        bodies = [block(x - u, y - v, x + u, y + v, on, z),
+                  block(x - u + 0.4, y - v + 0.3, x + u - 1.2, y + v - 0.3, z, z + 0.35)]  # fmt: skip
+        site.add(None, "brick_stack", [(material, merge(bodies))], footprint=rectangle(x - u, y - v, x + u, y + v))
+
+
 def _container_stack(site: Site, stack: Stack, yaw_deg: float, on: float) -> None:
     rng = site.rng_for("stack", *stack.at)
     bodies: dict[str, list[Mesh]] = {}

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit.structures import Parts, block, stairs
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import bars, guard_rails, plates, posts, rim
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import bars, guard_rails, plates, posts, rim
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.site import Site

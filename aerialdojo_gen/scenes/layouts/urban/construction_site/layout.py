@@ -23,16 +23,16 @@ from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import (
     scaffold,
     shores,
 )
-from aerialdojo_gen.scenes.layouts.urban.construction_site.viaduct import build_viaduct, plant
-from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, ramped, roughened, shaped
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import Place, guard_rails, set_out
-from aerialdojo_gen.scenes.layouts.urban.parts.site_yard import (
+from aerialdojo_gen.scenes.layouts.urban.construction_site.earthworks import grid_terrain, ramped, roughened, shaped
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import Place, guard_rails, set_out
+from aerialdojo_gen.scenes.layouts.urban.construction_site.site_yard import (
     aggregate_bays,
     foundation,
     hoarding,
     offices,
     precast_stack,
 )
+from aerialdojo_gen.scenes.layouts.urban.construction_site.viaduct import build_viaduct, plant
 from aerialdojo_gen.scenes.site import Site
 
 

@@ -12,10 +12,15 @@ from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, smooth_path
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit.structures import Parts, block, parapet, stairs
 from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import scaffold
-from aerialdojo_gen.scenes.layouts.urban.parts.earthworks import grid_terrain, roughened
-from aerialdojo_gen.scenes.layouts.urban.parts.halls import across_x
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import Point3, bars, guard_rails, posts, trestle
-from aerialdojo_gen.scenes.layouts.urban.parts.site_yard import aggregate_bays, hoarding, offices, precast_stack
+from aerialdojo_gen.scenes.layouts.urban.construction_site.earthworks import grid_terrain, roughened
+from aerialdojo_gen.scenes.layouts.urban.construction_site.halls import across_x
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import Point3, bars, guard_rails, posts, trestle
+from aerialdojo_gen.scenes.layouts.urban.construction_site.site_yard import (
+    aggregate_bays,
+    hoarding,
+    offices,
+    precast_stack,
+)
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters, stairs
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import guard_rails, plates, posts
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import guard_rails, plates, posts
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, crown
 from aerialdojo_gen.scenes.site import Site

@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof, wall_with_openings
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
-from aerialdojo_gen.scenes.layouts.urban.parts.industry import Point3, bars, plates, posts
+from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import Point3, bars, plates, posts
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.scenes.site import Site

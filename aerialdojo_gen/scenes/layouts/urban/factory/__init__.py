@@ -1,1 +1,0 @@
-"""A factory: a big steel and chemical works, or a brickworks beside its clay pit."""
