@@ -1,1 +1,0 @@
-"""A neighbourhood: detached houses about a turning circle, or brick semis along a lane with a green."""
