@@ -37,7 +37,8 @@ class Site:
         x, y = recipe.size_m
         self.extent = rectangle(-x / 2, -y / 2, x / 2, y / 2)
         self.instances: list[Instance] = []
-        self.footings: list[BaseGeometry] = []  # Outlines of things that the ground is to be levelled under
+        # Outlines and middles of things that the ground is to be levelled under.
+        self.footings: list[tuple[BaseGeometry, Point]] = []
         self._counts: dict[str, int] = {}
         self._nodes: set[str] = set()
         self._moved_nodes: set[str] = set()

@@ -9,7 +9,6 @@ import trimesh
 
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.kit.natural_ground import blob
-from aerialdojo_gen.scenes.layouts.natural.forest.layout import _SPOTS
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 _ELSEWHERE = {"in the wood", "beside a path", "beside the stream"}
@@ -114,13 +113,13 @@ def test_the_landmark_rises_over_the_wood_but_not_over_the_ceiling(forest: Scene
 
 
 def test_trees_stay_off_the_clearings(forest: Scene) -> None:
-    camp, cabin = _SPOTS["camp"], _SPOTS["cabin"]
+    camp, cabin = (forest[node].centroid for node in ("campfire_000", "log_cabin_000"))
     for tree in forest.instances:
         if tree.category.endswith("_tree") and tree.attributes["place"] == "in the wood":
             v = tree.vertices
             root = v[v[:, 2] < v[:, 2].min() + 0.1].mean(axis=0)
             for spot in (camp, cabin):
-                assert np.hypot(root[0] - spot.x, root[1] - spot.y) > 4.0, tree.node
+                assert np.hypot(*(root - spot)[:2]) > 4.0, tree.node
 
 
 @pytest.mark.parametrize("seed", [0, 1, 7, 123])

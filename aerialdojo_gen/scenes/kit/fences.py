@@ -12,6 +12,7 @@ from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_scatter import place_along, slab
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
@@ -88,8 +89,15 @@ def yard_walls(
 
 @site_builder
 def fence_panels(
-    site: Site, *, of: str, lines: list[Line], panel_m: Annotated[Number, Field(ge=0.2)], turn_deg: Number = 90.0
-) -> None:
+    site: Site, *, of: str, lines: list[Line], panel_m: Annotated[Number, Field(ge=0.2)], turn_deg: Number = 90.0,
+    place: str = "", margin_m: Number = 0.0,
+) -> None:  # fmt: skip
     """Set a panel of the catalogue in the middle of every stretch of lines, turned with them."""
+    category, _, variant = of.partition(":")
+    words = {"place": place} if place else None
     for line in lines:
-        place_along(site, of, line, panel_m, turn_deg=turn_deg)
+        panels = place_along(
+            site, category, line, panel_m, turn_deg=turn_deg, variant=variant or None, attributes=words
+        )
+        for panel in panels if margin_m else ():
+            keep_clear(site, panel, margin_m)

@@ -18,13 +18,18 @@ from aerialdojo_gen.scenes.site import Site
 def paint_patches(
     site: Site, *, materials: Annotated[list[Material], Field(min_length=1)],
     count: Annotated[int, Field(ge=0, le=1000)], radius_m: tuple[Number, Number], seed: int = 0,
-    ragged: Number = 0.55, stream: str = "patches",
+    ragged: Number = 0.55, stream: str = "patches", box: tuple[Number, Number, Number, Number] | None = None,
+    skip: Annotated[int, Field(ge=0, le=1000)] = 0,
 ) -> None:  # fmt: skip
-    """Paint patches anywhere, of the materials in turn; `seed` is that of the first one's outline."""
+    """Paint patches about the site, or a box of it, of the materials in turn.
+
+    `seed` is that of the first one's outline; `skip` leaves out patches that another entry of the stream has drawn.
+    """
     rng = site.rng_for(stream)
-    half = [side / 2 for side in site.recipe.size_m]
+    rng.uniform(size=3 * skip)
+    x0, y0, x1, y1 = box or site.extent.bounds
     for k in range(count):
-        x, y = float(rng.uniform(-half[0], half[0])), float(rng.uniform(-half[1], half[1]))
+        x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
         patch = blob(x, y, float(rng.uniform(*radius_m)), seed + k, ragged)
         site.paint(patch, materials[k % len(materials)])
 

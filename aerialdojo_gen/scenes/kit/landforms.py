@@ -120,10 +120,10 @@ def sink_area(
 
 
 @ground_builder
-def level_under_things(site: Site, terrain: Terrain, *, blend_m: Number = 3.0) -> Terrain:
-    """Level the ground under every thing of the places that say `level`, in their order."""
-    for outline in site.footings:
-        terrain = terrain.flattened(outline, blend_m=blend_m)
+def level_under_things(site: Site, terrain: Terrain, *, blend_m: Number = 3.0, middles: bool = False) -> Terrain:
+    """Level the ground under every thing of the places that say `level`, in their order, or about their middles."""
+    for outline, middle in site.footings:
+        terrain = terrain.flattened(middle if middles else outline, blend_m=blend_m)
     return terrain
 
 

@@ -28,6 +28,19 @@ class Species:
     share: Number = 1.0
 
 
+@dataclass(frozen=True)
+class Strewn:
+    """What is strewn, how far apart, and at most how many; the rest as of `strew`."""
+
+    of: str
+    spacing_m: Annotated[Number, Field(ge=0.2)]
+    limit: Annotated[int, Field(ge=0, le=10_000)]
+    scale: Annotated[Number, Field(ge=0.05, le=20)] = 1.0
+    roles: dict[str, Material] | None = None
+    params: dict[str, Number] | None = None
+    attributes: dict[str, str] | None = None
+
+
 @site_builder
 def woods(
     site: Site,
@@ -86,3 +99,12 @@ def strew(
             continue
         turn = downhill_deg(site, x, y) if category == "fallen_log" else yaw
         count += site.try_place(category, x, y, turn, z=settled_z(site, x, y), **options) is not None
+
+
+@site_builder
+def undergrowth(
+    site: Site, *, area: Area, kinds: list[Strewn], density: ScalarField | None = None, place: str = ""
+) -> None:
+    """Strew several things over an area, a kind after the other."""
+    for kind in kinds:
+        strew(site, area=area, density=density, place=place, **vars(kind))

@@ -148,7 +148,8 @@ class _Building:
             for raw in entry.place:
                 thing = self._thing(raw[:4] if isinstance(raw, list) else {**raw, "on": None}, where)
                 category, variant, pose = self._pose(thing, entry, where)
-                self._site.footings.append(outline_of(self._site, category, variant, pose[:2], pose[2]))
+                outline = outline_of(self._site, category, variant, pose[:2], pose[2])
+                self._site.footings.append((outline, Point(pose[:2])))
 
     def _ground(self, body: Mapping[str, Any]) -> None:
         ground = self._read(Ground, body, f"{self._where}: [ground]")
@@ -231,11 +232,13 @@ class _Building:
 
     def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
-        z = thing.on if thing.on is not None else entry.on
-        if entry.settle_m is not None:
+        z = thing.on
+        if z is None and entry.settle_m is not None:
             z = settled_z(self._site, x, y, entry.settle_m) + entry.above_ground_m
-        elif entry.above_ground_m:
+        elif z is None and entry.above_ground_m:
             z = self._site.ground_z(x, y) + entry.above_ground_m
+        elif z is None:
+            z = entry.on
         if entry.sunk is not None:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant, x, y)
@@ -244,7 +247,7 @@ class _Building:
         options = {key: value for key, value in given.items() if value and value != 1.0}
         if not thing.solid:
             options["solid"] = False
-        one = Placement(category, x, y, yaw_deg, variant, z, entry.phrase, thing.node, options)
+        one = Placement(category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, options)
         try:
             placed = place(self._site, one, entry.fit, entry.clear_m, entry.margin_m, entry.room_m) is not None
         except AssetError as error:

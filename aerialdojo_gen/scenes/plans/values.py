@@ -65,8 +65,14 @@ class PlanNames:
             raise ValueError(f"a point [x, y] is wanted, got {value!r}")
         return self.number(value[0]), self.number(value[1])
 
+    def frame(self, value: Any) -> Frame:
+        """Resolve ``[x, y, yaw]``."""
+        if not isinstance(value, list) or len(value) != 3:
+            raise ValueError(f"frame is [x, y, yaw], got {value!r}")
+        return Frame(*(self.number(one) for one in value))
+
     def line(self, value: Any) -> list[Point]:
-        """Resolve the name of a line, its points, or ``{points, smooth}``, ``{points, eased}``.
+        """Resolve the name of a line, its points, or ``{points, smooth}``, ``{points, eased}``, ``{points, frame}``.
 
         `smooth` rounds the corners so many times; `eased` makes S-curves of so many steps of the legs across x.
         """
@@ -75,8 +81,10 @@ class PlanNames:
                 raise ValueError(unknown("no line", value, self.lines))
             return self.lines[value]
         smooth = eased = 0
+        frame = None
         if isinstance(value, dict):
-            refuse_unknown(value, ("points", "smooth", "eased"))
+            refuse_unknown(value, ("points", "smooth", "eased", "frame"))
+            frame = self.frame(value["frame"]) if "frame" in value else None
             smooth, eased, value = value.get("smooth", 0), value.get("eased", 0), value.get("points")
             if not isinstance(smooth, int) or not 0 <= smooth <= 6:
                 raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
@@ -85,6 +93,7 @@ class PlanNames:
         if not isinstance(value, list | tuple) or not 2 <= len(value) <= _MAX_POINTS:
             raise ValueError(f"a line has from 2 to {_MAX_POINTS:,} points [x, y]")
         points = [self.point(point) for point in value]
+        points = frame.path(points) if frame else points
         if min(math.dist(a, b) for a, b in pairwise(points)) < _SHORTEST_M:
             raise ValueError(f"consecutive points of a line must be {_SHORTEST_M:g} m apart")
         return smooth_path(eased_path(points, eased) if eased else points, smooth)
@@ -228,9 +237,7 @@ def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
 
 def _framed(names: PlanNames, area: BaseGeometry, pose: Any) -> BaseGeometry:
     """Take an area for one in the frame ``[x, y, yaw]``."""
-    if not isinstance(pose, list) or len(pose) != 3:
-        raise ValueError(f"frame is [x, y, yaw], got {pose!r}")
-    return Frame(*(names.number(one) for one in pose)).area(area)
+    return names.frame(pose).area(area)
 
 
 def _offset(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
