@@ -139,7 +139,7 @@ def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_pa
         ("snowfield", {"profile": []}, "profile: "),
         ("snowfield", {"rink": {"at": [0, 0], "size_m": [6, 11]}}, "rink.size_m.0: Input should be greater"),
         ("forest", {"birch_wood": {"creek": []}}, "birch_wood.creek: a line needs two points or more"),
-        ("park", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
+        ("mall", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
          "furniture.0.things.0.count: Input should be less than or equal to 1000"),
     ],
 )  # fmt: skip

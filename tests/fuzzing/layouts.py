@@ -58,11 +58,4 @@ RECIPES: dict[str, dict[str, Any]] = {
             },
         },
     },
-    "U_Lake_0": {
-        "layout": "park", "seed": 7, "size_m": [84, 76], "ceiling_m": 22, "parameters": {
-            "furniture": [{"place": "by the path", "things": [
-                {"category": "bench", "at": [3, 4], "yaw": 30, "count": 2, "step": [0, 3]},
-                {"category": "mailbox", "at": [5, 5], "z": 1.0}]}],
-        },
-    },
 }  # fmt: skip

@@ -129,7 +129,7 @@ def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tm
 def test_the_fingerprint_of_a_scene_follows_its_layout(tmp_path):
     """Two recipes that differ in nothing but the layout's name differ in code, not in their bytes alone."""
     pipeline = load_pipeline(PROJECT / "pipelines" / "smoke.toml")
-    texts = {"a": 'layout = "mall"', "b": 'layout = "park"'}
+    texts = {"a": 'layout = "mall"', "b": 'layout = "courtyard"'}
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
     roots = ProjectPaths(tmp_path, ASSETS, tmp_path, tmp_path)

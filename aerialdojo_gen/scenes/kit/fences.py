@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -59,11 +61,24 @@ def mesh_fences(
 @site_builder
 def garden_fences(
     site: Site, *, lines: list[Line], kind: Literal["picket", "board", "hedge", "wall", "railing"],
-    material: Material | None = None,
+    material: Material | None = None, piece_m: Annotated[Number, Field(ge=1.0)] | None = None,
 ) -> None:  # fmt: skip
-    """Put up fences about gardens, each on the lowest ground of its line; the kind has a material of its own."""
+    """Put up fences about gardens, each on the lowest ground of its line; the kind has a material of its own.
+
+    Where the ground is not level they may be cut into pieces of `piece_m` at least, each on its own ground.
+    """
     for line in lines:
-        fence(site, line, kind, material)
+        for piece in [line] if piece_m is None else _pieces(line, piece_m):
+            fence(site, piece, kind, material)
+
+
+def _pieces(line: Line, piece_m: float) -> Iterator[Line]:
+    for a, b in pairwise(line):
+        count = max(int(np.hypot(b[0] - a[0], b[1] - a[1]) / piece_m), 1)
+        steps = np.linspace(0.0, 1.0, count + 1)
+        yield from (
+            list(pair) for pair in pairwise([(a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t) for t in steps])
+        )
 
 
 @site_builder

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+from pydantic import Field
 from shapely import contains_xy
 
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
@@ -27,6 +29,16 @@ def keep_free(site: Site, *, areas: list[Area], z: tuple[Number, Number] = (-100
     """Take areas, between two heights, so that nothing that looks for room stands there later."""
     for area in areas:
         site.occupy(area, *z)
+
+
+@site_builder
+def strew_trees(
+    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)], spacing_m: Number,
+    stream: str = "trees", limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000,
+) -> None:  # fmt: skip
+    """Strew trees over an area, of categories in turn; a spot without room stays empty."""
+    for k, spot in enumerate(poisson_disc(area, spacing_m, site.rng_for(stream), limit=limit)):
+        site.try_place(of[k % len(of)], *spot)
 
 
 @site_builder

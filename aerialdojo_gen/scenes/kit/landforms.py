@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -21,17 +20,51 @@ from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 def rolling_ground(
     site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)], height_m: Number,
     wavelength_m: Annotated[Number, Field(gt=0)], octaves: Annotated[int, Field(ge=1, le=8)] = 4,
+    seed: int | None = None,
 ) -> Terrain:  # fmt: skip
-    """Make rolling ground by noise of the plan's seed, in place of what was there."""
-    return rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, height_m, wavelength_m, octaves)
+    """Make rolling ground by noise of a seed, the plan's by default, in place of what was there."""
+    seed = site.recipe.seed if seed is None else seed
+    return rolling_terrain(site.recipe.size_m, cell_m, seed, height_m, wavelength_m, octaves)
 
 
 @ground_builder
-def level_ground(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
-    """Make level ground at z = 0 of so large cells, fine enough for what comes after, in place of what was there."""
-    x, y = site.recipe.size_m
-    columns, rows = math.ceil(x / cell_m - 1e-9), math.ceil(y / cell_m - 1e-9)
-    return Terrain(-x / 2, -y / 2, max(x / columns, y / rows), np.zeros((rows + 1, columns + 1)))
+def hillside_steps(
+    _site: Site, terrain: Terrain, *, steps: list[tuple[Number, Number]], half_m: Number,
+    soft_m: Annotated[Number, Field(gt=0)] = 4.0, run_m: tuple[Number, Number] = (1.0, 8.0),
+) -> Terrain:  # fmt: skip
+    """Let the ground rise northwards in steps (y, rise): steep up to `half_m` from the middle, soft beyond."""
+    x, y = grid(terrain)
+    heights = terrain.heights_m
+    run = run_m[0] + (run_m[1] - run_m[0]) * np.clip((np.abs(x) - half_m) / soft_m, 0.0, 1.0)
+    for at, rise in steps:
+        t = np.clip((y - at + run / 2 - 0.1) / run, 0.0, 1.0)
+        heights = heights + rise * t * t * (3.0 - 2.0 * t)
+    return replace(terrain, heights_m=heights)
+
+
+@ground_builder
+def round_levels(
+    _site: Site, terrain: Terrain, *, discs: list[tuple[Number, Number, Number, Number]],
+    blend_m: Annotated[Number, Field(gt=0)] = 7.0,
+) -> Terrain:  # fmt: skip
+    """Level discs (x, y, radius, height), one after the other, with a slope about each back to the old ground."""
+    x, y = grid(terrain)
+    heights = terrain.heights_m
+    for u, v, radius, to_m in discs:
+        t = smooth(1.0 - (np.hypot(x - u, y - v) - radius) / blend_m)
+        heights = heights * (1.0 - t) + to_m * t
+    return replace(terrain, heights_m=heights)
+
+
+@ground_builder
+def level_about(
+    _site: Site, terrain: Terrain, *, area: Area, to_m: Number, reach_m: Number,
+    blend_m: Annotated[Number, Field(gt=0)],
+) -> Terrain:  # fmt: skip
+    """Level an area and `reach_m` about it, with a slope back to the old ground."""
+    away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
+    t = smooth(1.0 - (away - reach_m) / blend_m)
+    return replace(terrain, heights_m=terrain.heights_m * (1.0 - t) + to_m * t)
 
 
 @ground_builder

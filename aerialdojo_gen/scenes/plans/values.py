@@ -75,6 +75,7 @@ class PlanNames:
         """Resolve the name of a line, its points, or ``{points, smooth}``, ``{points, eased}``, ``{points, frame}``.
 
         `smooth` rounds the corners so many times; `eased` makes S-curves of so many steps of the legs across x.
+        In place of points, ``ellipse = [x, y, radius along x, radius along y, steps]`` gives a closed line.
         """
         if isinstance(value, str):
             if value not in self.lines:
@@ -83,9 +84,10 @@ class PlanNames:
         smooth = eased = 0
         frame = None
         if isinstance(value, dict):
-            refuse_unknown(value, ("points", "smooth", "eased", "frame"))
+            refuse_unknown(value, ("points", "ellipse", "smooth", "eased", "frame"))
             frame = self.frame(value["frame"]) if "frame" in value else None
-            smooth, eased, value = value.get("smooth", 0), value.get("eased", 0), value.get("points")
+            smooth, eased = value.get("smooth", 0), value.get("eased", 0)
+            value = self._ellipse(value["ellipse"]) if "ellipse" in value else value.get("points")
             if not isinstance(smooth, int) or not 0 <= smooth <= 6:
                 raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
             if not isinstance(eased, int) or not 0 <= eased <= 20:
@@ -97,6 +99,13 @@ class PlanNames:
         if min(math.dist(a, b) for a, b in pairwise(points)) < _SHORTEST_M:
             raise ValueError(f"consecutive points of a line must be {_SHORTEST_M:g} m apart")
         return smooth_path(eased_path(points, eased) if eased else points, smooth)
+
+    def _ellipse(self, value: Any) -> list[Point]:
+        if not isinstance(value, list) or len(value) != 5:
+            raise ValueError(f"ellipse is [x, y, radius along x, radius along y, steps], got {value!r}")
+        x, y, a, b, steps = (self.number(one) for one in value)
+        turns = [2 * math.pi * k / max(int(steps), 3) for k in range(max(int(steps), 3) + 1)]
+        return [(x + a * math.cos(turn), y + b * math.sin(turn)) for turn in turns]
 
     def area(self, value: Any) -> BaseGeometry:
         """Resolve the name of an area, ``[x0, y0, x1, y1]``, or a table with one of the keys of `_AREAS`."""
@@ -178,7 +187,9 @@ def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
 
 
 def _ribbon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    """Make the area about a line; `round_ends` is true, or the steps of a quarter of its round ends."""
+    """Make the area about a line, or several named ones; `round_ends` is true, or the steps of a quarter turn."""
+    if isinstance(value["ribbon"], list) and all(isinstance(one, str) for one in value["ribbon"]):
+        return shapely.union_all([_ribbon(names, {**value, "ribbon": one}) for one in value["ribbon"]])
     line, width_m, ends = names.line(value["ribbon"]), names.number(value.get("width_m")), value.get("round_ends")
     if ends is None or isinstance(ends, bool):
         return ribbon(line, width_m, bool(ends))

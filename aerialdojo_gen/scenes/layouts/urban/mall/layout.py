@@ -25,9 +25,9 @@ from aerialdojo_gen.scenes.kit.structures import (
     spaced,
     stairs,
 )
+from aerialdojo_gen.scenes.layouts.urban.mall.furniture import Furniture, furnish
 from aerialdojo_gen.scenes.layouts.urban.mall.outlets import build_outlets
 from aerialdojo_gen.scenes.layouts.urban.mall.shops import STOREY_M, anchor_store, shop_names, shop_row, shopping_hall
-from aerialdojo_gen.scenes.layouts.urban.parts.furniture import Furniture, furnish
 from aerialdojo_gen.scenes.site import Site
 
 HALL = unary_union([rectangle(-58, 20, 34, 46), rectangle(-58, -12, -36, 20), rectangle(14, -12, 34, 20)])

@@ -1,52 +1,42 @@
-"""Structure of amusement parks: pavilions, booths, queues, strings of lights, entrance gates, water channels."""
+"""What amusement parks and fairs are built of: ride halls, booths, queues, strings of lights, gates, flumes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry import LineString, Point
 from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cone, cylinder, sphere
 from aerialdojo_gen.scenes.shapes_extruded import prism, sweep
 from aerialdojo_gen.scenes.site import Site
 
+_Words = Annotated[list[str], Field(min_length=1)]
+_Count = Annotated[int, Field(ge=1, le=50)]
 FLOOR_M, EAVE_M = 0.3, 3.9
 
 
-def pavilion(
-    site: Site, node: str, frame: Frame, size_m: tuple[float, float], *, sign: str, roof: str, trim: str, floor: str
-) -> float:
-    """Put up a roofed ride hall with open sides, as dodgems have; its front is the +u side.
+@site_builder
+def ride_hall(
+    site: Site, *, at: At, yaw_deg: Number, size_m: tuple[Number, Number], sign: str, roof: Material,
+    trim: Material, floor: Material, node: str | None = None,
+) -> float:  # fmt: skip
+    """Put up a roofed hall with open sides, as dodgems have, its front along `yaw_deg`; gives its floor's height.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    node : str
-        Node name.
-    frame : Frame
-        Middle of its plan.
-    size_m : (float, float)
-        Along u and v, metres.
-    sign : str
-        Written over the front.
-    roof, trim, floor : str
-        Materials.
-
-    Returns
-    -------
-    float
-        Height of the floor, metres; the flat of the roof lies `EAVE_M` + 0.2 over the ground.
+    The flat of the roof lies 3.8 m over the floor.
     """
-    base = site.ground_z(frame.x, frame.y)
+    frame = Frame(*at, yaw_deg)
+    base = site.ground_z(*at)
     u, v = size_m[0] / 2, size_m[1] / 2
     posts = [(s * (u - 0.3), t) for s in (-1, 1) for t in np.linspace(-v + 0.3, v - 0.3, 4)]
     low, high = EAVE_M - 0.4, EAVE_M + 0.35
@@ -73,15 +63,20 @@ def pavilion(
     return base + FLOOR_M
 
 
-def booths(site: Site, node: str, frame: Frame, count: int, colours: Sequence[str], words: Sequence[str]) -> Instance:
-    """Put up a row of game booths, 3 m wide each, that look along +u: counters, prizes, striped roofs, signs."""
-    base = site.ground_z(frame.x, frame.y)
+@site_builder
+def booths(
+    site: Site, *, at: At, yaw_deg: Number, count: _Count, colours: Annotated[list[Material], Field(min_length=1)],
+    words: _Words, node: str | None = None,
+) -> None:  # fmt: skip
+    """Put up a row of game booths, 3 m wide each, open along `yaw_deg`: counters, prizes, striped roofs, signs."""
+    frame = Frame(*at, yaw_deg)
+    base = site.ground_z(*at)
     half = count * 1.5
     parts: Parts = []
     for k in range(count):
         a, b = -half + 3.0 * k, -half + 3.0 * (k + 1)
         colour, middle = colours[k % len(colours)], (a + b) / 2
-        roof = rotated(prism(size=(2.9, 3.2, 0.9)), rotation(0, 0, 0))
+        roof = prism(size=(2.9, 3.2, 0.9))
         parts += [
             (f"boards:{colour}", block(-1.2, a + 0.05, -1.1, b - 0.05, 0.0, 2.5)),
             (f"boards:{colour}", merge([block(-1.2, v - 0.05, 1.0, v + 0.05, 0.0, 2.5) for v in (a + 0.1, b - 0.1)])),
@@ -99,12 +94,16 @@ def booths(site: Site, node: str, frame: Frame, count: int, colours: Sequence[st
             ]
             parts.append((tone, merge(toys)))
     area = frame.area(rectangle(-1.3, -half, 1.4, half))
-    return site.add(node, "game_booth", frame.parts(parts, base), {"material": "wooden"}, footprint=area)
+    site.add(node, "game_booth", frame.parts(parts, base), {"material": "wooden"}, footprint=area)
 
 
-def queue_rails(site: Site, node: str, frame: Frame, lanes: int, length_m: float) -> Instance:
-    """Lay a zigzag of barriers for a queue, lanes 1.2 m wide that run along u."""
-    base = site.ground_z(frame.x, frame.y)
+@site_builder
+def queue_rails(
+    site: Site, *, at: At, length_m: Number, lanes: _Count, yaw_deg: Number = 0.0, node: str | None = None
+) -> None:
+    """Lay a zigzag of barriers for a queue, lanes 1.2 m wide that run along `yaw_deg`."""
+    frame = Frame(*at, yaw_deg)
+    base = site.ground_z(*at)
     rails, posts = [], []
     for k in range(lanes + 1):
         v = k * 1.2
@@ -114,11 +113,12 @@ def queue_rails(site: Site, node: str, frame: Frame, lanes: int, length_m: float
         rails += [sweep(path=[(a, v, z), (b, v, z)], radius=0.035) for z in (0.5, 1.0)]
         posts += [(float(u), v) for u in np.linspace(a, b, 4)]
     parts: Parts = [("steel", merge([*rails, columns(posts, -0.1, 1.03, 0.04, 6)]))]
-    return site.add(node, "queue_rails", frame.parts(parts, base))
+    site.add(node, "queue_rails", frame.parts(parts, base))
 
 
-def light_strings(site: Site, node: str, poles: Sequence[tuple[float, float]], height_m: float = 4.6) -> Instance:
-    """Hang strings of coloured bulbs from pole to pole."""
+@site_builder
+def festoons(site: Site, *, poles: list[At], height_m: Number = 4.6, node: str | None = None) -> None:
+    """Put up poles, and hang strings of coloured bulbs from one to the next."""
     tones = ("#e9b52a", "#d8342c", "#2f6fc0", "#3f9a5a")
     bulbs: dict[str, list[Mesh]] = {tone: [] for tone in tones}
     wires, masts = [], []
@@ -136,20 +136,23 @@ def light_strings(site: Site, node: str, poles: Sequence[tuple[float, float]], h
             bulbs[tones[k % 4]].append(translated(sphere(radius=0.12, subdivisions=0), p - (0, 0, 0.12)))
     parts: Parts = [("iron", merge([*wires, *masts]))]
     parts += [(tone, merge(many)) for tone, many in bulbs.items() if many]
-    return site.add(node, "light_strings", parts)
+    site.add(node, "light_strings", parts)
 
 
+@site_builder
 def entrance_gate(
-    site: Site, frame: Frame, name: str, width_m: float, *, wall: str, roof: str, sign: str
-) -> Instance:
-    """Put up an entrance: two round towers with pointed roofs, and an arched board with the park's name between."""
-    base = site.ground_z(frame.x, frame.y)
+    site: Site, *, at: At, yaw_deg: Number, name: str, width_m: Number, wall: Material, roof: Material,
+    sign: Material,
+) -> None:  # fmt: skip
+    """Put up an entrance: two round towers with pointed roofs, and an arched board with a name between them."""
+    frame = Frame(*at, yaw_deg)
+    base = site.ground_z(*at)
     half = width_m / 2 + 1.6
     parts: Parts = []
     for s in (-1, 1):
-        at = (0.0, s * half, 0.0)
+        foot = (0.0, s * half, 0.0)
         parts += [
-            (wall, translated(cylinder(radius=1.5, height=5.2, segments=14), at)),
+            (wall, translated(cylinder(radius=1.5, height=5.2, segments=14), foot)),
             (roof, translated(cone(radius=2.0, height=3.0, segments=14), (0.0, s * half, 5.2))),
             (sign, translated(cylinder(radius=1.56, height=0.5, segments=14), (0.0, s * half, 3.2))),
             ("window", translated(box(size=(3.06, 0.6, 1.2)), (0.0, s * half, 1.4))),
@@ -164,24 +167,23 @@ def entrance_gate(
     )
     parts.append((sign, block(-0.12, -2.4, 0.12, 2.4, 4.7, 5.85)))
     area = unary_union([frame.area(rectangle(-1.6, s * half - 1.6, 1.6, s * half + 1.6)) for s in (-1, 1)])
-    return site.add("entrance_gate", "entrance_gate", frame.parts(parts, base), {"material": "stone"}, footprint=area)
+    site.add("entrance_gate", "entrance_gate", frame.parts(parts, base), {"material": "stone"}, footprint=area)
 
 
-def flume(site: Site, node: str, path: Sequence[tuple[float, float, float]], *, trough: str, leg: str) -> Instance:
-    """Lead a water channel along a path of (x, y, height over z = 0): a trough on legs, brim full.
+@site_builder
+def flume(
+    site: Site, *, path: Annotated[list[tuple[Number, Number, Number]], Field(min_length=2)], trough: Material,
+    leg: Material, smooth: Annotated[int, Field(ge=0, le=4)] = 1, free_m: Number = 2.0, node: str | None = None,
+) -> None:  # fmt: skip
+    """Lead a water channel along a path (x, y, underside), its corners rounded: a trough on legs, brim full.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    node : str
-        Node name.
-    path : sequence of (x, y, z)
-        Underside of the channel, metres, world frame.
-    trough, leg : str
-        Materials.
+    The ground within `free_m` of it stays free.
     """
-    line = np.asarray(path, dtype=np.float64)
+    corners = LineString([(x, y) for x, y, _ in path])
+    xy = smooth_path([(x, y) for x, y, _ in path], smooth)
+    marks = [corners.project(Point(x, y)) for x, y, _ in path]
+    heights = np.interp([corners.project(Point(p)) for p in xy], marks, [z for _, _, z in path])
+    line = np.column_stack([xy, heights])
     parts: Parts = [(trough, sweep(path=(line + np.array([0.0, 0.0, 0.1])).tolist(), section=(2.2, 0.2)))]
     parts.append(("water", sweep(path=(line + np.array([0.0, 0.0, 0.3])).tolist(), section=(1.8, 0.2))))
     flat = LineString(line[:, :2])
@@ -200,7 +202,8 @@ def flume(site: Site, node: str, path: Sequence[tuple[float, float, float]], *, 
             legs += [block(p.x - 0.14, p.y - 0.14, p.x + 0.14, p.y + 0.14, ground, z + 0.02)]
     if legs:
         parts.append((leg, merge(legs)))
-    return site.add(node, "log_flume", parts, {"material": "metal"})
+    site.add(node, "log_flume", parts, {"material": "metal"})
+    site.occupy(flat.buffer(free_m))
 
 
 def _stations(line: np.ndarray) -> np.ndarray:

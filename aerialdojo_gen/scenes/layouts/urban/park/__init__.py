@@ -1,1 +1,0 @@
-"""An amusement park: a small fair on the terraces of a hillside, or a larger park about a lake."""
