@@ -5,14 +5,13 @@ import pytest
 import shapely
 from support.layout_checks import catalogue, each_scene, props_of
 
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
+from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
+from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, terraces
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
+from aerialdojo_gen.scenes.kit.landforms import level_ground
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
-from aerialdojo_gen.scenes.layouts.urban.construction_site.concrete import Frame, put_up_frame, scaffold
-from aerialdojo_gen.scenes.layouts.urban.construction_site.industry import Place, set_out
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
@@ -36,7 +35,8 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
     site = blank()
     plan = rectangle(-8, -8, 8, 8)
     void = rectangle(-2, -2, 2, 2)
-    put_up_frame(site, Frame((-7.0, 0.0, 7.0), (-7.0, 0.0, 7.0), ((plan, 3.6), (plan, 7.2)), 0.0, {0: void}))
+    grid = [-7.0, 0.0, 7.0]
+    concrete_frame(site, xs=grid, ys=grid, slabs=[Slab(plan, 3.6, void), Slab(plan, 7.2)])
     cast = RayCaster(site.scene())
     down = np.array([[0.0, 0.0, -1.0]])
     assert cast.first_hit(np.array([[4.0, 4.0, 5.0]]), down)[0][0] == pytest.approx(1.4)
@@ -51,7 +51,7 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
 def test_pits_have_benches_and_ramps_lead_down():
     pit = rectangle(-15, -15, 15, 15)
     site = blank()
-    flat = level_grid(site, site.terrain, cell_m=1.0)
+    flat = level_ground(site, site.terrain, cell_m=1.0)
     ground = terraces(site, flat, area=pit, steps=[(0, 0), (3, -2), (6, -2), (9, -5)])
     assert ground.z(0, 0) == pytest.approx(-5.0)
     assert ground.z(-10.5, 0) == pytest.approx(-2.0, abs=0.1)
@@ -77,7 +77,7 @@ def test_halls_are_entered_by_their_gates_alone():
 
 def test_scaffolds_take_the_side_left_of_their_line():
     site = blank()
-    scaffold(site, (0.0, 0.0), (10.0, 0.0), 6.0)
+    scaffold(site, line=((0.0, 0.0), (10.0, 0.0)), z=(0.0, 6.0))
     assert not site.is_free(5.0, 0.6, 0.2)
     assert site.is_free(5.0, -0.6, 0.2)
     assert site.instances[-1].bounds[1, 2] == pytest.approx(7.1, abs=0.1)
@@ -93,12 +93,3 @@ def test_guard_rails_follow_every_line():
     assert rail[:, 0].max() == pytest.approx(6.0, abs=0.1)
     assert rail[:, 1].max() == pytest.approx(9.0, abs=0.1)
     assert "planks" not in dict(guard_rails(lines, 2.0))
-
-
-def test_what_has_no_room_is_named():
-    site = blank()
-    places = [Place(place="in the yard", things=(("skip_container/blue_empty", 0, 0, 0), ("generator", 0.5, 0, 0)))]
-    with pytest.raises(AssetError, match=r"generator at \(0\.5, 0\)"):
-        set_out(site, places)
-    assert site.instances[0].variant == "blue_empty"
-    assert site.instances[0].attributes["place"] == "in the yard"

@@ -52,11 +52,16 @@ def growth(
     limit: int,
     settle_m: Number = 0.5,
     stream: str = "growth",
+    by_pose: bool = False,
 ) -> None:
-    """Strew plants over an area where there is room about them; each is of the first zone that it lies in."""
+    """Strew plants over an area where there is room about them; each is of the first zone that it lies in.
+
+    The limit and the categories of a zone count those that stand; `by_pose`, those without room too.
+    """
     count = 0
-    for pose in poisson_disc(area, spacing_m, site.rng_for(stream)):
+    for k, pose in enumerate(poisson_disc(area, spacing_m, site.rng_for(stream))):
         x, y, _ = pose
+        count = k if by_pose else count
         zone = next((one for one in zones if one.area is None or contains_xy(one.area, x, y)), None)
         if count >= limit or zone is None:
             continue

@@ -15,11 +15,11 @@ from shapely.geometry import Polygon
 
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof, wall_with_openings
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit import part_builder, site_builder
+from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.steelwork import bars, plates, posts
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import At, Material, Number
+from aerialdojo_gen.scenes.plans.values import Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.scenes.site import Site
 
@@ -141,12 +141,6 @@ def shed_on_posts(
     for x, y in feet:
         site.occupy(rectangle(x - 0.2, y - 0.2, x + 0.2, y + 0.2), on, top)
     return top
-
-
-@part_builder
-def profile_along_x(*, points: list[At], x: tuple[Number, Number], material: Material) -> Parts:
-    """Extrude an outline of (y, z) along x, from one end to the other."""
-    return [(material, across_x(points, *x))]
 
 
 def across_x(points: Sequence[tuple[float, float]], x0: float, x1: float) -> Mesh:

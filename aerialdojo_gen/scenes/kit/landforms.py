@@ -18,13 +18,14 @@ from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
 @ground_builder
 def rolling_ground(
-    site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)], height_m: Number,
+    site: Site, terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)], height_m: Number,
     wavelength_m: Annotated[Number, Field(gt=0)], octaves: Annotated[int, Field(ge=1, le=8)] = 4,
-    seed: int | None = None,
+    seed: int | None = None, over: bool = False,
 ) -> Terrain:  # fmt: skip
-    """Make rolling ground by noise of a seed, the plan's by default, in place of what was there."""
+    """Make rolling ground by noise of a seed, the plan's by default, in place of what was there or `over` it."""
     seed = site.recipe.seed if seed is None else seed
-    return rolling_terrain(site.recipe.size_m, cell_m, seed, height_m, wavelength_m, octaves)
+    rolling = rolling_terrain(site.recipe.size_m, cell_m, seed, height_m, wavelength_m, octaves)
+    return replace(rolling, heights_m=terrain.heights_m + rolling.heights_m) if over else rolling
 
 
 @ground_builder

@@ -60,9 +60,23 @@ def guard_rail(
 
 
 @part_builder
-def trestles(*, at: list[At], z: tuple[Number, Number], half_m: Number, material: Material, width_m: Number) -> Parts:
-    """Make braced towers of four legs about points, between two heights."""
-    return [(material, merge([trestle(x, y, *z, half_m, width_m) for x, y in at]))]
+def lattice_beams(
+    *, x: tuple[Number, Number], rows: tuple[Number, Number], z: tuple[Number, Number], material: Material,
+    panels: Annotated[int, Field(ge=1, le=200)] = 14, width_m: Number = 0.26,
+    free: tuple[Number, Number] = (0.0, 0.0),
+) -> Parts:  # fmt: skip
+    """Make two lattice beams along x in rows (y), tied at the top at every second panel but on a `free` stretch."""
+    (x0, x1), (low, high), step = x, z, (x[1] - x[0]) / panels
+    lines: list[tuple[Point3, Point3]] = []
+    for y in rows:
+        lines += [((x0, y, w), (x1, y, w)) for w in z]
+        for k in range(panels):
+            a, b = x0 + k * step, x0 + (k + 1) * step
+            lines.append(((a, y, low), (b, y, high)) if k % 2 else ((a, y, high), (b, y, low)))
+            lines.append(((a, y, low), (a, y, high)))
+    ties = [x0 + k * step for k in range(0, panels + 1, 2)]
+    lines += [((a, rows[0], high), (a, rows[1], high)) for a in ties if not free[0] <= a <= free[1]]
+    return [(material, bars(lines, width_m))]
 
 
 @site_builder

@@ -1,4 +1,4 @@
-"""Stone viaducts along x: walls of round arches."""
+"""Viaducts along x: walls of round arches in stone; box girders on piers, and what they are built on."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit import part_builder
+from aerialdojo_gen.scenes.kit import part_builder, site_builder
+from aerialdojo_gen.scenes.kit.halls import across_x
+from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts, rim, trestle
 from aerialdojo_gen.scenes.kit.structures import Parts, block
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Bodies, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.site import Site
 
 _SIDES = (-2.4, 2.4)
 
@@ -59,6 +62,60 @@ def stone_viaduct(
     parts += [(trim, merge([*rings, *caps, *course])), (stone, merge([*walls, *pilasters]))]
     parts.append((ballast, block(x0 - 0.2, -2.2, x1 + 0.2, 2.2, -0.05, ballast_m)))
     return parts
+
+
+@part_builder
+def box_girder(
+    *, x: tuple[Number, Number], y: Number, top_m: Number, half_m: Number = 5.4, deep_m: Number = 2.2,
+    concrete: Material = "concrete:#bdb9ae",
+) -> Parts:  # fmt: skip
+    """Make a girder of concrete along x about `y`, half as wide as its deck at its foot."""
+    side = [(half_m, top_m - 0.25), (3.0, top_m - 0.55), (2.4, top_m - deep_m)]
+    deck = [(y - half_m, top_m - 0.25), (y - half_m, top_m), (y + half_m, top_m)]
+    outline = [*deck, *((y + v, z) for v, z in side), *((y - v, z) for v, z in side[:0:-1])]
+    return [(concrete, across_x(outline, *x))]
+
+
+@site_builder
+def bridge_piers(
+    site: Site, *, at: list[At], top_m: Number | None = None, built_m: Number = 4.6,
+    concrete: Material = "concrete:#b6b2a8", footing: Material = "concrete",
+) -> None:  # fmt: skip
+    """Put up piers with a hammerhead at `top_m`; without it they are under way, `built_m` high, with bars on top."""
+    for x, y in at:
+        foot = site.ground_z(x, y) - 0.4
+        top = foot + built_m if top_m is None else top_m
+        parts: Parts = [(footing, block(x - 2.6, y - 3.8, x + 2.6, y + 3.8, foot, foot + 0.9))]
+        shaft = [(y - 1.7, foot + 0.9), (y + 1.7, foot + 0.9)]
+        if top_m is None:
+            shaft += [(y + 1.7, top), (y - 1.7, top)]
+            rods = [(x + i * 0.6, y + j * 0.4) for i in (-1, 0, 1) for j in range(-3, 4)]
+            parts.append(("rust", posts(rods, top, top + 2.2, 0.06)))
+        else:
+            head = [(1.7, top - 1.6), (2.9, top - 0.3), (2.9, top)]
+            shaft += [*((y + v, z) for v, z in head), *((y - v, z) for v, z in head[::-1])]
+        parts.append((concrete, across_x(shaft, x - 0.9, x + 0.9)))
+        site.add(None, "bridge_pier", parts)
+        site.occupy(rectangle(x - 2.7, y - 3.9, x + 2.7, y + 3.9), foot - 2.0, foot + 1.2)
+        site.occupy(rectangle(x - 1.1, y - 2.2, x + 1.1, y + 2.2), foot, top)
+
+
+@site_builder
+def falsework(
+    site: Site, *, box: tuple[Number, Number, Number, Number], top_m: Number,
+    towers: tuple[list[Number], list[Number]], beams: list[Number], extra: Bodies = [],  # noqa: B006
+) -> None:  # fmt: skip
+    """Carry a platform on trestles that stand on the ground, every x with every y, and on beams (y) along x."""
+    x0, y0, x1, y1 = box
+    parts: Parts = []
+    for x in towers[0]:
+        for y in towers[1]:
+            foot = site.ground_z(x, y) - 0.1
+            parts.append(("marking_yellow:#d9a32a", trestle(x, y, foot, top_m - 0.7, 0.8, 0.12)))
+            site.occupy(rectangle(x - 1, y - 1, x + 1, y + 1), foot - 0.5, top_m - 0.8)
+    parts += [("steel", block(x0, y - 0.2, x1, y + 0.2, top_m - 0.7, top_m - 0.3)) for y in beams]
+    parts += [("planks:#c8a468", block(*box, top_m - 0.3, top_m)), *extra]
+    site.add(None, "falsework", [*parts, *guard_rails(rim(rectangle(x0, y0, x1, y1)), top_m, toe="planks")])
 
 
 def _circle(x: float, z: float, radius: float) -> BaseGeometry:
