@@ -1,4 +1,4 @@
-"""Arithmetic in asset files: ``"body_h*0.5+0.1"`` over a prop's parameters."""
+"""Arithmetic in asset files: ``"body_h*0.5+0.1"`` over a prop's parameters, or over arrays of numbers."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import ShapeError
 
+Floats = NDArray[np.float64]
+
 _LONGEST = 200
-_BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
+_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -19,7 +25,7 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
 }
-_UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+_UNARY: dict[type[ast.unaryop], Callable[[Any], Any]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 
 
 def _round(value: float, digits: float = 0) -> float:
@@ -31,8 +37,24 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
     "tan": lambda d: math.tan(math.radians(d)), "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
 }  # fmt: skip
+
+
+def eased(t: Floats | float, start: Floats | float, end: Floats | float) -> Floats:
+    """Climb smoothly from 0 at `start` to 1 at `end`: numbers, or arrays of one shape."""
+    u = np.clip((np.asarray(t, dtype=np.float64) - start) / (end - start), 0.0, 1.0)
+    return np.asarray(u * u * (3.0 - 2.0 * u))
+
+
+_OF_ARRAYS: dict[str, Callable[..., Any]] = {
+    "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt, "exp": np.exp, "pow": np.power,
+    "hypot": np.hypot, "clip": np.clip, "eased": eased, "choose": lambda t, a, b: np.where(t > 0.0, a, b),
+    "sin": lambda d: np.sin(np.radians(d)), "cos": lambda d: np.cos(np.radians(d)),
+    "atan2": lambda y, x: np.degrees(np.arctan2(y, x)),
+}  # fmt: skip
 # Minimum and maximum number of arguments, where it is not one.
 _ARITY = {"min": (2, 99), "max": (2, 99), "round": (1, 2), "atan2": (2, 2)}
+_ARITY_OF_ARRAYS = {"clip": 3, "eased": 3, "choose": 3} | dict.fromkeys(("min", "max", "pow", "hypot", "atan2"), 2)
+_ALL_ARITIES = {name: _ARITY.get(name, (1, 1)) for name in _FUNCTIONS}
 _CONSTANTS = {"pi": math.pi}
 
 
@@ -44,6 +66,23 @@ def names_in(text: str) -> frozenset[str]:
     return _parse(text)[1]
 
 
+def evaluate_arrays(text: str, names: Mapping[str, Floats | float]) -> Floats:
+    """Compute an expression over arrays of one shape, with their own functions.
+
+    Among them are ``exp``, ``pow``, ``hypot``, ``clip(t, low, high)``, ``eased(t, start, end)``, which climbs from
+    0 to 1, and ``choose(t, a, b)``: a where t is positive, else b.
+    """
+    tree, used = _parse(text, arrays=True)
+    unknown = sorted(used - names.keys())
+    if unknown:
+        raise ShapeError(f"{text!r} speaks of the unknown name {unknown[0]!r}")
+    with np.errstate(all="ignore"):
+        value = np.asarray(_value(tree, names, _OF_ARRAYS), dtype=np.float64)
+    if not np.isfinite(value).all():
+        raise ShapeError(f"{text!r} gives numbers that are not finite")
+    return value
+
+
 def evaluate(text: str, names: Mapping[str, float]) -> float:
     """Compute an expression; `ShapeError` for what `names_in` refuses, an unknown name or no finite result."""
     tree, used = _parse(text)
@@ -51,7 +90,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
     if unknown:
         raise ShapeError(f"{text!r} speaks of the unknown parameter {unknown[0]!r}")
     try:
-        value = float(_value(tree, names))
+        value = float(_value(tree, names, _FUNCTIONS))
     except (ArithmeticError, ValueError) as error:
         raise ShapeError(f"{text!r}: {error}") from error
     if not math.isfinite(value):
@@ -60,7 +99,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _parse(text: str) -> tuple[ast.expr, frozenset[str]]:
+def _parse(text: str, arrays: bool = False) -> tuple[ast.expr, frozenset[str]]:
     if len(text) > _LONGEST:
         raise ShapeError(f"{text[:40] + '...'!r} has {len(text):,} characters, an expression {_LONGEST} at most")
     try:
@@ -68,11 +107,12 @@ def _parse(text: str) -> tuple[ast.expr, frozenset[str]]:
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ShapeError(f"{text!r} is no arithmetic expression") from error
     used: set[str] = set()
-    _check(tree, text, used)
+    arity = {name: (_ARITY_OF_ARRAYS.get(name, 1),) * 2 for name in _OF_ARRAYS} if arrays else _ALL_ARITIES
+    _check(tree, text, used, arity)
     return tree, frozenset(used)
 
 
-def _check(node: ast.expr, text: str, used: set[str]) -> None:
+def _check(node: ast.expr, text: str, used: set[str], arities: Mapping[str, tuple[int, int]]) -> None:
     match node:
         case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
             return
@@ -80,30 +120,30 @@ def _check(node: ast.expr, text: str, used: set[str]) -> None:
             if name not in _CONSTANTS:
                 used.add(name)
         case ast.BinOp() if type(node.op) in _BINARY:
-            _check(node.left, text, used)
-            _check(node.right, text, used)
+            _check(node.left, text, used, arities)
+            _check(node.right, text, used, arities)
         case ast.UnaryOp() if type(node.op) in _UNARY:
-            _check(node.operand, text, used)
-        case ast.Call(func=ast.Name(id=name), keywords=[]) if name in _FUNCTIONS:
-            least, most = _ARITY.get(name, (1, 1))
+            _check(node.operand, text, used, arities)
+        case ast.Call(func=ast.Name(id=name), keywords=[]) if name in arities:
+            least, most = arities[name]
             if not least <= len(node.args) <= most:
                 raise ShapeError(f"{text!r}: {name} does not take {len(node.args)} arguments")
             for argument in node.args:
-                _check(argument, text, used)
+                _check(argument, text, used, arities)
         case _:
             raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")
 
 
-def _value(node: ast.expr, names: Mapping[str, float]) -> float:
+def _value(node: ast.expr, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
     match node:
         case ast.Constant(value=int() | float() as number):
             return number
         case ast.Name(id=name):
             return names[name] if name in names else _CONSTANTS[name]
         case ast.BinOp():
-            return _BINARY[type(node.op)](_value(node.left, names), _value(node.right, names))
+            return _BINARY[type(node.op)](_value(node.left, names, functions), _value(node.right, names, functions))
         case ast.UnaryOp():
-            return _UNARY[type(node.op)](_value(node.operand, names))
+            return _UNARY[type(node.op)](_value(node.operand, names, functions))
         case ast.Call(func=ast.Name(id=name)):
-            return _FUNCTIONS[name](*(_value(a, names) for a in node.args))
+            return functions[name](*(_value(a, names, functions) for a in node.args))
     raise ShapeError(f"{ast.unparse(node)!r} is not allowed")

@@ -6,9 +6,12 @@ import shapely
 from support import layout_checks as look
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.layouts.natural.parts.quays import flight, groyne, pier, retaining_wall
-from aerialdojo_gen.scenes.layouts.natural.parts.shore import inland_m, ragged, rise, shaped, steep_area
+from aerialdojo_gen.scenes.expressions import eased
+from aerialdojo_gen.scenes.kit.landforms import ground_by_formula, inland_m
+from aerialdojo_gen.scenes.kit.natural_ground import ragged_outline
+from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
+from aerialdojo_gen.scenes.kit.shores import steep_area
+from aerialdojo_gen.scenes.kit.structures import flights
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 
@@ -36,24 +39,27 @@ def blank() -> Site:
 
 
 def test_coastlines_are_natural_and_always_the_same():
-    coarse = [(-20, -20), (20, -20), (20, 20), (-20, 20)]
-    line = ragged(coarse, 5, 1.5)
-    assert line.equals(ragged(coarse, 5, 1.5))
-    assert not line.equals(ragged(coarse, 6, 1.5))
+    coarse = shapely.box(-20, -20, 20, 20)
+    line = ragged_outline(coarse.exterior, 5, 1.5, 3.0)
+    assert line.equals(ragged_outline(coarse.exterior, 5, 1.5, 3.0))
+    assert not line.equals(ragged_outline(coarse.exterior, 6, 1.5, 3.0))
     assert line.is_valid
     assert line.area == pytest.approx(1600, rel=0.15)
-    assert 0.5 < shapely.hausdorff_distance(line.boundary, shapely.Polygon(coarse).boundary) < 6.0
+    assert 0.5 < shapely.hausdorff_distance(line.boundary, coarse.boundary) < 6.0
 
 
 def test_inland_is_positive_on_the_land_and_negative_at_sea():
     land = shapely.box(-10, -10, 10, 10)
     away = inland_m(land, np.array([0.0, 9.0, 13.0]), np.zeros(3))
     assert away == pytest.approx([10.0, 1.0, -3.0])
-    assert rise(np.array([-1.0, 0.5, 3.0]), 0.0, 1.0) == pytest.approx([0.0, 0.5, 1.0])
+    assert eased(np.array([-1.0, 0.5, 3.0]), 0.0, 1.0) == pytest.approx([0.0, 0.5, 1.0])
 
 
 def test_steep_ground_is_found():
-    terrain = shaped(blank(), 2.0, 20.0, lambda x, _y, _n: np.where(x > 0.0, 8.0, 0.0))
+    site = blank()
+    terrain = ground_by_formula(
+        site, site.terrain, cell_m=2.0, height=lambda arrays: np.where(arrays["x"] > 0.0, 8.0, 0.0)
+    )
     steep = steep_area(terrain, 40.0)
     assert steep.contains(shapely.Point(1.0, 0.0))
     assert not steep.intersects(shapely.box(6.0, -20.0, 25.0, 20.0))
@@ -61,7 +67,7 @@ def test_steep_ground_is_found():
 
 def test_piers_bear_above_and_are_open_below():
     site = blank()
-    pier(site, Frame(-15.0, 0.0, 0.0), 30.0, 5.0, 4.0, bay_m=5.0)
+    pier(site, at=(-15.0, 0.0), yaw_deg=0.0, length_m=30.0, width_m=5.0, z=4.0, bay_m=5.0, rail="iron")
     cast = RayCaster(site.scene())
     down, along = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0]])
     for x in (-12.0, 0.3, 14.0):
@@ -73,9 +79,9 @@ def test_piers_bear_above_and_are_open_below():
 
 def test_walls_groynes_and_steps_bar_the_way():
     site = blank()
-    retaining_wall(site, -10.0, 10.0, 4.0, 5.5, 0.0, 3.0)
-    groyne(site, [(0.0, -12.0), (0.0, 2.0)], 1.8)
-    flight(site, (6.0, -4.0), 90.0, 2.0, 0.0, 3.0, 7.0)
+    sea_wall(site, box=(-10.0, 4.0, 10.0, 5.5), z=(0.0, 3.0))
+    groynes(site, lines=[[(0.0, -12.0), (0.0, 2.0)]], height_m=1.8)
+    flights(site, feet=[(6.0, -4.0)], yaw_deg=90.0, width_m=2.0, run_m=7.0, on=0.0, to_m=3.0)
     cast = RayCaster(site.scene())
     origins = np.array([[-5.0, -3.0, 1.5], [-3.0, -5.0, 1.2], [6.0, -1.0, 8.0]])
     ways = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -250,6 +250,29 @@ def test_an_area_is_made_of_another(catalogue):
     assert names.area({"box": [-1, 1, 2, 9], "within": "yard"}).equals(rectangle(0, 1, 2, 2))
 
 
+def test_areas_lie_around_points_and_lines_and_have_ragged_outlines(catalogue):
+    names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 40, 20)})
+    assert names.area({"around": [3, 4], "width_m": 6}).equals(Point(3, 4).buffer(3))
+    assert names.area({"around": [[0, 0], [8, 0]], "width_m": 2}).bounds == pytest.approx((-1, -1, 9, 1))
+    ragged = names.area({"area": "yard", "ragged": [1, 5, 2]})
+    assert 700 < ragged.area < 900
+    assert len(ragged.exterior.coords) > 60
+
+
+def test_ground_has_the_heights_of_a_formula(tmp_path, catalogue):
+    step = {
+        "make": "ground_by_formula", "cell_m": 1, "inland": {"inland": [-10, -10, 10, 10]},
+        "let": {"mound": "top*eased(inland, 0, 5)"}, "height": "choose(inland, max(mound, 0.5), 0)",
+    }  # fmt: skip
+    plan = {
+        **HEAD, "floor_m": {"top": 4}, "placing": {"settle_m": 0.5}, "ground": {"steps": [step]},
+        "site": [{"place": [["bench", 0, 0], ["bench", 15, 0], ["bench", 5, 0, 0, 7]]}],
+    }  # fmt: skip
+    ground, *benches = build(tmp_path, catalogue, plan).instances
+    assert [bench.bounds[0, 2] for bench in benches] == pytest.approx([4, 0, 7], abs=0.01)
+    assert ground.bounds[:, 2] == pytest.approx((0, 4), abs=0.05)
+
+
 def test_the_plan_of_the_contributors_page_is_built(tmp_path, catalogue):
     text = (ASSETS.parent / "CONTRIBUTING.md").read_text().partition("```toml\n#:schema")[2].partition("```")[0]
     (tmp_path / "U_Farm_0.toml").write_text(text.partition("\n")[2])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
-from aerialdojo_gen.scenes.expressions import evaluate, names_in
+from aerialdojo_gen.scenes.expressions import evaluate, evaluate_arrays, names_in
 from aerialdojo_gen.scenes.materials import TEXTURES, make_texture
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, to_part, translated
 from aerialdojo_gen.scenes.textures_natural import NATURAL
@@ -282,6 +282,27 @@ def test_expressions_compute_what_python_computes(text, a, b):
 def test_expressions_are_arithmetic_only(text):
     with pytest.raises(ValueError, match="is no arithmetic expression"):
         names_in(text)
+
+
+@given(expression, st.lists(st.floats(-5, 5), min_size=1, max_size=4))
+def test_expressions_over_arrays_compute_what_they_do_of_each_number(text, values):
+    try:
+        expected = [evaluate(text, {"a": a, "b_1": 2.0}) for a in values]
+    except ValueError:
+        return
+    arrays = {"a": np.array(values), "b_1": 2.0}
+    assert np.broadcast_to(evaluate_arrays(text, arrays), len(values)).tolist() == pytest.approx(expected)
+
+
+def test_expressions_over_arrays_have_functions_of_their_own():
+    arrays = {"t": np.array([-1.0, 0.5, 3.0])}
+    assert evaluate_arrays("choose(t, clip(t, 0, 1), eased(t, -2, 0))", arrays).tolist() == [0.5, 0.5, 1.0]
+    with pytest.raises(ValueError, match="not finite"):
+        evaluate_arrays("1/(t - t)", arrays)
+    with pytest.raises(ValueError, match="unknown name 'u'"):
+        evaluate_arrays("t + u", arrays)
+    with pytest.raises(ValueError, match="is no arithmetic expression"):
+        evaluate_arrays("floor(t)", arrays)
 
 
 def test_division_by_zero_and_unknown_names_are_said():

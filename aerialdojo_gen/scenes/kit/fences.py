@@ -8,16 +8,18 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
+from shapely.geometry import LineString
 from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_scatter import place_along, slab
+from aerialdojo_gen.scenes.grammar_scatter import along, place_along, slab
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
-from aerialdojo_gen.scenes.mesh import merge
+from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
+from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -116,3 +118,38 @@ def fence_panels(
         )
         for panel in panels if margin_m else ():
             keep_clear(site, panel, margin_m)
+
+
+@site_builder
+def palings(
+    site: Site, *, lines: list[Line], height_m: Number = 1.1, material: Material = "wood:#b39d7c",
+    category: str = "sand_fence",
+) -> None:  # fmt: skip
+    """Put up palings over uneven ground, as dunes have them: slender pales, two wires, and posts."""
+    for line in lines:
+        pales = []
+        for x, y, yaw in along(line, 0.32):
+            pale = rotated(box(size=(0.05, 0.09, height_m)), rotation(0.0, 0.0, yaw + 90.0))
+            pales.append(translated(pale, (x, y, site.ground_z(x, y) - 0.1)))
+        poses = along(line, 1.6)
+        wires = [sweep(path=[(p.x, p.y, site.ground_z(p.x, p.y) + h) for p in poses], radius=0.02, sides=3)
+                 for h in (0.25, 0.8)]  # fmt: skip
+        posts = [
+            translated(cylinder(radius=0.06, height=height_m + 0.4, segments=6),
+                       (p.x, p.y, site.ground_z(p.x, p.y) - 0.3))
+            for p in poses[::2]
+        ]  # fmt: skip
+        area = LineString(line).buffer(0.2, cap_style="flat")
+        site.add(None, category, [(material, merge([*pales, *wires, *posts]))], footprint=area)
+
+
+@site_builder
+def field_walls(
+    site: Site, *, lines: list[Line], height_m: Number = 1.1, material: Material = "blocks:#938c80"
+) -> None:
+    """Put up dry stone walls over uneven ground."""
+    for line in lines:
+        path = [(p.x, p.y, site.ground_z(p.x, p.y) + height_m / 2 - 0.25) for p in along(line, 2.0)]
+        body = sweep(path=path, section=(0.55, height_m + 0.5))
+        area = LineString(line).buffer(0.35, cap_style="flat")
+        site.add(None, "stone_wall", [(material, body)], footprint=area)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from aerialdojo_gen.scenes.grammar_buildings import building
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
@@ -59,6 +60,21 @@ def flats(
         extra=[*frame.parts(sign), *frame.parts(_balconies(size_m[0], d, storeys, band))],
     )  # fmt: skip
     return top
+
+
+@part_builder
+def long_balconies(
+    *, x0: Number, x1: Number, y: Number, z: list[Number], depth_m: Number = 1.1,
+    bays: Annotated[int, Field(ge=1, le=100)] = 8, floor: Material = "concrete:#efece4", rail: Material = "iron",
+) -> Parts:  # fmt: skip
+    """Make balconies along a front that looks to -y, at heights: a slab, and a rail on a post at each bay's end."""
+    floors, rails, edge = [], [], y - depth_m
+    for level in z:
+        floors.append(block(x0, edge, x1, y, level, level + 0.15))
+        rails.append(block(x0, edge, x1, edge + 0.06, level + 0.95, level + 1.05))
+        for x in np.arange(x0, x1 + 0.1, (x1 - x0) / bays):
+            rails.append(block(float(x) - 0.02, edge, float(x) + 0.03, edge + 0.06, level + 0.15, level + 0.95))
+    return [(floor, merge(floors)), (rail, merge(rails))]
 
 
 def _balconies(length_m: float, d: float, storeys: int, band: str) -> Parts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
@@ -16,13 +16,16 @@ from aerialdojo_gen.scenes.site import Site
 
 @site_builder
 def house_row(
-    site: Site, *, at: list[At], yaw_deg: Number, style: HouseStyle, on: Number | None = None,
-    walls: tuple[Material, ...] = (), roofs: tuple[Material, ...] = (), doors: tuple[Material, ...] = (),
-    storeys: tuple[int, ...] = (), chimneys: tuple[bool, ...] = (),
+    site: Site, *, at: list[At], yaw_deg: Number = 0.0, style: HouseStyle, on: Number | None = None,
+    yaws_deg: tuple[Number, ...] = (), walls: tuple[Material, ...] = (), roofs: tuple[Material, ...] = (),
+    doors: tuple[Material, ...] = (), storeys: tuple[int, ...] = (), chimneys: tuple[bool, ...] = (),
+    roof_kinds: tuple[Literal["gable", "hip"], ...] = (),
 ) -> None:  # fmt: skip
-    """Put up houses of a style; each takes the next of the walls, roofs, doors, storeys and chimneys, in turn."""
-    varied = {"wall": walls, "roof": roofs, "door": doors, "storeys": storeys, "chimney": chimneys}
+    """Put up houses of a style; each takes the next of the directions, walls, roofs, doors and so on, in turn."""
+    varied = {"wall": walls, "roof": roofs, "door": doors, "storeys": storeys, "chimney": chimneys,
+              "roof_kind": roof_kinds}  # fmt: skip
     for k, point in enumerate(at):
+        yaw_deg = yaws_deg[k % len(yaws_deg)] if yaws_deg else yaw_deg
         own: dict[str, Any] = {key: values[k % len(values)] for key, values in varied.items() if values}
         house(site, Frame(*point, yaw_deg), replace(style, **own), z=on)
 

@@ -8,10 +8,11 @@ from typing import Annotated, Literal
 import numpy as np
 import shapely
 from pydantic import Field
+from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
@@ -77,6 +78,34 @@ def bank_about(
     away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
     t, fade = smooth((away - start_m) / (end_m - start_m)), (grid(terrain)[0] - fade_x[0]) / (fade_x[1] - fade_x[0])
     return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t * smooth(fade)))
+
+
+@ground_builder
+def ground_by_formula(
+    site: Site, terrain: Terrain, *, height: Formula, let: dict[str, Formula] = {}, inland: dict[str, Area] = {},  # noqa: B006
+    noise_m: Annotated[Number, Field(gt=0)] = 20.0, cell_m: Annotated[Number, Field(ge=0.5)] | None = None,
+) -> Terrain:  # fmt: skip
+    """Shape the ground by a formula over x and y, the height z so far, and noise of a wavelength, from -1 to 1.
+
+    `inland` names distances to the borders of areas, positive inside; `let` names formulas for those after them. With
+    `cell_m` the ground begins anew, level, with cells of that size.
+    """
+    cell_m = terrain.cell_m if cell_m is None else cell_m
+    waves = rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, 1.0, noise_m, octaves=3)
+    x, y, noise = waves.corners().T
+    arrays = {"x": x, "y": y, "noise": noise, "z": np.asarray(terrain.z(x, y))}
+    arrays |= {name: inland_m(area, x, y) for name, area in inland.items()}
+    for name, formula in let.items():
+        arrays[name] = formula(arrays)
+    shape = waves.heights_m.shape
+    return replace(waves, heights_m=np.array(np.broadcast_to(height(arrays), x.shape).reshape(shape)))
+
+
+def inland_m(land: BaseGeometry, x: Floats, y: Floats) -> Floats:
+    """Distance from an area's border at points, metres: positive inside, negative outside."""
+    shapely.prepare(land)
+    away = np.asarray(shapely.distance(land.boundary, shapely.points(x, y)), dtype=np.float64)
+    return np.where(shapely.contains_xy(land, x, y), away, -away)
 
 
 @ground_builder

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from shapely.geometry import Polygon
+import shapely
+from shapely.geometry import LinearRing, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.model import Instance
@@ -118,3 +119,19 @@ def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, c
     wave = np.array([noise.noise2(1.3 * float(np.cos(a)), 1.3 * float(np.sin(a))) for a in angles])
     r = radius_m * (1.0 + ragged * wave / 0.6)
     return Polygon(np.column_stack([x + r * np.cos(angles), y + r * np.sin(angles)]))
+
+
+def ragged_outline(ring: LinearRing, seed: int, amplitude_m: float, step_m: float) -> Polygon:
+    """Make a natural outline from a coarse one: resampled every `step_m` and pushed in and out by noise, metres."""
+    count = int(ring.length / step_m)
+    at = shapely.get_coordinates([ring.interpolate(k / count, normalized=True) for k in range(count)])
+    before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
+    along = after - before
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    noise, angles = OpenSimplex(seed=seed), np.arange(count) / count * 2 * np.pi
+    bends = ring.length / (2 * np.pi * 14.0)
+    wave = [noise.noise2(bends * float(np.cos(t)), bends * float(np.sin(t))) for t in angles]
+    out = at + amplitude_m * 1.5 * np.asarray(wave)[:, None] * np.column_stack([along[:, 1], -along[:, 0]])
+    outline = Polygon(out).buffer(0)
+    smooth = outline.buffer(1.5, quad_segs=3).buffer(-3.0, quad_segs=3).buffer(1.5, quad_segs=3)
+    return smooth if isinstance(smooth, Polygon) else max(smooth.geoms, key=lambda g: g.area)

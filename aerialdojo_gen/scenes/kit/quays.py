@@ -1,20 +1,26 @@
-"""What stands at the water's edge: quays over water at z = 0, fenders, mooring lines, breakwaters, jetties.
+"""What stands at the water's edge, at z = 0: quays, fenders, mooring lines, breakwaters, jetties, piers, sea walls.
 
 The water is the ground itself, level at z = 0; quays are painted with a rise, so that their walls stand upright.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated
+
 import numpy as np
+from pydantic import Field
 from shapely.geometry import LineString
 
+from aerialdojo_gen.scenes import shapes
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import ribbon
+from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, block, columns
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, crown, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -113,3 +119,140 @@ def jetties(
         ]
         frame = Frame(x0, y0, float(np.degrees(np.arctan2(y1 - y0, x1 - x0))))
         site.add(None, "jetty", frame.parts(local))
+
+
+@site_builder
+def mole(
+    site: Site, *, path: Line, width_m: Number, z: Number, stone: Material = "blocks:#9a9488",
+    way: Material = "paving:#a59c8c",
+) -> None:  # fmt: skip
+    """Build a solid breakwater of masonry along a path, its way at `z`, with a parapet on its left side."""
+    line = LineString(path)
+    body = line.buffer(width_m / 2, cap_style="flat", join_style="mitre")
+    parapet = line.offset_curve(width_m / 2 - 0.3).buffer(0.3, cap_style="flat", join_style="mitre")
+    parts: Parts = [
+        (stone, slab(body, -1.0, z - 0.2)),
+        (way, slab(body.buffer(0.08, join_style="mitre"), z - 0.2, z)),
+        (stone, slab(parapet, z, z + 0.9)),
+    ]
+    site.add(None, "breakwater", parts, footprint=body)
+
+
+@site_builder
+def pier(
+    site: Site, *, at: At, yaw_deg: Number, length_m: Number, width_m: Number, z: Number,
+    bay_m: Annotated[Number, Field(ge=0.5)] = 5.0, floor: Material = "boards:#9a8462",
+    pile: Material = "logs:#6f5a44", rail: Material | None = None,
+    gates: list[tuple[Number, Number]] = [], category: str = "pier",  # noqa: B006
+) -> None:  # fmt: skip
+    """Build a pier on rows of piles that one can fly between; its ground stays free.
+
+    It runs from `at`, the middle of its landward end, along `yaw_deg`, its floor at `z`; `gates` are the stretches,
+    metres from there, where the rails at its sides are open.
+    """
+    frame, w = Frame(*at, yaw_deg), width_m / 2
+    parts: Parts = [(floor, translated(box(size=(length_m, width_m, 0.14)), (length_m / 2, 0.0, z - 0.14)))]
+    wood: list[Mesh] = [
+        translated(box(size=(length_m, 0.22, 0.3)), (length_m / 2, v, z - 0.44)) for v in (-w + 0.2, 0.0, w - 0.2)
+    ]
+    count = max(round((length_m - 0.8) / bay_m), 1)
+    for k in range(count + 1):
+        u = 0.4 + (length_m - 0.8) * k / count
+        ground = site.ground_z(*frame.at(u, 0.0))
+        foot = min(ground, 0.0) - 1.0
+        for v in (-w + 0.3, w - 0.3):
+            wood.append(translated(cylinder(radius=0.17, height=z - 0.2 - foot, segments=8), (u, v, foot)))
+        wood.append(translated(box(size=(0.24, width_m, 0.26)), (u, 0.0, z - 0.68)))
+        if z - ground > 2.4:
+            for s in (-1, 1):
+                brace = [(u, s * (w - 0.3), ground + 0.4), (u, -s * (w - 0.3), z - 0.7)]
+                wood.append(sweep(path=brace, radius=0.07, sides=4))
+    parts.append((pile, merge(wood)))
+    if rail:
+        for side in (-w + 0.08, w - 0.08):
+            for u0, u1 in _gaps(0.0, length_m, gates):
+                parts += bars([(u0, side), (u1, side)], z, rail)
+    site.add(None, category, frame.parts(parts))
+
+
+@site_builder
+def bar_railing(
+    site: Site, *, line: Line, on: Number | None = None, height_m: Number = 1.0, material: Material = "#f1f0ea",
+    sunk_m: Number = 0.0,
+) -> None:  # fmt: skip
+    """Put up a level railing of bars along a line, at a height or on the line's lowest ground."""
+    z = min(site.ground_z(x, y) for x, y in line) if on is None else on
+    site.add(None, "railing", bars(line, z - sunk_m, material, height_m))
+
+
+def bars(path: Sequence[Point], z_m: float, material: str = "#f1f0ea", height_m: float = 1.0) -> Parts:
+    """Make an open railing of posts every 2 m and three bars along a path on a floor at `z_m`."""
+    bodies: list[Mesh] = []
+    for a, b in pairwise(path):
+        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+        for share, thick in ((0.35, 0.04), (0.68, 0.04), (1.0, 0.09)):
+            bar = rotated(box(size=(length, thick, thick)), turn)
+            bodies.append(translated(bar, (*middle, z_m + share * height_m - thick)))
+        count = max(round(length / 2.0), 1)
+        for k in range(count + 1):
+            t = k / count
+            at = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, z_m)
+            bodies.append(translated(rotated(box(size=(0.08, 0.08, height_m)), turn), at))
+    return [(material, merge(bodies))]
+
+
+@site_builder
+def sea_wall(
+    site: Site, *, box: tuple[Number, Number, Number, Number], z: tuple[Number, Number],
+    wall: Material = "blocks:#a79f92", cap: Material = "concrete", rail: Material | None = "#e8ecec",
+    gates: list[tuple[Number, Number]] = [],  # noqa: B006
+) -> None:  # fmt: skip
+    """Put up a wall along x that holds a terrace and looks to -y: body, coping, buttresses, a railing along its edge.
+
+    `gates` are stretches along x without railing, where steps arrive.
+    """
+    (x0, y0, x1, y1), (low, high) = box, z
+    parts: Parts = [
+        (wall, slab(rectangle(x0, y0, x1, y1), low, high - 0.25)),
+        (cap, slab(rectangle(x0 - 0.02, y0 - 0.15, x1 + 0.02, y1), high - 0.25, high + 0.04)),
+    ]
+    for x in np.arange(x0 + 4.0, x1 - 1.0, 8.0):
+        foot = shapes.box(size=(0.7, 0.5, high - low - 0.3), taper=(1.0, 0.5))
+        parts.append((wall, translated(foot, (float(x), y0 - 0.1, low))))
+    if rail:
+        for a, b in _gaps(x0, x1, gates):
+            parts += bars([(a, y0 + 0.1), (b, y0 + 0.1)], high + 0.04, rail, 1.0)
+    site.add(None, "sea_wall", parts, footprint=rectangle(x0, y0 - 0.4, x1, y1))
+
+
+@site_builder
+def groynes(
+    site: Site, *, lines: list[Line], height_m: Number, material: Material = "planks:#6f5d47",
+    post: Material = "logs:#5d4c3a",
+) -> None:  # fmt: skip
+    """Put up timber groynes along lines: close planks between posts that follow the beach's fall."""
+    for path in lines:
+        line = LineString(path)
+        count = max(round(line.length / 2.5), 1)
+        points = [line.interpolate(k / count, normalized=True) for k in range(count + 1)]
+        xyz = [(p.x, p.y, max(site.ground_z(p.x, p.y), 0.0)) for p in points]
+        planks = sweep(path=[(x, y, z + height_m / 2 - 0.3) for x, y, z in xyz], section=(0.14, height_m + 0.2))
+        posts = [
+            translated(cylinder(radius=0.16, height=height_m + 1.1, segments=8), (x, y, z - 0.8)) for x, y, z in xyz
+        ]
+        area = line.buffer(0.3, cap_style="flat")
+        site.add(None, "groyne", [(material, planks), (post, merge(posts))], footprint=area)
+
+
+def _gaps(start: float, end: float, gates: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """List the stretches between gates."""
+    out, at = [], start
+    for a, b in sorted(gates):
+        if a - at > 0.3:
+            out.append((at, a))
+        at = max(at, b)
+    if end - at > 0.3:
+        out.append((at, end))
+    return out

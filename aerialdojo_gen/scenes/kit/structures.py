@@ -14,14 +14,16 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit import part_builder
+from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.lettering import text
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
+from aerialdojo_gen.scenes.site import Site
 
 Parts = list[tuple[str, Mesh]]
 Point = tuple[float, float]
@@ -123,6 +125,19 @@ def stairs(
         side += [translated(box(size=[0.06, 0.06, 1.0]), (at[0], s * (width_m / 2 + 0.05), at[1])) for s in (-1, 1)]
     turn = rotation(0.0, 0.0, yaw_deg)
     return [(m, _posed(merge(b), turn, (*foot, z_m))) for m, b in ((tread, treads), (stringer, side))]
+
+
+@site_builder
+def flights(
+    site: Site, *, feet: list[At], yaw_deg: Number, width_m: Number, run_m: Number, to_m: Number,
+    on: Number | None = None, tread: Material = "concrete", stringer: Material = "iron",
+) -> None:  # fmt: skip
+    """Put up flights of open steps that climb from each foot along `yaw_deg`, from `on` or the ground."""
+    plan = rectangle(0.0, -width_m / 2 - 0.1, run_m, width_m / 2 + 0.1)
+    for foot in feet:
+        z = site.ground_z(*foot) - 0.1 if on is None else on
+        parts = stairs(foot, yaw_deg, width_m, to_m - z, run_m, z_m=z, tread=tread, stringer=stringer)
+        site.add(None, "steps", parts, footprint=Frame(*foot, yaw_deg).area(plan))
 
 
 @part_builder

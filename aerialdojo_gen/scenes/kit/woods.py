@@ -6,13 +6,17 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+import shapely
 from pydantic import Field
+from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import downhill_deg, settled_z
+from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
 from aerialdojo_gen.scenes.plans.fields import ScalarField
 from aerialdojo_gen.scenes.plans.values import Area, Material, Number
+from aerialdojo_gen.scenes.shapes import crown, cylinder
 from aerialdojo_gen.scenes.site import Site
 
 # Where not even a stem has room, nothing need be grown to find that out.
@@ -108,3 +112,33 @@ def undergrowth(
     """Strew several things over an area, a kind after the other."""
     for kind in kinds:
         strew(site, area=area, density=density, place=place, **vars(kind))
+
+
+@site_builder
+def broadleaves(
+    site: Site, *, area: Area, spacing_m: Annotated[Number, Field(ge=0.5)],
+    limit: Annotated[int, Field(ge=1, le=2000)], height_m: tuple[Number, Number],
+    density: ScalarField | None = None, leaves: Material = "foliage:#4a7a32",
+) -> None:  # fmt: skip
+    """Grow round-crowned trees where there is room, as one structure: background that nothing refers to."""
+    rng = site.rng_for("broadleaves", round(area.area, 2))
+    stems: list[Mesh] = []
+    crowns: list[Mesh] = []
+    plans: list[BaseGeometry] = []
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density.on(site) if density else None, 3 * limit):
+        high = float(rng.uniform(*height_m))
+        if len(stems) >= limit or not site.is_free(x, y, 0.18 * high):
+            continue
+        z, reach = site.ground_z(x, y), 0.3 * high
+        stem = cylinder(radius=0.035 * high, radius_top=0.02 * high, height=0.62 * high + 0.4, segments=7)
+        stems.append(translated(stem, (x, y, z - 0.4)))
+        for k, (out, share, up) in enumerate(((0.0, 1.0, 0.72), (0.75, 0.7, 0.6), (0.75, 0.6, 0.66))):
+            turn = np.radians(yaw + 170.0 * k)
+            at = (x + out * reach * float(np.cos(turn)), y + out * reach * float(np.sin(turn)), z + up * high)
+            size = [share * reach, share * reach, share * reach * 0.8]
+            body = crown(radii=size, noise=0.25, subdivisions=1, seed=int(rng.integers(1, 40)))
+            crowns.append(translated(body, at))
+        plans.append(shapely.Point(x, y).buffer(0.5, quad_segs=2))
+    if stems:
+        parts = [("bark", merge(stems)), (leaves, merge(crowns))]
+        site.add(None, "broadleaf_trees", parts, footprint=shapely.union_all(plans))

@@ -95,9 +95,11 @@ class _Building:
     def __init__(self, site: Site, names: PlanNames, where: str) -> None:
         self._site, self._names, self._where = site, names, where
         names.make_parts = self._all_parts
+        self._placing: Mapping[str, Any] = {}
 
     def build(self, head: PlanHead) -> dict[str, int]:
         """Make the ground and then every entry, in order; returns the entry of each node."""
+        self._placing = head.placing
         self._footings(head.site)
         self._ground(head.ground)
         made: dict[str, int] = {}
@@ -202,7 +204,7 @@ class _Building:
             raise AssetError(f"{where} ({shape}): {error}") from None
 
     def _place(self, body: dict[str, Any], where: str) -> None:
-        entry = self._read(Place, body, where)
+        entry = self._read(Place, {**self._placing, **body}, where)
         for number, raw in enumerate(entry.place):
             self._stand(self._thing(raw, f"{where}[{number}]"), entry, where)
         if entry.pattern is not None:
@@ -232,13 +234,11 @@ class _Building:
 
     def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
-        z = thing.on
+        z = thing.on if thing.on is not None else entry.on
         if z is None and entry.settle_m is not None:
             z = settled_z(self._site, x, y, entry.settle_m) + entry.above_ground_m
         elif z is None and entry.above_ground_m:
             z = self._site.ground_z(x, y) + entry.above_ground_m
-        elif z is None:
-            z = entry.on
         if entry.sunk is not None:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant, x, y)

@@ -36,6 +36,7 @@ class PlanHead(BaseModel):
     lines: dict[str, Any] = {}
     areas: dict[str, Any] = {}
     fields: dict[str, Any] = {}  # Named numbers that vary over the site; each may be made of those before it
+    placing: dict[str, Any] = {}  # What every `place` entry has that does not say otherwise, e.g. ``margin_m``
     ground: dict[str, Any] = {}
     site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES)] = []
 

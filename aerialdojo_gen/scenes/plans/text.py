@@ -22,7 +22,7 @@ def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-_TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "ground")
+_TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "placing", "ground")
 
 
 def _pair(key: str, value: Any) -> Iterator[str]:
@@ -30,21 +30,29 @@ def _pair(key: str, value: Any) -> Iterator[str]:
 
 
 def _wrapped(start: str, value: Any, indent: str) -> Iterator[str]:
-    """Write a value on one line, or a list over several of as many items as fit."""
-    text = _inline(value)
+    """Write a value on one line, or a list over several of as many items as fit, also one that ends a table."""
+    text, end = _inline(value), "]"
+    last = [*value.values()][-1] if isinstance(value, Mapping) and value else None
+    if len(indent + start + text) > _WIDTH and isinstance(last, list | tuple):
+        start, end, value = start + text.removesuffix(f"{_inline(last)} }}"), "] }", last
     if len(indent + start + text) <= _WIDTH or not isinstance(value, list | tuple):
         yield f"{indent}{start}{text}"
         return
     yield f"{indent}{start}["
     row = ""
     for item in value:
-        text = _inline(item)
-        if row and len(indent) + 2 + len(row) + len(text) + 2 > _WIDTH:
+        first, *others = _wrapped("", item, f"{indent}  ")
+        text = first.lstrip()
+        if row and (others or len(indent) + 2 + len(row) + len(text) + 2 > _WIDTH):
             yield f"{indent}  {row.rstrip()}"
             row = ""
-        row += f"{text}, "
-    yield f"{indent}  {row.rstrip()}"
-    yield f"{indent}]"
+        if others:
+            yield from (first, *others[:-1], f"{others[-1]},")
+        else:
+            row += f"{text}, "
+    if row:
+        yield f"{indent}  {row.rstrip()}"
+    yield f"{indent}{end}"
 
 
 def _inline(value: Any) -> str:

@@ -20,14 +20,15 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
-from aerialdojo_gen.scenes.expressions import evaluate
+from aerialdojo_gen.scenes.expressions import Floats, evaluate, evaluate_arrays
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.grammar_scatter import eased_path, smooth_path
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, ribbon
-from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.natural_ground import blob, ragged_outline
 from aerialdojo_gen.scenes.materials import MaterialLibrary
 
 Point = tuple[float, float]
+ArrayFunction = Callable[[Mapping[str, Floats]], Floats]
 
 # The largest site is 1,000 m across.
 _MAX_M, _MAX_POINTS = 2000.0, 1000
@@ -58,6 +59,11 @@ class PlanNames:
         if abs(value) > _MAX_M:
             raise ValueError(f"must lie within {_MAX_M:,.0f}, got {value:g}")
         return float(value)
+
+    def formula(self, value: Any) -> ArrayFunction:
+        """Resolve a formula over arrays and the plan's heights; it takes the arrays by name."""
+        text = value if isinstance(value, str) else repr(self.number(value))
+        return lambda arrays: evaluate_arrays(text, {**self.heights, **arrays})
 
     def point(self, value: Any) -> Point:
         """Resolve ``[x, y]``, metres."""
@@ -202,6 +208,14 @@ def _outline(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     return shapely.union_all([edge.buffer(names.number(value.get("width_m")) / 2) for edge in edges])
 
 
+def _around(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
+    """Give what lies within half a width of a line or of a point, with round ends."""
+    given = value["around"]
+    single = isinstance(given, list) and len(given) == 2 and not isinstance(given[0], list)
+    middle = shapely.Point(names.point(given)) if single else shapely.LineString(names.line(given))
+    return middle.buffer(names.number(value.get("width_m")) / 2)
+
+
 def _polygon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     points: list[Point] = []
     for one in value["polygon"]:
@@ -251,6 +265,17 @@ def _framed(names: PlanNames, area: BaseGeometry, pose: Any) -> BaseGeometry:
     return names.frame(pose).area(area)
 
 
+def _ragged(names: PlanNames, area: BaseGeometry, given: Any) -> BaseGeometry:
+    """Make the outline natural: ``[metres in and out, seed, metres from point to point]``, of its largest piece."""
+    if not isinstance(given, list) or len(given) != 3:
+        raise ValueError(f"ragged is [metres in and out, seed, metres from point to point], got {given!r}")
+    amplitude_m, seed, step_m = (names.number(one) for one in given)
+    ring = max(polygons_of(area), key=lambda piece: piece.area).exterior
+    if not 8 <= ring.length / max(step_m, _SHORTEST_M) <= _MAX_POINTS:
+        raise ValueError(f"ragged makes from 8 to {_MAX_POINTS:,} points, got one every {step_m:g} m")
+    return ragged_outline(ring, int(seed), amplitude_m, step_m)
+
+
 def _offset(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
     """Grow an area with sharp corners, or shrink it."""
     return area.buffer(names.number(by_m), join_style="mitre")
@@ -262,10 +287,11 @@ def _is_box(value: Sequence[Any]) -> bool:
 
 _AREAS = {
     "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
-    "outline": _outline, "union": _union,
+    "outline": _outline, "around": _around, "union": _union,
 }  # fmt: skip
 _CHANGES = {
     "frame": _framed,
+    "ragged": _ragged,
     "plus": _plus,
     "minus": _minus,
     "grow_m": _grown,
@@ -294,6 +320,12 @@ Number = Annotated[
     float, BeforeValidator(lambda value, info: names_of(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
 ]
 """A number, or an expression over the plan's heights such as ``"quay + 0.2"``."""
+Formula = Annotated[
+    ArrayFunction,
+    PlainValidator(lambda value, info: names_of(info).formula(value)),
+    WithJsonSchema(_NUMBER_SCHEMA),
+]
+"""An expression over arrays, such as ``"2*eased(inland, 12, 26)*(1 + 0.8*noise)"``; see `evaluate_arrays`."""
 At = Annotated[Point, PlainValidator(lambda value, info: names_of(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
 """A point ``[x, y]``, metres."""
 Line = Annotated[
