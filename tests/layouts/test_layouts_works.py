@@ -8,9 +8,8 @@ from support.layout_checks import catalogue, each_scene, props_of
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
-from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, terraces
+from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
-from aerialdojo_gen.scenes.kit.landforms import level_ground
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
@@ -51,7 +50,7 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
 def test_pits_have_benches_and_ramps_lead_down():
     pit = rectangle(-15, -15, 15, 15)
     site = blank()
-    flat = level_ground(site, site.terrain, cell_m=1.0)
+    flat = level_grid(site, site.terrain, cell_m=1.0)
     ground = terraces(site, flat, area=pit, steps=[(0, 0), (3, -2), (6, -2), (9, -5)])
     assert ground.z(0, 0) == pytest.approx(-5.0)
     assert ground.z(-10.5, 0) == pytest.approx(-2.0, abs=0.1)
