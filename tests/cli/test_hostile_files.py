@@ -127,17 +127,9 @@ def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_pa
 @pytest.mark.parametrize(
     ("layout", "parameters", "place"),
     [
-        ("desert", {"tracks": [[[0, 0]]]}, "tracks.0: a line needs two points or more"),
-        ("desert", {"bed": [[0, 0], [5, 0], [5, 0]]}, "points of a line must be at least 0.05 m from each other"),
-        ("desert", {"hills": [[0, 0, 0, 1]]}, "hills.0.2: Input should be greater than or equal to 0.1"),
-        ("desert", {"houses": [{"name": "a", "at": [0, 0], "size_m": [0.5, 5, 3]}]}, "houses.0.size_m.0: Input"),
-        ("desert", {"ground": "wash"}, "a wash needs the middle line of its bed"),
-        ("desert", {"steps": [[5, 5, 1]]}, "steps.0: a step ends 0.05 m or more beyond where it begins"),
         ("mountain", {"ridges": [{"line": [], "width_m": 9}]}, "ridges.0.line: "),
         ("mountain", {"ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}, "ridges.0.line.0.2: Input should"),
         ("mountain", {"ridges": [], "paths": [[[-2000, 0], [2000, 0]] * 2]}, "paths.0: a line may be 5,000 m long"),
-        ("snowfield", {"profile": []}, "profile: "),
-        ("snowfield", {"rink": {"at": [0, 0], "size_m": [6, 11]}}, "rink.size_m.0: Input should be greater"),
         ("forest", {"birch_wood": {"creek": []}}, "birch_wood.creek: a line needs two points or more"),
         ("mall", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
          "furniture.0.things.0.count: Input should be less than or equal to 1000"),
@@ -150,20 +142,33 @@ def test_a_layout_s_lines_and_sizes_are_bounded_at_their_key(project, tmp_path, 
     assert_named(str(refused.value), f"{path}: parameters: ", place)
 
 
+ROLLING = {"make": "rolling_ground", "cell_m": 1, "height_m": 1, "wavelength_m": 20}
+FAR = {"disc": [200, 100, 4]}
+
+
 @pytest.mark.parametrize(
-    ("parameters", "says"),
+    ("parts", "says"),
     [
-        ({"houses": [{"name": "far", "at": [200, 100]}]}, "the ground about (200, 100) lies off the site"),
-        ({"rocks": [{"name": "far", "at": [200, 100], "radius_m": 4, "height_m": 3}]}, "rock_000 has no body"),
-        ({"groups": [{"name": "far", "at": [200, 100], "things": ["bench"]}]}, "'far' has no room for 'bench'"),
-        ({"groups": [{"name": "odd", "at": [0, 0], "things": ["bench @ 1-2 ."]}]}, "'bench @ 1-2 .' is no thing"),
+        ({"ground": {"steps": [ROLLING, {"make": "level_area", "area": FAR}]}},
+         "the ground about (200, 100) lies off the site"),
+        ({"ground": {"steps": [{"make": "stepped_valley", "cell_m": 2, "bed": [[-9, 0], [9, 0]], "roughness_m": 1,
+                                "steps": [[5, 5, 1]]}]}}, "a step ends 0.05 m or more beyond where it begins"),
+        ({"ground": {"steps": [{"make": "level_along", "lines": [[[-2000, 0], [2000, 0]]], "width_m": 2}]}},
+         "a way may be 3,000 m long"),
+        ({"site": [{"make": "layered_rocks", "bands": ["rock"],
+                    "rocks": [{"area": FAR, "name": "far", "height_m": 3}]}]}, "rock_000 has no body"),
+        ({"site": [{"make": "mudbrick_houses", "houses": [{"at": [0, 0], "name": "a", "size_m": [0.5, 5, 3]}]}]},
+         "[houses.0] size_m.0 = 0.5: Input should be greater"),
+        ({"site": [{"make": "layered_rocks", "bands": ["rock"], "as": ["low", "high"],
+                    "rocks": [{"area": [0, 0, 4, 4], "name": "one", "height_m": 3}]}]},
+         "'layered_rocks' returns no such heights that 'as' could name"),
     ],
-)
-def test_what_a_layout_cannot_place_is_an_error_of_its_recipe(project, tmp_path, parameters, says):
-    path = recipe(tmp_path, COURT | {"layout": "desert", "parameters": parameters})
+)  # fmt: skip
+def test_what_a_builder_cannot_make_is_an_error_of_its_plan(project, tmp_path, parts, says):
+    path = recipe(tmp_path, {"plan": 1, "size_m": [30, 30], "ceiling_m": 12} | parts)
     with pytest.raises(AssetError) as refused:
         build_scene(path, load_catalogue(project / "scene_assets"))
-    assert str(refused.value).startswith(f"{path}: layout 'desert': ")
+    assert str(refused.value).startswith(f"{path}: ")
     assert says in str(refused.value)
 
 

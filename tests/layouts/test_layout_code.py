@@ -100,7 +100,7 @@ def test_what_a_process_imports_to_build_a_type_is_what_counts():
 
 @pytest.mark.parametrize(
     ("module", "users"),
-    [("urban.mall.shops", {"mall"}), ("natural.parts.strata", {"desert", "snowfield"})],
+    [("urban.mall.shops", {"mall"})],
 )
 def test_a_layout_counts_what_it_is_built_with_and_nothing_else(module, users):
     name = f"aerialdojo_gen.scenes.layouts.{module}"

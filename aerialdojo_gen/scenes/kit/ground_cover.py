@@ -13,11 +13,13 @@ from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
+_Radius = Annotated[Number, Field(ge=0.1)]
+
 
 @site_builder
 def paint_patches(
     site: Site, *, materials: Annotated[list[Material], Field(min_length=1)],
-    count: Annotated[int, Field(ge=0, le=1000)], radius_m: tuple[Number, Number], seed: int = 0,
+    count: Annotated[int, Field(ge=0, le=1000)], radius_m: tuple[_Radius, _Radius], seed: int = 0,
     ragged: Number = 0.55, stream: str = "patches", box: tuple[Number, Number, Number, Number] | None = None,
     skip: Annotated[int, Field(ge=0, le=1000)] = 0,
 ) -> None:  # fmt: skip
@@ -37,7 +39,7 @@ def paint_patches(
 @site_builder
 def paint_shore(
     site: Site, *, water: Area, material: Material, count: Annotated[int, Field(ge=1, le=1000)] = 60,
-    lobe_m: Number = 1.4, seed: int = 0, grow_m: Number = 0.6,
+    lobe_m: _Radius = 1.4, seed: int = 0, grow_m: Number = 0.6,
 ) -> None:  # fmt: skip
     """Paint the shore of waters with an uneven outline; the water itself is painted over it."""
     points = [water.boundary.interpolate(k / count, normalized=True) for k in range(count)]
@@ -55,7 +57,9 @@ def paint_scree(site: Site, *, areas: list[Area], material: Material, seed: int 
 
 
 @site_builder
-def strips_beside(site: Site, *, line: Line, offsets_m: list[Number], width_m: Number, material: Material) -> None:
+def strips_beside(
+    site: Site, *, line: Line, offsets_m: list[Number], width_m: Annotated[Number, Field(gt=0)], material: Material
+) -> None:
     """Paint strips beside a line, such as ruts or the marks of a groomer, left of it at positive offsets."""
     for offset_m in offsets_m:
         strip = LineString(line).offset_curve(offset_m)

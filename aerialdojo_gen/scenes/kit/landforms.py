@@ -8,13 +8,18 @@ from typing import Annotated, Literal
 import numpy as np
 import shapely
 from pydantic import Field
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
+
+# Smoothing a way takes the square of its length.
+_LONGEST_M = 3000.0
 
 
 @ground_builder
@@ -170,6 +175,8 @@ def level_along(
 ) -> Terrain:  # fmt: skip
     """Lay ways into the ground, each level across, and smoothed along over `smooth_m`."""
     for line in lines:
+        if LineString(line).length > _LONGEST_M:
+            raise AssetError(f"lines: a way may be {_LONGEST_M:,.0f} m long")
         terrain = terrain.graded(line, width_m, blend_m, smooth_m)
     return terrain
 

@@ -169,12 +169,14 @@ class _Building:
             self._site.paint(area, entry.material, entry.rise_m, entry.edge)
 
     def _make(self, body: dict[str, Any], where: str) -> None:
-        """Call a builder; ``as`` names the height that it returns, e.g. of a roof, for what follows."""
-        height = self._call("site", {k: v for k, v in body.items() if k != "as"}, where, self._site)
+        """Call a builder; ``as`` names the height that it returns, e.g. of a roof, or the heights, for later."""
+        made = self._call("site", {k: v for k, v in body.items() if k != "as"}, where, self._site)
         if "as" in body:
-            if not isinstance(height, float):
-                raise AssetError(f"{where}: {body['make']!r} returns no height that 'as' could name")
-            self._names.heights[str(body["as"])] = height
+            names = body["as"] if isinstance(body["as"], list) else [body["as"]]
+            heights = made if isinstance(made, list) else [made]
+            if len(names) != len(heights) or not all(isinstance(height, float) for height in heights):
+                raise AssetError(f"{where}: {body['make']!r} returns no such heights that 'as' could name")
+            self._names.heights.update(zip(map(str, names), heights, strict=True))
 
     def _structure(self, body: dict[str, Any], where: str) -> None:
         entry = self._read(Structure, body, where)
@@ -218,7 +220,8 @@ class _Building:
             if len(raw) not in (3, 4, 5):
                 raise AssetError(f"{where}: a thing is [category, x, y], or with yaw and height too, got {raw!r}")
             keys: Sequence[tuple[str, Any]] = [*zip(("yaw_deg", "on"), raw[3:], strict=False)]
-            raw = {"what": raw[0], "at": raw[1:3], **dict(keys)}
+            what, _, phrase = str(raw[0]).partition(" | ")
+            raw = {"what": what, "phrase": phrase, "at": raw[1:3], **dict(keys)}
         if not isinstance(raw, dict):
             raise AssetError(f"{where}: a thing is a list or a table, got {raw!r}")
         return self._read(Thing, raw, where)

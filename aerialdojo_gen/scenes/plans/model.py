@@ -84,7 +84,10 @@ class Structure(BaseModel):
 
 
 class Thing(BaseModel):
-    """A prop of the catalogue, in the long form; the short one is ``["category:variant", x, y, yaw, z]``."""
+    """A prop of the catalogue, in the long form; the short one is ``["category:variant", x, y, yaw, z]``.
+
+    In the short form its own phrase stands behind a bar: ``"bench:blue | beside the pond"``.
+    """
 
     model_config = _STRICT
 

@@ -54,7 +54,7 @@ def _builder(name: str, definitions: dict[str, Any]) -> dict[str, Any]:
     found = _schema(one.arguments, definitions)
     keys = {"make": {"const": name}, **found.get("properties", {})}
     if one.kind == "site":
-        keys["as"] = {"type": "string"}
+        keys["as"] = {"type": ["string", "array"], "items": {"type": "string"}}
     return {
         "type": "object", "title": name, "description": one.summary, "properties": keys,
         "required": ["make", *found.get("required", [])], "additionalProperties": False,

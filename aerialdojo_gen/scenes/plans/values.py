@@ -82,6 +82,7 @@ class PlanNames:
 
         `smooth` rounds the corners so many times; `eased` makes S-curves of so many steps of the legs across x.
         In place of points, ``ellipse = [x, y, radius along x, radius along y, steps]`` gives a closed line.
+        The points may be another line's, by its name.
         """
         if isinstance(value, str):
             if value not in self.lines:
@@ -98,6 +99,8 @@ class PlanNames:
                 raise ValueError(f"smooth must be from 0 to 6, got {smooth!r}")
             if not isinstance(eased, int) or not 0 <= eased <= 20:
                 raise ValueError(f"eased must be from 0 to 20, got {eased!r}")
+            if isinstance(value, str):
+                value = self.line(value)
         if not isinstance(value, list | tuple) or not 2 <= len(value) <= _MAX_POINTS:
             raise ValueError(f"a line has from 2 to {_MAX_POINTS:,} points [x, y]")
         points = [self.point(point) for point in value]

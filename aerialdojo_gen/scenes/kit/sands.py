@@ -1,36 +1,37 @@
-"""Ground of dry country: dunes shaped by the wind, dry river beds between stepped banks."""
+"""Ground of dry country: dunes shaped by the wind, valleys between stepped banks."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import Field
 
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.scenes.kit import ground_builder
 from aerialdojo_gen.scenes.mesh import Floats
+from aerialdojo_gen.scenes.plans.values import Line, Number
+from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 
 # Share of a dune's length that is its long windward slope; the slip face takes the rest.
 _WINDWARD = 0.7
 
 
-def dunes(
-    size_m: tuple[float, float], cell_m: float, seed: int, height_m: float, wavelength_m: float, wind_deg: float
-) -> Terrain:
-    """Make a sand sea: wavy crests across the wind, gentle windward slopes and steep slip faces.
+_Cell = Annotated[Number, Field(ge=0.5)]
 
-    Parameters
-    ----------
-    size_m, cell_m, seed
-        As in `rolling_terrain`.
-    height_m, wavelength_m : float
-        Of the highest dunes, and from crest to crest, metres.
-    wind_deg : float
-        Where the wind blows to, degrees counter-clockwise from +x.
-    """
-    ground = rolling_terrain(size_m, cell_m, seed, 0.25 * height_m, 2.6 * wavelength_m, octaves=2)
+
+@ground_builder
+def dunes(
+    site: Site, _terrain: Terrain, *, cell_m: _Cell, height_m: Number, wavelength_m: Annotated[Number, Field(ge=1)],
+    wind_deg: Number,
+) -> Terrain:  # fmt: skip
+    """Make a sand sea: wavy crests across the wind, gentle windward slopes and steep slip faces."""
+    seed = site.recipe.seed
+    ground = rolling_terrain(site.recipe.size_m, cell_m, seed, 0.25 * height_m, 2.6 * wavelength_m, octaves=2)
     x, y = ground.corners()[:, :2].T
     c, s = np.cos(np.radians(wind_deg)), np.sin(np.radians(wind_deg))
     along, across = c * x + s * y, -s * x + c * y
@@ -41,33 +42,20 @@ def dunes(
     rise = np.clip(s01 / _WINDWARD, 0.0, 1.0) ** 1.25
     fall = np.clip((s01 - _WINDWARD) / (1.0 - _WINDWARD), 0.0, 1.0)
     ridge = rise * (1.0 - fall * fall * (3.0 - 2.0 * fall))
-    shape = ground.heights_m.shape
     high = height_m * (0.75 + 0.4 * swell) * ridge
-    return replace(ground, heights_m=ground.heights_m + high.reshape(shape))
+    return replace(ground, heights_m=ground.heights_m + high.reshape(ground.heights_m.shape))
 
 
-def wash(
-    size_m: tuple[float, float],
-    cell_m: float,
-    seed: int,
-    bed: Sequence[tuple[float, float]],
-    steps: Sequence[tuple[float, float, float]],
-    roughness_m: float,
-) -> Terrain:
-    """Make a dry river bed: the ground climbs away from it in steps.
-
-    Parameters
-    ----------
-    size_m, cell_m, seed
-        As in `rolling_terrain`.
-    bed : sequence of (x, y)
-        Middle line of the bed, metres.
-    steps : sequence of (from, to, rise)
-        Between these distances from the middle line the ground rises by so much, metres.
-    roughness_m : float
-        Of the noise over it all, metres.
-    """
-    ground = rolling_terrain(size_m, cell_m, seed, roughness_m, 16.0, octaves=3)
+@ground_builder
+def stepped_valley(
+    site: Site, _terrain: Terrain, *, cell_m: _Cell, bed: Line, steps: list[tuple[Number, Number, Number]],
+    roughness_m: Number,
+) -> Terrain:  # fmt: skip
+    """Make a valley along the middle line of its bed, from which the ground climbs in steps (from, to, rise)."""
+    if any(far - near < 0.05 for near, far, _ in steps):
+        raise AssetError("steps: a step ends 0.05 m or more beyond where it begins")
+    seed = site.recipe.seed
+    ground = rolling_terrain(site.recipe.size_m, cell_m, seed, roughness_m, 16.0, octaves=3)
     xy = ground.corners()[:, :2]
     d = shapely.distance(shapely.LineString(bed), shapely.points(xy))
     d = d + 2.2 * _noise(seed + 5, xy[:, 0] / 9.0, xy[:, 1] / 9.0)

@@ -1,0 +1,86 @@
+"""Layered rock that stands on the ground: mesas, buttes, spurs and canyon walls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import shapely
+from pydantic import Field
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.scenes.grammar_frames import Parts
+from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.plans.values import Area, Material, Number
+from aerialdojo_gen.scenes.site import Site
+
+_CAP_M = 0.22
+
+
+@dataclass(frozen=True)
+class Rock:
+    """A rock of layers."""
+
+    area: Area  # At its foot
+    name: str  # Of its random streams
+    height_m: Annotated[Number, Field(gt=0, le=100)]
+    batter: Annotated[Number, Field(ge=0, le=1)] = 0.14  # How far its walls lean back, metres a metre of height
+
+
+@site_builder
+def layered_rocks(
+    site: Site, *, rocks: list[Rock], bands: Annotated[list[Material], Field(min_length=1)],
+    cap: Material | None = None,
+) -> list[float]:  # fmt: skip
+    """Put up rocks in layers of alternating hardness, from the foot up; gives the heights of their tops, metres.
+
+    A thin `cap`, such as snow, lies over each.
+    """
+    return [_layered_rock(site, rock, bands, cap) for rock in rocks]
+
+
+def _layered_rock(site: Site, rock: Rock, bands: Sequence[str], cap: str | None) -> float:
+    area = rock.area
+    ring = [site.ground_z(float(x), float(y)) for x, y in shapely.get_coordinates(area)]
+    low, top = min(ring) - 0.6, float(np.mean(ring)) + rock.height_m
+    rng = site.rng_for("strata", rock.name)
+    count = max(round((top - low) / 1.3), 2)
+    cuts = np.linspace(low, top, count + 1)
+    cuts[1:-1] += rng.uniform(-0.35, 0.35, size=count - 1)
+    noise = OpenSimplex(seed=site.recipe.seed * 13 + _number(rock.name))
+    parts: Parts = []
+    for k in range(count):
+        # Hard layers jut out over soft ones; the topmost is hard, and caps the rest.
+        hard = 0.28 if (count - 1 - k) % 2 == 0 else -0.12
+        inset = rock.batter * (float(cuts[k]) - low) - hard + float(rng.uniform(-0.1, 0.1))
+        outline = _weathered(area.buffer(-max(inset, -0.3)), noise, float(k) * 0.35).intersection(site.extent)
+        parts += [(bands[k % len(bands)], slab(p, float(cuts[k]), float(cuts[k + 1]))) for p in polygons_of(outline)]
+    if cap is not None:
+        parts += [(cap, slab(p, top, top + _CAP_M)) for p in polygons_of(outline.buffer(0.1))]
+        top += _CAP_M
+    site.add(None, "rock", parts, footprint=area.buffer(0.3))
+    return top
+
+
+def _weathered(area: BaseGeometry, noise: OpenSimplex, phase: float) -> BaseGeometry:
+    """Notch an outline: every 1.5 m of it moves by up to half a metre, similarly in neighbouring layers."""
+    pieces = []
+    for p in polygons_of(area):
+        xy = shapely.get_coordinates(shapely.segmentize(p.exterior, 1.5))[:-1]
+        d = np.array(
+            [[noise.noise3(x / 2.2, y / 2.2, phase), noise.noise3(x / 2.2, y / 2.2, phase + 40.0)] for x, y in xy]
+        )
+        moved = Polygon(xy + 0.5 * d)
+        pieces += polygons_of(moved if moved.is_valid else moved.buffer(0))
+    return shapely.union_all(pieces)
+
+
+def _number(name: str) -> int:
+    """Turn a name into a small number that is the same on every machine."""
+    return sum((k + 1) * ord(c) for k, c in enumerate(name)) % 997
