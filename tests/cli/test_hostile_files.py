@@ -161,7 +161,7 @@ FAR = {"disc": [200, 100, 4]}
          "[houses.0] size_m.0 = 0.5: Input should be greater"),
         ({"site": [{"make": "layered_rocks", "bands": ["rock"], "as": ["low", "high"],
                     "rocks": [{"area": [0, 0, 4, 4], "name": "one", "height_m": 3}]}]},
-         "'layered_rocks' returns no such heights that 'as' could name"),
+         "'layered_rocks' returns no height for each name of 'as'"),
     ],
 )  # fmt: skip
 def test_what_a_builder_cannot_make_is_an_error_of_its_plan(project, tmp_path, parts, says):

@@ -175,7 +175,7 @@ class _Building:
             names = body["as"] if isinstance(body["as"], list) else [body["as"]]
             heights = made if isinstance(made, list) else [made]
             if len(names) != len(heights) or not all(isinstance(height, float) for height in heights):
-                raise AssetError(f"{where}: {body['make']!r} returns no such heights that 'as' could name")
+                raise AssetError(f"{where}: {body['make']!r} returns no height for each name of 'as'")
             self._names.heights.update(zip(map(str, names), heights, strict=True))
 
     def _structure(self, body: dict[str, Any], where: str) -> None:
