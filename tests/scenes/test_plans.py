@@ -313,3 +313,23 @@ def test_the_ground_under_a_thing_on_a_slope_is_levelled_and_its_room_kept(tmp_p
     with pytest.raises(AssetError, match="no area 'sheds'"):
         build(tmp_path, catalogue, {**HEAD, "site": [shed, keep]})
     build(tmp_path, catalogue, {**HEAD, "site": [{**shed, "spots": "sheds"}, keep]})
+
+
+def test_ribbons_run_along_several_lines_with_ends_as_round_as_said(catalogue):
+    names = PlanNames(catalogue.materials)
+    names.lines["round"] = names.line({"ellipse": [2, 0, 6, 3, 24]})
+    names.lines["out"] = names.line([[8, 0], [14, 0]])
+    assert names.lines["round"][0] == (8.0, 0.0) == pytest.approx(names.lines["round"][-1], abs=1e-9)
+    ways = names.area({"ribbon": ["round", "out"], "width_m": 1})
+    assert ways.bounds == pytest.approx((-4.5, -3.5, 14, 3.5), abs=0.05)
+    assert not ways.covers(rectangle(1, -1, 3, 1))
+    ways_out = [{"ribbon": "out", "width_m": 2, "round_ends": steps} for steps in (1, True, 12)]
+    coarse, plain, fine = (names.area(way).area for way in ways_out)
+    assert 12 < coarse < plain < fine < 12 + 3.1416
+
+
+@pytest.mark.parametrize("core", [[0, 0, 0.5, 30], {"union": [[0, 0, 4, 4], [30, 0, 34, 4]]}])
+def test_a_stand_without_one_front_edge_is_refused(tmp_path, catalogue, core):
+    tier = {"core": core, "front_m": -0.5, "rows": 3, "z_m": 1}
+    with pytest.raises(AssetError, match=r"site\[0\] \(make\) 'stand': tier .*must enclose one area"):
+        build(tmp_path, catalogue, {**HEAD, "site": [{"make": "stand", "tier": tier, "seats": ["#ffffff"]}]})

@@ -188,7 +188,10 @@ def flume(
     parts.append(("water", sweep(path=(line + np.array([0.0, 0.0, 0.3])).tolist(), section=(1.8, 0.2))))
     flat = LineString(line[:, :2])
     for side in (-1, 1):
-        rim = np.array(flat.offset_curve(side * 1.05, join_style="mitre").coords)
+        offset = flat.offset_curve(side * 1.05, join_style="mitre")
+        if not isinstance(offset, LineString):
+            raise ValueError("the path of a flume bends too sharply, or crosses itself")
+        rim = np.array(offset.coords)
         s = [flat.project(Point(x, y)) for x, y in rim]
         z = np.interp(s, _stations(line), line[:, 2])
         edge = np.column_stack([rim, z + 0.45])

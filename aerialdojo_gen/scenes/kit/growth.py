@@ -33,7 +33,8 @@ def keep_free(site: Site, *, areas: list[Area], z: tuple[Number, Number] = (-100
 
 @site_builder
 def strew_trees(
-    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)], spacing_m: Number,
+    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)],
+    spacing_m: Annotated[Number, Field(ge=0.5)],
     stream: str = "trees", limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000,
 ) -> None:  # fmt: skip
     """Strew trees over an area, of categories in turn; a spot without room stays empty."""

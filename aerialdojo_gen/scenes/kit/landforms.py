@@ -20,6 +20,7 @@ from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
 
 # Smoothing a way takes the square of its length.
 _LONGEST_M = 3000.0
+_Run = Annotated[Number, Field(ge=0.1)]
 
 
 @ground_builder
@@ -37,7 +38,7 @@ def rolling_ground(
 @ground_builder
 def hillside_steps(
     _site: Site, terrain: Terrain, *, steps: list[tuple[Number, Number]], half_m: Number,
-    soft_m: Annotated[Number, Field(gt=0)] = 4.0, run_m: tuple[Number, Number] = (1.0, 8.0),
+    soft_m: Annotated[Number, Field(gt=0)] = 4.0, run_m: tuple[_Run, _Run] = (1.0, 8.0),
 ) -> Terrain:  # fmt: skip
     """Let the ground rise northwards in steps (y, rise): steep up to `half_m` from the middle, soft beyond."""
     x, y = grid(terrain)
@@ -81,8 +82,8 @@ def bank_about(
 ) -> Terrain:  # fmt: skip
     """Raise a bank about an area, which rises between two distances from it, and comes up between two x."""
     away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
-    t, fade = smooth((away - start_m) / (end_m - start_m)), (grid(terrain)[0] - fade_x[0]) / (fade_x[1] - fade_x[0])
-    return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t * smooth(fade)))
+    t, fade = between(away, start_m, end_m), between(grid(terrain)[0], *fade_x)
+    return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t * fade))
 
 
 @ground_builder
@@ -161,7 +162,7 @@ def slope(
     With `only_up` it slopes from z = 0, and higher ground stays as it is.
     """
     along = grid(terrain)["xy".index(axis)]
-    t = smooth((along - start_m) / (end_m - start_m))
+    t = between(along, start_m, end_m)
     if only_up:
         return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t))
     inside = (along > within[0]) & (along <= within[1])
@@ -225,3 +226,10 @@ def smooth(t: Floats) -> Floats:
     """Ease from 0 to 1, with level ends."""
     t = np.clip(t, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
+
+
+def between(t: Floats, start: float, end: float) -> Floats:
+    """Ease from 0 at the start to 1 at the end."""
+    if start == end:
+        raise ValueError(f"a slope must not begin where it ends, {start:g}")
+    return smooth((t - start) / (end - start))

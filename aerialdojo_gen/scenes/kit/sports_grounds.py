@@ -91,4 +91,6 @@ def bank_kerbs(
 
 
 def _about(line: Line, radius_m: float) -> Polygon:
+    if radius_m <= 0.0:
+        raise ValueError(f"the distance from a line must be above 0, got {radius_m:g}")
     return LineString(line).buffer(radius_m, quad_segs=12)

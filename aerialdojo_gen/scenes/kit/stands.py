@@ -45,6 +45,10 @@ class Tier:
     portals: Areas = field(default_factory=list)  # Passages from front to back
     head_m: Number = 3.2  # Rows lower than this leave the portals open
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.edge(0), Polygon) or self.edge(0).is_empty:
+            raise ValueError("the front edge of a tier must enclose one area")
+
     def edge(self, row: float) -> Polygon:
         """Outline of what lies in front of a row, metres."""
         return self.core.buffer(self.front_m + row * self.tread_m, quad_segs=QUARTER)

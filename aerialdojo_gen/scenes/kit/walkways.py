@@ -30,7 +30,8 @@ def raised_walkway(
     parts += deck(plan, z_m, floor=floor, under=under)
     for side in (-1, 1):
         rim = middle.offset_curve(side * (width_m / 2 - 0.1), join_style="mitre")
-        parts += railing([(float(x), float(y)) for x, y in rim.coords], z_m, pane="iron", height_m=0.95)
+        for leg in getattr(rim, "geoms", [rim]):
+            parts += railing([(float(x), float(y)) for x, y in leg.coords], z_m, pane="iron", height_m=0.95)
     for (x, y), yaw in zip((line[0], line[-1]), stair_yaws, strict=True):
         back = (x - run_m * float(np.cos(np.radians(yaw))), y - run_m * float(np.sin(np.radians(yaw))))
         foot = site.ground_z(*back)
