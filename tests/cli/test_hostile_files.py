@@ -130,7 +130,6 @@ def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_pa
         ("mountain", {"ridges": [{"line": [], "width_m": 9}]}, "ridges.0.line: "),
         ("mountain", {"ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}, "ridges.0.line.0.2: Input should"),
         ("mountain", {"ridges": [], "paths": [[[-2000, 0], [2000, 0]] * 2]}, "paths.0: a line may be 5,000 m long"),
-        ("forest", {"birch_wood": {"creek": []}}, "birch_wood.creek: a line needs two points or more"),
         ("mall", {"furniture": [{"place": "", "things": [{"category": "bench", "at": [0, 0], "count": 1001}]}]},
          "furniture.0.things.0.count: Input should be less than or equal to 1000"),
     ],

@@ -17,13 +17,4 @@ RECIPES: dict[str, dict[str, Any]] = {
             "snow_z_m": 9, "trees_z_m": 3, "boulders": 2, "groups": [{**_GROUP, "at": [12, -12]}],
         },
     },
-    "N_Birch_0": {
-        "layout": "forest", "seed": 6, "size_m": [36, 34], "ceiling_m": 20, "parameters": {
-            "relief_m": 1, "tree_spacing_m": 9, "undergrowth": 0.1, "birch_wood": {
-                "creek": [[-17, -8], [0, -10], [17, -8]], "paths": [[[-15, 14], [0, 13], [15, 14]]],
-                "hills": [[10, 5, 5, 1]], "bridges": [[0, -10, 90, 8]], "abbey": [-6, 3, 10],
-                "groups": [{**_GROUP, "at": [9, 3], "radius_m": 4}],
-            },
-        },
-    },
 }  # fmt: skip

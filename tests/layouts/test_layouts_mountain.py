@@ -6,7 +6,7 @@ import shapely
 from support.layout_checks import catalogue, each_scene
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.layouts.natural.mountain.peaks import Ridge, above, massif, steep
+from aerialdojo_gen.scenes.kit.mountains import Ridge, above, massif, steep
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
+from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import Area, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -156,3 +160,15 @@ def _bar(a: tuple[float, float, float], b: tuple[float, float, float], thick_m: 
 
 def _pieces(area: BaseGeometry) -> list[BaseGeometry]:
     return [p for p in getattr(area, "geoms", [area]) if p.area > 1e-4]
+
+
+@site_builder
+def footbridge(
+    site: Site, *, at: At, yaw_deg: Number, span_m: Annotated[Number, Field(gt=0, le=60)], place: str,
+    sunk_m: Number = 0.28, margin_m: Number = 1.6,
+) -> None:  # fmt: skip
+    """Lay a footbridge of the catalogue over a gap, a little lower than the higher bank."""
+    frame = Frame(*at, yaw_deg)
+    z = max(site.ground_z(*frame.at(side * span_m / 2, 0.0)) for side in (-1.0, 1.0)) - sunk_m
+    bridge = site.place("footbridge", *at, yaw_deg, z=z, params={"span": span_m}, attributes={"place": place})
+    keep_clear(site, bridge, margin_m)

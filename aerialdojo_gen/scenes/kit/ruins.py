@@ -6,14 +6,17 @@ Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 import numpy as np
+import shapely
 from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 
+from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
 from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, columns
@@ -331,3 +334,43 @@ def _balconies(wreck: Wreck, rng: np.random.Generator) -> Parts:
 
 def _posed(body: Mesh, yaw_deg: float, at: tuple[float, ...]) -> Mesh:
     return translated(rotated(body, rotation(0.0, 0.0, yaw_deg)), at)
+
+
+@dataclass(frozen=True)
+class RuinedWall:
+    """A wall between two points of the ruin's frame, and its openings (from, to, sill, head), metres."""
+
+    ends: tuple[At, At]
+    height_m: Number
+    openings: list[tuple[Number, Number, Number, Number]] = field(default_factory=list)
+
+
+@site_builder
+def roofless_walls(
+    site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, walls: Annotated[list[RuinedWall], Field(min_length=1)],
+    stone: Material, stream: str = "walls", columns: Sequence[At] = (),
+    thickness_m: Annotated[Number, Field(ge=0.2, le=3)] = 0.7,
+) -> None:  # fmt: skip
+    """Put up what is left of a stone building: walls under shorter and shorter courses, and stumps of columns."""
+    frame, rng = Frame(*at, yaw_deg), site.rng_for(stream)
+    base = min(site.ground_z(*frame.at(*end)) for wall in walls for end in wall.ends) - 0.3
+    bodies: list[Mesh] = []
+    for wall in walls:
+        a, b = (frame.at(*end) for end in wall.ends)
+        z = base + wall.height_m + 0.3
+        bodies.append(wall_with_openings(a, b, base, z, wall.openings, thickness_m))
+        start, way = np.array(wall.ends[0]), np.array(wall.ends[1]) - np.array(wall.ends[0])
+        u0, u1 = 0.0, 1.0
+        for course in range(3):
+            u0 += float(rng.uniform(0.05, 0.3)) * (u1 - u0)
+            u1 -= float(rng.uniform(0.05, 0.3)) * (u1 - u0)
+            # Each piece is set in a little, and starts inside the course below.
+            piece = LineString([frame.at(*(start + way * u)) for u in (u0, u1)])
+            piece = piece.buffer(thickness_m / 2 - 0.02, cap_style="flat")
+            bodies.append(slab(piece, z + 0.45 * course - 0.05, z + 0.45 * course + 0.45))
+    for column in columns:
+        middle = Point(frame.at(*column))
+        bodies.append(slab(middle.buffer(0.42, quad_segs=3), base, base + float(rng.uniform(0.7, 1.6))))
+        site.occupy(middle.buffer(0.6))
+    feet = [LineString([frame.at(*end) for end in wall.ends]).buffer(thickness_m) for wall in walls]
+    site.add(node, node, [(stone, merge(bodies))], footprint=shapely.union_all(feet))

@@ -237,11 +237,11 @@ class _Building:
 
     def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
-        z = thing.on if thing.on is not None else entry.on
+        z, above_m = thing.on if thing.on is not None else entry.on, thing.above_ground_m or entry.above_ground_m
         if z is None and entry.settle_m is not None:
-            z = settled_z(self._site, x, y, entry.settle_m) + entry.above_ground_m
-        elif z is None and entry.above_ground_m:
-            z = self._site.ground_z(x, y) + entry.above_ground_m
+            z = settled_z(self._site, x, y, entry.settle_m) + above_m
+        elif z is None and above_m:
+            z = self._site.ground_z(x, y) + above_m
         if entry.sunk is not None:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant, x, y)

@@ -96,6 +96,7 @@ class Thing(BaseModel):
     yaw_deg: Number = 0.0
     on: Number | None = None
     phrase: Annotated[str, Field(max_length=200)] = ""  # In place of that of the entry
+    above_ground_m: Number = 0.0  # The same
     node: str | None = None
     scale: Annotated[float, Field(ge=0.05, le=20)] = 1.0
     roles: dict[str, Material] = {}

@@ -18,8 +18,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import ribbon
+from aerialdojo_gen.scenes.kit.mountains import Crag, Ridge, above, massif, put_up_crag, steep
 from aerialdojo_gen.scenes.kit.natural_ground import blob, keep_clear
-from aerialdojo_gen.scenes.layouts.natural.mountain.peaks import Crag, Ridge, above, massif, put_up_crag, steep
 from aerialdojo_gen.scenes.layouts.natural.parts.groups import Group, level_ground, plan_groups, set_out
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import Field as PlantField
 from aerialdojo_gen.scenes.layouts.natural.parts.woods import Species, near, patches, plant, strew
