@@ -54,29 +54,10 @@ def _separated(step: tuple[float, float, float]) -> tuple[float, float, float]:
     return step
 
 
-def _with_length(wall: tuple[float, ...]) -> tuple[float, ...]:
-    _line((wall[:2], wall[2:4]))  # type: ignore[arg-type]
-    return wall
-
-
-def _with_area(box: tuple[float, ...]) -> tuple[float, ...]:
-    x0, y0, x1, y1 = box[:4]
-    if min(abs(x1 - x0), abs(y1 - y0)) < _SHORTEST_M:
-        raise ValueError(f"a rectangle must be {_SHORTEST_M:g} m wide and deep or more")
-    return box
-
-
 Line = Annotated[tuple[At, ...], Field(max_length=1000), AfterValidator(_line)]
 """Two points or more, distinct from one to the next, metres."""
 LineOrNone = Annotated[tuple[At, ...], Field(max_length=1000), AfterValidator(_line_or_none)]
 """A line, or no point at all."""
-Box = Annotated[tuple[Metres, Metres, Metres, Metres], AfterValidator(_with_area)]
-"""x0, y0, x1, y1 of a rectangle, metres."""
-Roof = Annotated[tuple[Metres, Metres, Metres, Metres, Annotated[float, Field(ge=0.3, le=500)]],
-                 AfterValidator(_with_area)]  # fmt: skip
-"""x0, y0, x1, y1 of a rectangle, and its height, metres."""
-Stretch = Annotated[tuple[Metres, Metres, Metres, Metres, Length], AfterValidator(_with_length)]
-"""x0, y0, x1, y1 of a straight wall, and its height, metres."""
 Crest = Annotated[tuple[tuple[Metres, Metres, Annotated[float, Field(ge=0, le=500)]], ...],
                   Field(min_length=1, max_length=1000), AfterValidator(_crest)]  # fmt: skip
 """A line of points x, y, z, or a peak alone, metres."""

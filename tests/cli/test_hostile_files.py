@@ -34,7 +34,10 @@ from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.studio.annotate.server import make_app
 from aerialdojo_gen.studio.annotate.session import open_session
 
-COURT = {"layout": "courtyard", "size_m": [30, 30], "ceiling_m": 12, "parameters": {"things": []}}
+SITE = {"size_m": [30, 30], "ceiling_m": 12}
+COURT = {"layout": "none", **SITE, "parameters": {"things": []}}
+WALLS = {"make": "walls", "lines": [[[0, 0], [9, 0]]], "height_m": 3, "material": "brick"}
+ROOF = {"shape": "block", "role": "roof_tiles", "corners": [-6, -6, 0, 0], "z": [3, 3.2]}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
 
 
@@ -102,26 +105,27 @@ def assert_named(message, start, place):
 
 
 @pytest.mark.parametrize(
-    ("drawing", "place"),
+    ("entry", "says"),
     [
-        ({"roofs": [["nan", -6, 0, 0, 4]]}, "roofs.0.0: Input should be a valid number"),
-        ({"paths": [[0, 0, "inf", 9]]}, "paths.0.2: Input should be a valid number"),
-        ({"roofs": [[-6, False, 0, 0, 4]]}, "roofs.0.1: Input should be a valid number"),
-        ({"roofs": [[-6, -1e-300, 0, 0, 4]]}, "roofs.0: a rectangle must be 0.05 m wide and deep or more"),
-        ({"roofs": [[-6, -6, 0, 0, 0.1]]}, "roofs.0.4: Input should be greater than or equal to 0.3"),
-        ({"walls": [[1, 1, 1, 1, 3]]}, "walls.0: consecutive points of a line must be at least 0.05 m"),
-        (
-            {"things": [{"category": "bench", "at": [0, 0], "yaw": "inf"}]},
-            "things.0.yaw: Input should be a valid number",
-        ),
+        ({"paint": ["nan", -6, 0, 0], "material": "mud"}, "(paint): paint = ['nan', -6, 0, 0]: 'nan' speaks of"),
+        ({"paint": [0, 0, float("inf"), 9], "material": "mud"}, ".paint[2]: is inf, no finite number"),
+        ({"paint": [-6, False, 0, 0], "material": "mud"}, "a number or an expression is wanted, got False"),
+        ({"paint": [-6, -1e-300, 0, 0], "material": "mud"}, "a rectangle must be 0.01 m wide and deep or more"),
+        ({"parts": [ROOF | {"corners": ["nan", -6, 0, 0]}]}, "parts[0] (block): 'nan' speaks of"),
+        ({"parts": [ROOF | {"corners": [-6, -1e-300, 0, 0]}]}, "parts[0] (block): the outline has no area"),
+        (WALLS | {"lines": [[[1, 1], [1, 1]]]}, "consecutive points of a line must be 0.01 m apart"),
+        (WALLS | {"lines": [[[0, 0], [1e7, 0]]]}, "must lie within 2,000"),
+        (WALLS | {"height_m": 0}, "height_m = 0: Input should be greater than 0"),
+        ({"place": [["bench", 0, 0, "inf"]]}, "(place)[0]: yaw_deg = 'inf': 'inf' speaks of"),
     ],
 )
-def test_a_courtyard_s_walls_and_roofs_have_a_length_and_an_area(project, tmp_path, drawing, place):
-    things = {"things": [{"category": "bench", "at": [0, 0]}]}
-    path = recipe(tmp_path, COURT | {"parameters": things | drawing})
+def test_what_a_plan_draws_has_a_length_and_an_area(project, tmp_path, entry, says):
+    category = {"category": "roof"} if "parts" in entry else {}
+    path = recipe(tmp_path, {"plan": 1, **SITE, "site": [entry | category]})
     with pytest.raises(AssetError) as refused:
         build_scene(path, load_catalogue(project / "scene_assets"))
-    assert_named(str(refused.value), f"{path}: parameters: ", place)
+    assert str(refused.value).startswith(f"{path}: site[0]")
+    assert says in str(refused.value)
 
 
 @pytest.mark.parametrize(

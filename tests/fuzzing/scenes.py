@@ -88,12 +88,15 @@ def _read_pipeline(folder: Path) -> None:
 
 
 _COURT = {
-    "layout": "courtyard", "seed": 5, "size_m": [36.0, 36.0], "ceiling_m": 15.0, "sky": "#96bee6", "sun": [0.4,
-    -0.3, 0.8],
-    "palette": {"wall": "brick", "path": "paving"}, "inventory": {"bench": 1},
-    "parameters": {"walls": [[-16, -16, 16, -16, 3.0]], "roofs": [[-6, -6, 0, 0, 4.0]], "paths": [[-2, -9, 2, 9]],
-                   "things": [{"category": "bench", "at": [3.0, 4.0], "yaw": 30.0}, {"category": "mailbox",
-                   "at": [5, 5], "z": 1.0}]},
+    "plan": 1, "seed": 5, "size_m": [36.0, 36.0], "ceiling_m": 15.0, "sky": "#96bee6", "sun": [0.4, -0.3, 0.8],
+    "palette": {"wall": "brick", "path": "paving"}, "inventory": {"bench": 1}, "floor_m": {"eaves": 4.0},
+    "site": [
+        {"paint": [[-2, -9, 2, 9]], "material": "path"},
+        {"make": "walls", "lines": [[[-16, -16], [16, -16]]], "height_m": 3.0, "material": "wall"},
+        {"category": "roof", "parts": [
+            {"shape": "block", "role": "wood", "corners": [-6, -6, 0, 0], "z": ["eaves", "eaves + 0.2"]}]},
+        {"place": [["bench", 3.0, 4.0, 30.0], ["mailbox", 5, 5, 0, 1.0]]},
+    ],
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.plans.values import PlanNames
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
-PLANS = [path for path in sorted((ASSETS / "scenes").glob("*.toml")) if is_plan(path)]
+PLANS = [path for path in sorted(ASSETS.glob("s[cm]*/*_[01].toml")) if is_plan(path)]
 HEAD = {"plan": 1, "size_m": [40, 40], "ceiling_m": 12}
 YARD = {
     **HEAD, "palette": {"wall": "brick:#8a4638"}, "floor_m": {"loft": 2.5},

@@ -13,7 +13,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_scatter import along, place_along, slab
+from aerialdojo_gen.scenes.grammar_scatter import along, place_along, slab, wall
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
@@ -89,6 +89,16 @@ def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Are
     left = ground.disc(*disc, 12).exterior.difference(opening)
     for leg in getattr(left, "geoms", [left]):
         fence(site, [(float(x), float(y)) for x, y in leg.coords], "hedge")
+
+
+@site_builder
+def walls(
+    site: Site, *, lines: list[Line], height_m: Annotated[Number, Field(gt=0)], material: Material,
+    thickness_m: Annotated[Number, Field(gt=0)] = 0.3, category: str = "wall",
+) -> None:  # fmt: skip
+    """Put up plain walls along lines on the ground, each as a structure of its own."""
+    for line in lines:
+        site.add(None, category, [(material, wall(site, line, height_m, thickness_m))])
 
 
 @site_builder

@@ -168,7 +168,10 @@ def _box(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     corners = value["box"]
     if not isinstance(corners, list) or len(corners) != 4:
         raise ValueError(f"box is [x0, y0, x1, y1], got {corners!r}")
-    return rectangle(*(names.number(corner) for corner in corners))
+    x0, y0, x1, y1 = (names.number(corner) for corner in corners)
+    if min(abs(x1 - x0), abs(y1 - y0)) < _SHORTEST_M:
+        raise ValueError(f"a rectangle must be {_SHORTEST_M:g} m wide and deep or more")
+    return rectangle(x0, y0, x1, y1)
 
 
 def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
