@@ -317,6 +317,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         }
         if self._image_shape is not None:
             goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
+            goal["image_distance_m"] = spaces.Box(0.0, np.inf, (1,), np.float32)
         if "heading" in self._tell:
             goal |= {"heading": spaces.Discrete(len(DIRECTIONS)), "heading_deg": spaces.Box(0, 359, (1,), np.int32)}
         s = self._sensors
@@ -357,6 +358,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             seen["heading_deg"] = np.array([goal.heading.heading_deg], np.int32)
         if self._image_shape is not None:
             seen["image"] = np.zeros(self._image_shape, np.uint8) if goal.image is None else goal.image.copy()
+            seen["image_distance_m"] = np.array([goal.image_distance_m or 0.0], np.float32)
         return seen
 
     def _observe(self) -> dict[str, Any]:

@@ -28,11 +28,12 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
 MODALITIES = ("semantic", "image")
-# What an episode needs of a task: releases of other versions have these, whatever else stands in their tables.
+# What an episode needs of a task. Releases of other versions have these, whatever else stands in their tables; only
+# the last may be missing there.
 _COLUMNS = (
     "task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "setting", "modality",
     "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad", "target_name", "landmark", "direction",
-    "description", "reference_image_id",
+    "description", "reference_image_id", "image_distance_m",
 )  # fmt: skip
 _USUAL = {"train": ("id_train", "ood_train"), "test": ("id_test", "ood_test"), "all": tuple(SUBSETS)}
 _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m", "target_object_id")
@@ -245,8 +246,9 @@ def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) 
     image_id = row["reference_image_id"]
     image = None if image_id is None else reference_image(root, row["scene"], image_id)
     words = (row["modality"], row["target_name"], row["landmark"], row["direction"], row["description"])
+    distance_m = None if image is None else row["image_distance_m"]
     heading = Heading(*compass_heading(row["start_yaw_rad"])) if "heading" in tell else None
-    return Goal(*words, image, rules, heading)
+    return Goal(*words, image, rules, heading, distance_m)
 
 
 @lru_cache(maxsize=256)

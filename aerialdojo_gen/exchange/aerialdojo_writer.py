@@ -94,7 +94,7 @@ Floats = NDArray[np.float64]
 
 # What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
-    "tasks": list(SPLIT_COLUMNS),
+    "tasks": ["image_distance_m", *SPLIT_COLUMNS],
     "routes": ["goal_yaw_rad", "min_clearance_m", *DIFFICULTY_COLUMNS],
     "objects": [
         "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",

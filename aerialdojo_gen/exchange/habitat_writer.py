@@ -27,6 +27,7 @@ LOST: Mapping[str, Sequence[str]] = {
         "modality (one episode a navigation task)",
         "description",
         "reference_image_id",
+        "image_distance_m",
         "landmark",
         "direction",
         *SPLIT_COLUMNS,

@@ -258,6 +258,7 @@ def _episodes(part: Part, stats: list[dict[str, Stats]], keys: list[str], at: di
         name: pa.array(index.told[name], pa.string())
         for name in ("target_name", "landmark", "direction", "reference_image_id")
     }
+    columns["image_distance_m"] = pa.array(index.told["image_distance_m"], pa.float64())
     for key in stats[0]:
         for name in stats[0][key]:
             columns[f"stats/{key}/{name}"] = [found[key][name] for found in stats]

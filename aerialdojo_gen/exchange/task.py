@@ -109,6 +109,7 @@ def task_rows(task: Task, nav_id: str, source: dict[str, Any], pictures: list[st
             "modality": instance.modality,
             "description": instance.description,
             "reference_image_id": picture,
+            "image_distance_m": None,
         }
         for instance, picture in zip(task.instances, pictures, strict=True)
     ]

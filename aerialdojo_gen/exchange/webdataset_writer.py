@@ -81,7 +81,7 @@ def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list
     if "text" in options.goal:
         whole |= {name: index.told[name][k] for name in ("target_name", "landmark", "direction", "description")}
     if "image" in options.goal:
-        whole["reference_image_id"] = index.told["reference_image_id"][k]
+        whole |= {name: index.told[name][k] for name in ("reference_image_id", "image_distance_m")}
     return [
         {
             **whole,

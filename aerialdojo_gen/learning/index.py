@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -26,6 +27,7 @@ _SIDES = ("train", "test")
 _GOAL = ("goal_x_m", "goal_y_m", "goal_z_m")
 _START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
 _TOLD = ("target_name", "landmark", "direction")
+_BY_MODALITY = ("description", "reference_image_id", "image_distance_m")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +42,7 @@ class Index:
     start: NDArray[np.float64]  # (n, 4) float64; start poses: x, y, z in metres and yaw in radians, world frame
     goal: NDArray[np.float64]  # (n, 3) float64; goal anchors, metres, world frame
     budget: NDArray[np.int32]  # (n,) int32; most actions, Stop included
-    told: dict[str, list[str | None]]
+    told: dict[str, list[Any]]  # What each goal says, by column of `tasks`
 
     def __len__(self) -> int:
         """Return the number of trajectories."""
@@ -113,8 +115,8 @@ def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None)
         if allowed is not None and row["nav_id"] not in allowed:
             continue
         known = wanted.setdefault(row["nav_id"], row)
-        for name in ("description", "reference_image_id"):
-            known[name] = known[name] or row[name]
+        for name in _BY_MODALITY:
+            known[name] = row[name] if known[name] is None else known[name]
     routes: dict[str, tuple[NDArray[np.int8], list[float]]] = {}
     for side in sorted({str(row["subset"]) for row in wanted.values()}):
         routes |= _routes(root, scene, side, wanted)
@@ -132,7 +134,7 @@ def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None)
         np.array([[wanted[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
         np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
         np.array([wanted[i]["action_budget"] for i in ids], np.int32),
-        {name: [wanted[i][name] for i in ids] for name in (*_TOLD, "description", "reference_image_id")},  # type: ignore[misc]
+        {name: [wanted[i][name] for i in ids] for name in (*_TOLD, *_BY_MODALITY)},
     )
 
 

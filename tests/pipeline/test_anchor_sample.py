@@ -296,7 +296,7 @@ def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
     assert [(r["object_id"], r["anchor_id"]) for r in rows] == [(o, k) for o in (0, 1) for k in range(3)]
     assert [xyz(r).tolist() for r in rows[:3]] == [xyz(auto[k]).tolist() for k in (2, 0, 1)]
     assert [(r["selected"], r["selected_by"]) for r in rows[:3]] == [
-        (True, "human"),
+        (True, "annotation"),
         (False, "auto"),
         (False, "auto"),
     ]
@@ -306,7 +306,7 @@ def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
     out = whole_run(place, [BALL, BUS], tmp_path, chosen=[by_hand])
     placed, *others = out.tables["anchors"].to_pylist()[:3]
     assert xyz(placed).tolist() == [by_hand[f"{a}_m"] for a in "xyz"]
-    assert (placed["selected"], placed["selected_by"]) == (True, "human")
+    assert (placed["selected"], placed["selected_by"]) == (True, "annotation")
     assert placed["surface_distance_m"] == pytest.approx(1.15, abs=0.02)
     assert placed["visible_fraction"] > 0.95
     assert [xyz(r).tolist() for r in others] == [xyz(r).tolist() for r in auto[:2]]

@@ -28,7 +28,7 @@ def anchor_rows(places, variants=3):
         {
             "scene": SCENE, "object_id": o, "anchor_id": a, "x_m": x, "y_m": y + 0.5 * a, "z_m": z, "yaw_rad": 0.0,
             "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 1.0, "score": 1.0 - a / 10, **OPINIONS,
-            "selected": a == variants // 2, "selected_by": "human" if variants // 2 else "auto",
+            "selected": a == variants // 2, "selected_by": "annotation" if variants // 2 else "auto",
         }
         for o, (x, y, z) in enumerate(places)
         for a in range(variants)

@@ -66,7 +66,7 @@ def data(tmp_path_factory) -> Path:
             anchors.append(
                 {"scene": SCENE, "object_id": k, "anchor_id": a, "x_m": p[0], "y_m": p[1], "z_m": p[2],
                  "yaw_rad": rng.uniform(-math.pi, math.pi), "clearance_m": 1.0, "surface_distance_m": 1.0,
-                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "human",
+                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "annotation",
                  **OPINIONS}
             )  # fmt: skip
     write(root, "anchors", schemas.ANCHORS, anchors)

@@ -142,7 +142,9 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         assert chrome.errors(browser) == []
     run_pipeline(scene.pipeline, data, stages=["filter"], scenes=[NAME], workers=1)
     anchors = store.read_scene(data, "anchors", NAME).to_pylist()
-    assert {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]} == dict.fromkeys(range(3), "human")
+    assert {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]} == dict.fromkeys(
+        range(3), "annotation"
+    )
     assert pc.sum(store.read_scene(data, "verdicts", NAME)["keep"]).as_py() >= 1
 
 

@@ -132,10 +132,14 @@ class Goal:
     description : str or None
         For semantic goals.
     image : (H, W, 3) uint8 or None
-        For image goals: the object as the drone's front camera sees it from the goal viewpoint; read-only.
+        For image goals: the object as the drone's front camera sees it from the goal viewpoint, or, where it would
+        not fit into the picture, from `image_distance_m` behind that viewpoint; read-only.
     rules : Rules
     heading : Heading or None
         Of the start pose, where it is told (``--tell heading``); None in the paper's setting.
+    image_distance_m : float or None
+        For image goals: how far from the goal viewpoint the picture was taken, metres, straight back along the
+        camera's axis. A Stop where it was taken fails if that is more than the success radius. None if unknown.
     """
 
     modality: str
@@ -146,6 +150,7 @@ class Goal:
     image: NDArray[np.uint8] | None
     rules: Rules
     heading: Heading | None = None
+    image_distance_m: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ class Options(BaseModel):
     request_retries: int = Field(default=3, ge=0, le=10)
     answer: Form = "auto"
     actions: Literal["sixteen", "eight"] = "sixteen"
-    move_m: Literal[1, 3, 5] = 3
+    move_m: Literal[1, 3, 5] = 1
     climb_m: Literal[1, 2] = 1
     views: tuple[View, ...] = Field(default=("front",), min_length=1)
     depth: bool = True  # Whether their depth is sent too

@@ -112,8 +112,19 @@ def goal_text(goal: Goal) -> str:
             f"{goal.heading.heading_deg}° (0° is north, 90° east). Turning right adds, turning left takes away."
         )
     if goal.image is not None:
-        return f"{where}\nThis picture shows the target from the viewpoint in front of it:"
+        return f"{where}\nThis picture shows the target {_camera_text(goal.image_distance_m)}:"
     return f"{where}\nDescription: {goal.description}"
+
+
+def _camera_text(distance_m: float | None) -> str:
+    if distance_m is None:
+        return "from the goal viewpoint in front of it, or from behind that viewpoint"
+    if distance_m == 0.0:
+        return "from the goal viewpoint in front of it"
+    return (
+        f"from {distance_m:g} m behind the goal viewpoint in front of it, so that all of it is in the picture; "
+        f"the goal viewpoint is {distance_m:g} m ahead of that camera"
+    )
 
 
 def step_text(observation: Observation, turns: Sequence[Turn]) -> str:

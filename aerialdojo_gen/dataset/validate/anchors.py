@@ -29,7 +29,7 @@ _STANDOFF_M = 1e-3
 def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Ranks of an object's anchors count from 0, the better score first, but for a person's choice."""
     ids, ranks, score = rows.ints("object_id"), rows.ints("anchor_id"), rows.floats("score")
-    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
     for object_id in np.unique(ids):
         own = np.flatnonzero(ids == object_id)
         own = own[np.argsort(ranks[own], kind="stable")]
@@ -38,7 +38,7 @@ def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
             if ranks[row] != expected:
                 yield Finding(row, f"rank {ranks[row]}", f"rank {expected}")
                 break
-            if score[row] > score[before] and not by_hand[before]:
+            if score[row] > score[before] and not annotated[before]:
                 yield Finding(row, f"score {score[row]:.6g}", f"{score[before]:.6g} at most, the rank before")
 
 
@@ -69,20 +69,20 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
     geometric = geometric * clarity_score(unoccluded, framed, 1.0 - unhindered, level)
-    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
+    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
-        uncalled = sorted(name for name in own if not asked[name] and not by_hand[row])
+        uncalled = sorted(name for name in own if not asked[name] and not annotated[row])
         total = sum(asked[name] for name in own)
         expected = sum(asked[name] * value for name, value in own.items()) / total if total else 0.0
         if uncalled:
             yield Finding(row, f"score_{uncalled[0]} = {own[uncalled[0]]:.6g}", "null: the scorer was not asked")
         elif "geometric" in own and abs(own["geometric"] - geometric[row]) > _SAME_SCORE:
             yield Finding(row, f"score_geometric = {own['geometric']:.6g}", f"{geometric[row]:.6g} by its parts")
-        elif not by_hand[row] and asked["geometric"] and "geometric" not in own:
+        elif not annotated[row] and asked["geometric"] and "geometric" not in own:
             yield Finding(row, "score_geometric is null", f"{geometric[row]:.6g} by its parts")
         # What a person placed was compared with nothing: it has the geometric score alone.
-        elif min(abs(score - s) for s in (expected, *([geometric[row]] if by_hand[row] else []))) > _SAME_SCORE:
+        elif min(abs(score - s) for s in (expected, *([geometric[row]] if annotated[row] else []))) > _SAME_SCORE:
             yield Finding(row, f"score = {score:.6g}", f"{expected:.6g} by its parts")
 
 
@@ -162,8 +162,8 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
     objects = data["objects"]
     item = objects.find("object_id", rows.column("object_id"))
-    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
-    fit = np.flatnonzero(sound(data, "objects", item) & ~by_hand)
+    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    fit = np.flatnonzero(sound(data, "objects", item) & ~annotated)
     centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
     off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))
@@ -175,8 +175,8 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
     scene = scene_mesh(data).scene
-    by_hand = np.asarray(rows.texts("selected_by"), dtype=object) == "human"
-    slack = np.where(by_hand, SLACK_M + _SAME_M, _STANDOFF_M)
+    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    slack = np.where(annotated, SLACK_M + _SAME_M, _STANDOFF_M)
     expected = data.pipeline.anchor_sample.standoff_m
     nodes = data["objects"].texts("mesh_node")
     item = data["objects"].find("object_id", rows.column("object_id"))

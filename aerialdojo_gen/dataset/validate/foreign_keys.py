@@ -221,6 +221,7 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
         "direction": objects.column("direction"),
         "description": objects.column("description"),
         "reference_image_id": objects.column("reference_image_id"),
+        "image_distance_m": objects.column("step_back_m"),
     }
     fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
     for name, column in theirs.items():

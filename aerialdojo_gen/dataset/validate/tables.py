@@ -20,7 +20,7 @@ _WORDS = {
     "direction": DIRECTIONS,
     "family": (*FAMILIES.values(), "Custom"),
     "partition": ("ID", "OOD"),
-    "selected_by": ("human", "auto"),
+    "selected_by": ("annotation", "auto"),
     "visible_view_at_start": VIEWS,
     "target_split": ("train", "test"),
 }

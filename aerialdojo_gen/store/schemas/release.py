@@ -59,6 +59,8 @@ TASKS = table(
     column("description", pa.string(), "the target's description; null for image goals", nullable=True),
     column("reference_image_id", pa.string(), "the target's picture in objects; null for semantic goals",
            nullable=True),
+    column("image_distance_m", pa.float64(),
+           "how far behind the goal that picture was taken; null for semantic goals or unknown", "m", True),
     *SPLITS,
     clusters=["setting", "modality"],
     plain=["task_id", "nav_id"],

@@ -125,7 +125,7 @@ ANCHOR_COLUMNS = (
     column("part_open", pa.float64(), "1 less the share that what stands nearer takes of the picture or of the "
            "object's box in it"),
     column("selected", pa.bool_(), "true for one anchor an object: the goal of its tasks"),
-    column("selected_by", pa.string(), "human or auto"),
+    column("selected_by", pa.string(), "annotation (an annotation places it) or auto (the score)"),
 )  # fmt: skip
 
 ANCHORS = table(

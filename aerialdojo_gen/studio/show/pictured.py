@@ -58,7 +58,8 @@ class PicturedTask:
         row = self.instance
         kind, name, landmark, direction, more = (row[key] for key in _TOLD)
         image = self.reference if kind == "image" else None
-        return goal_text(Goal(kind, name, landmark, direction, more, image, Rules(row["action_budget"])))
+        rules, distance_m = Rules(row["action_budget"]), row["image_distance_m"]
+        return goal_text(Goal(kind, name, landmark, direction, more, image, rules, image_distance_m=distance_m))
 
     @property
     def terminal_goal(self) -> str:

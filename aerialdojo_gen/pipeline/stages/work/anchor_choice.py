@@ -119,7 +119,7 @@ def with_choice(
         | {
             "anchor_id": rank,
             "selected": rank == 0,
-            "selected_by": "human" if rank == 0 else "auto",
+            "selected_by": "annotation" if rank == 0 else "auto",
             "no_front_reason": _off_front(row) if rank == 0 else None,
         }
         for rank, row in enumerate(ordered)

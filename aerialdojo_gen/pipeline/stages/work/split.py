@@ -102,6 +102,7 @@ def tasks_table(
             "direction": target.column("direction"),
             "description": target.column("description") if modality == "semantic" else nulls,
             "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
+            "image_distance_m": target.column("step_back_m") if modality == "image" else pa.nulls(n, pa.float64()),
             **seen_and_split,
         }
         instances.append(pa.table(columns, schema=TASKS.schema))
