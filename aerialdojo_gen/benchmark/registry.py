@@ -208,8 +208,8 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
         notes = [_MEANS.format(""), f"{counts.pop():,} episodes each." if len(counts) == 1 else f"Episodes: {sizes}."]
         if results:
             notes.append(
-                "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks; its ± fits the "
-                "sample standard deviation over eight maps. Its rows are ranked among themselves."
+                "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks; its ± fits "
+                "the sample standard deviation over eight maps. Its rows are ranked among themselves."
             )
         spec = TableSpec(
             NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), lambda _, own=rows: own,  # type: ignore[misc]

@@ -46,15 +46,22 @@ _HEAD_KEYS = (
 
 def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, int] | None = None) -> Scene:
     """Build the scene of a plan, and fill in the entry of each node; an `AssetError` names file, entry and key."""
-    head = validated(PlanHead, read_toml(path, AssetError), str(path))
+    return build_tables(path.stem, read_toml(path, AssetError), catalogue, entries, str(path))
+
+
+def build_tables(
+    name: str, tables: Mapping[str, Any], catalogue: Catalogue, entries: dict[str, int] | None = None, where: str = ""
+) -> Scene:
+    """Build the scene of a plan's tables; errors name it by `where`, its name by default."""
+    where = where or name
+    head = validated(PlanHead, dict(tables), where)
     recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
-    names = _names(head, catalogue, str(path))
-    site = Site(path.stem, recipe, catalogue)
-    made = _Building(site, names, str(path)).build(head)
+    site = Site(name, recipe, catalogue)
+    made = _Building(site, _names(head, catalogue, where), where).build(head)
     if entries is not None:
         entries.update(made)
     scene = site.scene()
-    check_inventory(scene, recipe, path)
+    check_inventory(scene, recipe, where)
     return scene
 
 
@@ -63,12 +70,12 @@ def is_plan(path: Path) -> bool:
     return "plan" in read_toml(path, AssetError)
 
 
-def check_inventory(scene: Scene, recipe: Recipe, path: Path) -> None:
+def check_inventory(scene: Scene, recipe: Recipe, where: object) -> None:
     """Raise an `AssetError` if a scene has fewer instances of a category than its file asks for."""
     found = Counter(instance.category for instance in scene.instances)
     short = [f"{c} (needs {n}, has {found[c]})" for c, n in recipe.inventory.items() if found[c] < n]
     if short:
-        raise AssetError(f"{path}: inventory: the scene has too few of {', '.join(short)}")
+        raise AssetError(f"{where}: inventory: the scene has too few of {', '.join(short)}")
 
 
 def _names(head: PlanHead, catalogue: Catalogue, where: str) -> PlanNames:
