@@ -32,7 +32,7 @@ class _Use:
 
     plan: str
     tables: Mapping[str, Any]  # The plan with this one entry, and what it needs
-    entry: int | None  # Its number there; None for a step of the ground
+    entry: str  # Its name there, as `build_tables` has it; empty for a step of the ground
     path: tuple[str | int, ...]  # From there to the table
 
     @property
@@ -88,12 +88,12 @@ def _uses(plans: Sequence[Path]) -> dict[str, list[_Use]]:
         whole = read_toml(path, AssetError)
         head = {key: value for key, value in whole.items() if key not in ("site", "inventory", "moves", "level")}
         for number, step in enumerate(whole.get("ground", {}).get("steps", ())):
-            found.setdefault(step["make"], []).append(_Use(path.stem, head, None, ("ground", "steps", number)))
+            found.setdefault(step["make"], []).append(_Use(path.stem, head, "", ("ground", "steps", number)))
         named: list[dict[str, Any]] = []
-        for entry in whole.get("site", ()):
+        for entry in [one for some in whole.get("site", ()) for one in some.get("entries", [some])]:
             tables = {**head, "site": [*named, entry]}
             for inner in _calls(entry):
-                use = _Use(path.stem, tables, len(named), ("site", len(named), *inner))
+                use = _Use(path.stem, tables, f"site[{len(named)}]", ("site", len(named), *inner))
                 found.setdefault(use.call["make"], []).append(use)
             named += [entry] if "as" in entry else []
     return {name: sorted(some, key=lambda use: _rank(use, some)) for name, some in found.items()}
@@ -162,7 +162,7 @@ def _scaled(value: Any, scale: float) -> Any:
 
 def _picture(use: _Use, catalogue: Catalogue) -> Image | None:
     """Build a use by itself; None where it cannot stand alone."""
-    entries: dict[str, int] = {}
+    entries: dict[str, str] = {}
     try:
         scene = build_tables(use.plan, use.tables, catalogue, entries)
     except AssetError:

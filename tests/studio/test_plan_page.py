@@ -63,7 +63,7 @@ def test_a_saved_plan_is_built_again_and_a_broken_one_keeps_the_last_scene(plan)
     with watched(plan) as url:
         first = json.loads(read(f"{url}api/state"))
         assert (first["error"], first["n_instances"], first["name"]) == ("", 3, "U_Yard_0")
-        assert first["entries"] == {node: {"entry": 1, "line": 9} for node in ("bench_000", "tractor_000")}
+        assert first["entries"] == {node: {"entry": "site[1]", "line": 9} for node in ("bench_000", "tractor_000")}
         payload = read(f"{url}api/scene")
         assert json.loads(read(f"{url}api/state")) == first
         save(plan, PLAN.replace("bench", "bensh"))
@@ -71,10 +71,10 @@ def test_a_saved_plan_is_built_again_and_a_broken_one_keeps_the_last_scene(plan)
         assert "site[1] (place): unknown category 'bensh': did you mean 'bench'?" in broken["error"]
         assert broken["n_instances"] == 3
         assert read(f"{url}api/scene") == payload
-        save(plan, PLAN + '[[site]]\nplace = [["mailbox", -8, 8]]\n')
+        save(plan, PLAN + '[[site]]\nentries = [\n  { place = [["mailbox", -8, 8]] },\n]\n')
         mended = json.loads(read(f"{url}api/state"))
         assert (mended["error"], mended["n_instances"]) == ("", 4)
-        assert mended["entries"]["mailbox_000"] == {"entry": 2, "line": 11}
+        assert mended["entries"]["mailbox_000"] == {"entry": "site[2].entries[0]", "line": 13}
         assert read(f"{url}api/scene") != payload
         plan.unlink()
         assert "U_Yard_0.toml" in json.loads(read(f"{url}api/state"))["error"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,13 +44,13 @@ _HEAD_KEYS = (
 )
 
 
-def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, int] | None = None) -> Scene:
+def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, str] | None = None) -> Scene:
     """Build the scene of a plan, and fill in the entry of each node; an `AssetError` names file, entry and key."""
     return build_tables(path.stem, read_toml(path, AssetError), catalogue, entries, str(path))
 
 
 def build_tables(
-    name: str, tables: Mapping[str, Any], catalogue: Catalogue, entries: dict[str, int] | None = None, where: str = ""
+    name: str, tables: Mapping[str, Any], catalogue: Catalogue, entries: dict[str, str] | None = None, where: str = ""
 ) -> Scene:
     """Build the scene of a plan's tables; errors name it by `where`, its name by default."""
     where = where or name
@@ -96,6 +96,16 @@ def _names(head: PlanHead, catalogue: Catalogue, where: str) -> PlanNames:
     return names
 
 
+def _entries(site: Sequence[dict[str, Any]]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield all entries, those in a list of short ones too, with their names."""
+    for number, entry in enumerate(site):
+        if "entries" not in entry:
+            yield f"site[{number}]", entry
+            continue
+        for inner, one in enumerate(entry["entries"]):
+            yield f"site[{number}].entries[{inner}]", one
+
+
 class _Building:
     """Builds the entries of one plan."""
 
@@ -104,26 +114,27 @@ class _Building:
         names.make_parts = self._all_parts
         self._placing: Mapping[str, Any] = {}
 
-    def build(self, head: PlanHead) -> dict[str, int]:
-        """Make the ground and then every entry, in order; returns the entry of each node."""
+    def build(self, head: PlanHead) -> dict[str, str]:
+        """Make the ground and then every entry, in order; returns the name of each node's entry, as in `site[3]`."""
         self._placing = head.placing
-        self._footings(head.site)
+        entries = list(_entries(head.site))
+        self._footings(entries)
         self._ground(head.ground)
-        made: dict[str, int] = {}
+        made: dict[str, str] = {}
         kinds: dict[str, Callable[[dict[str, Any], str], None]] = {
             "paint": self._paint, "make": self._make, "parts": self._structure, "place": self._place,
             "pattern": self._place,
         }  # fmt: skip
-        for number, entry in enumerate(head.site):
+        for name, entry in entries:
             kind = next((kind for kind in kinds if kind in entry), None)
-            where = f"{self._where}: site[{number}]"
+            where = f"{self._where}: {name}"
             if kind is None:
                 raise AssetError(f"{where}: an entry has one of paint, make, parts, place, pattern")
             try:
                 kinds[kind](entry, f"{where} ({kind})")
             except ShapeError as error:
                 raise AssetError(f"{where} ({kind}): {error}") from error
-            made |= {instance.node: number for instance in self._site.instances[len(made) :]}
+            made |= {instance.node: name for instance in self._site.instances[len(made) :]}
         return made
 
     def _read(self, model: type[Model], body: Mapping[str, Any], where: str) -> Model:
@@ -146,12 +157,12 @@ class _Building:
             # Numbers that are each within bounds and make no body together.
             raise AssetError(f"{where} {name!r}: {error}") from error
 
-    def _footings(self, entries: Sequence[Mapping[str, Any]]) -> None:
+    def _footings(self, entries: Sequence[tuple[str, Mapping[str, Any]]]) -> None:
         """Outline the things that the ground is to be levelled under, before it is made."""
-        for number, body in enumerate(entries):
+        for name, body in entries:
             if not body.get("level"):
                 continue
-            where = f"{self._where}: site[{number}] (place)"
+            where = f"{self._where}: {name} (place)"
             # Heights that builders return are not known yet.
             entry = self._read(Place, {key: body[key] for key in ("place", "frame") if key in body}, where)
             for raw in entry.place:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
 from aerialdojo_gen.scenes.recipe import Colour, Extent, Height, Level, Move, Origin, Sun
@@ -39,6 +39,20 @@ class PlanHead(BaseModel):
     placing: dict[str, Any] = {}  # What every `place` entry has that does not say otherwise, e.g. ``margin_m``
     ground: dict[str, Any] = {}
     site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES)] = []
+
+    @field_validator("site")
+    @classmethod
+    def _few_entries(cls, site: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        for number, entry in enumerate(site):
+            if "entries" in entry and (set(entry) != {"entries"} or not _tables(entry["entries"])):
+                raise ValueError(f"site[{number}]: entries is a list of entries, alone in its table")
+        if sum(len(entry.get("entries", [entry])) for entry in site) > MAX_ENTRIES:
+            raise ValueError(f"more than {MAX_ENTRIES:,} entries")
+        return site
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, dict) for one in value)
 
 
 class Ground(BaseModel):

@@ -30,7 +30,13 @@ def plan_schema() -> dict[str, Any]:
     ground = _schema(Ground, definitions)
     ground["properties"]["steps"]["items"] = {"anyOf": builders["ground"]}
     entries = [_schema(Paint, definitions), structure, place, *builders["site"]]
-    whole["properties"] |= {"ground": ground, "site": {"type": "array", "items": {"anyOf": entries}}}
+    definitions["Entry"] = {"anyOf": entries}
+    one = {"$ref": "#/$defs/Entry"}
+    several = {
+        "type": "object", "description": "Short entries, one a line.", "required": ["entries"],
+        "properties": {"entries": {"type": "array", "items": one}}, "additionalProperties": False,
+    }  # fmt: skip
+    whole["properties"] |= {"ground": ground, "site": {"type": "array", "items": {"anyOf": [one, several]}}}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Plan of a scene", **whole} | {
         "$defs": dict(sorted(definitions.items()))
     }

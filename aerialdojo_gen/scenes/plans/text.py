@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-_WIDTH = 118
+_WIDTH = 150
 
 
 def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
@@ -18,8 +18,15 @@ def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
         if plan.get(table):
             lines += ["", f"[{table}]", *(line for key, value in plan[table].items() for line in _pair(key, value))]
     for entry in plan.get("site", ()):
-        lines += ["", "[[site]]", *(line for key, value in entry.items() for line in _pair(key, value))]
+        lines += ["", *entry_lines(entry)]
     return "\n".join(lines) + "\n"
+
+
+def entry_lines(entry: Mapping[str, Any]) -> list[str]:
+    """Write an entry; of a list of short ones, each on a line."""
+    if "entries" in entry:
+        return ["[[site]]", "entries = [", *(f"  {_inline(one)}," for one in entry["entries"]), "]"]
+    return ["[[site]]", *(line for key, value in entry.items() for line in _pair(key, value))]
 
 
 _TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "placing", "ground")

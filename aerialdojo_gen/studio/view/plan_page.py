@@ -51,14 +51,14 @@ class WatchedPlan:
 
     def _build(self) -> _Built:
         head: dict[str, Any] = {"version": self._version, "file": str(self.path), "name": self.path.stem}
-        before, entries = time.perf_counter(), dict[str, int]()
+        before, entries = time.perf_counter(), dict[str, str]()
         try:
             scene = build_plan(self.path, load_catalogue(self._assets), entries)
             lines = _entry_lines(self.path.read_text(encoding="utf-8"))
         except (AerialDojoError, OSError) as error:
             return _Built(self._built.payload, {**self._built.state, **head, "error": one_line(str(error))})
         counts = {"n_triangles": scene.n_triangles, "n_instances": len(scene.instances)}
-        where = {node: {"entry": k, "line": lines[k]} for node, k in entries.items()}
+        where = {node: {"entry": name, "line": lines.get(name)} for node, name in entries.items()}
         seconds = round(time.perf_counter() - before, 2)
         return _Built(scene_payload(scene), {**head, **counts, "seconds": seconds, "error": "", "entries": where})
 
@@ -71,8 +71,18 @@ def _stat(file: Path) -> Any:
         return None
 
 
-def _entry_lines(text: str) -> list[int]:
-    return [number for number, line in enumerate(text.splitlines(), 1) if line.strip() == "[[site]]"]
+def _entry_lines(text: str) -> dict[str, int]:
+    """Number the lines where entries begin, by their names."""
+    found: dict[str, int] = {}
+    table = inner = -1
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() == "[[site]]":
+            table, inner = table + 1, -1
+            found[f"site[{table}]"] = number
+        elif table >= 0 and line.startswith("  {"):
+            inner += 1
+            found[f"site[{table}].entries[{inner}]"] = number
+    return found
 
 
 def plan_app(path: Path, assets: Path) -> FastAPI:

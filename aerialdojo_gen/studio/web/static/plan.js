@@ -30,7 +30,7 @@ function picked(hit) {
   const { category, variant, attributes } = node.instance, entry = state.entries[node.node];
   $("picked").replaceChildren(make("h2", {}, node.node), facts([
     ["category", words(category)], ...(variant ? [["variant", words(variant)]] : []),
-    ...(entry ? [["entry", `site[${entry.entry}], line ${entry.line}`]] : []),
+    ...(entry ? [["entry", `${entry.entry}, line ${entry.line}`]] : []),
     ...Object.entries(attributes).map(([key, value]) => [words(key), value]),
     ["point", node.point.map((v) => number(v, 2)).join(", ") + " m"],
   ]));
