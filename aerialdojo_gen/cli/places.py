@@ -45,7 +45,7 @@ def add_map(
 ) -> None:
     """Make scenes from a map: streets, buildings, trees and street furniture."""
     from aerialdojo_gen.imports import places
-    from aerialdojo_gen.imports.map_recipe import TownOptions
+    from aerialdojo_gen.imports.map_plan import TownOptions
 
     options = TownOptions(cell, attribution, seed, ceiling, drive_on)
     boxes = [_box(text) for text in bbox]

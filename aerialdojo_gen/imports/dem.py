@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
+from aerialdojo_gen.scenes.height_table import read_ascii_grid
 
 Floats = NDArray[np.float64]
 # Surveys have far fewer; crop a continental model first.
@@ -23,7 +24,6 @@ _MAX_TEXT_BYTES = 512 << 20
 _MAX_HEIGHT_M = 1e5
 _EDGE = 1e-6
 _DEGREES = 1.0
-_ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "nodata_value")
 _SUFFIXES = (".tif", ".tiff", ".asc", ".npz")
 
 
@@ -128,38 +128,11 @@ def _geotiff(path: Path) -> Dem:
 
 
 def _ascii(path: Path) -> Dem:
-    if path.stat().st_size > _MAX_TEXT_BYTES:
-        raise AssetError(f"{path} has more than {_MAX_TEXT_BYTES >> 20} MiB: cut a part out of it first")
-    head: dict[str, float] = {}
-    try:
-        with path.open(encoding="ascii") as file:
-            while True:
-                start = file.tell()
-                words = file.readline(200).split()
-                if len(words) != 2 or words[0].lower() not in _ASC_KEYS:
-                    file.seek(start)
-                    break
-                head[words[0].lower()] = float(words[1])
-            columns, rows, cell = int(head["ncols"]), int(head["nrows"]), head["cellsize"]
-            if min(columns, rows) < 1:
-                raise ValueError(f"{columns} columns, {rows} rows")
-            fits = columns * rows <= _MAX_CELLS
-            numbers = np.fromstring(file.read(), dtype=np.float64, sep=" ") if fits else None
-    except (KeyError, ValueError, OverflowError, UnicodeDecodeError) as error:
-        raise AssetError(
-            f"{path} is not an ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize): {_one_line(error)}"
-        ) from None
-    if numbers is None or numbers.size != columns * rows or not (cell > 0 and math.isfinite(cell)):
-        found = "too many" if numbers is None else f"{numbers.size:,}"
-        raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it truncated?")
-    z = numbers.reshape(rows, columns)
-    z[(z == head.get("nodata_value", -9999.0)) | ~(np.abs(z) < _MAX_HEIGHT_M)] = np.nan
-    half = 0.0 if "xllcenter" in head else cell / 2
-    west = head.get("xllcenter", head.get("xllcorner", 0.0)) + half
-    south = head.get("yllcenter", head.get("yllcorner", 0.0)) + half
-    north = south + (rows - 1) * cell
+    grid = read_ascii_grid(path, _MAX_CELLS, _MAX_TEXT_BYTES, _MAX_HEIGHT_M)
+    rows, columns = grid.heights_m.shape
+    west, north, cell = grid.west, grid.south + (rows - 1) * grid.cell, grid.cell
     geographic = cell * max(rows, columns) < 5 and abs(west) <= 180 and abs(north) <= 90 and cell < _DEGREES / 10
-    return Dem(path, z, west, north, cell, cell, geographic or None, _identity if geographic else None)
+    return Dem(path, grid.heights_m, west, north, cell, cell, geographic or None, _identity if geographic else None)
 
 
 def _npz(path: Path) -> Dem:

@@ -58,8 +58,8 @@ class Bridge:
         s = self.axis.project(Point(x, y))
         return float(np.interp(s, np.linspace(0.0, self.axis.length, len(self.heights_m)), self.heights_m))
 
-    def to_recipe(self) -> dict[str, Any]:
-        """Return the bridge as a table of the recipe."""
+    def to_plan(self) -> dict[str, Any]:
+        """Return the bridge as a table of the plan."""
         at = np.linspace(0.0, self.axis.length, len(self.heights_m))
         name = next((f.tags["name"] for f in self.members if f.tags.get("name")), "")[:80]
         points = [self.axis.interpolate(s) for s in at]

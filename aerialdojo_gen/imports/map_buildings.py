@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from statistics import median_low
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely import STRtree
 from shapely.geometry import Polygon
@@ -24,7 +25,7 @@ STOREY_M = 3.2
 _ROOF_LEVEL_M = 2.4
 _LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
 _LEAST_HOLE_M2 = 1.0
-# Recipes allow 1,000 points per ring.
+# As many as a line of a plan has, or a little less.
 _MOST_POINTS = 900
 _LEFT_OUT = "outlines left out: self-intersecting or with too many corners"
 _PITCH = 0.62
@@ -97,7 +98,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> li
 
 
 def rings_of(plan: Polygon) -> dict[str, Any]:
-    """Return the recipe keys of an area: `outline`, and `holes` if any."""
+    """Return the keys of an area: `outline`, and `holes` if any."""
     outline, *holes = ([list(at) for at in ring.coords[:-1]] for ring in (plan.exterior, *plan.interiors))
     return {"outline": outline, **({"holes": holes} if holes else {})}
 
@@ -112,7 +113,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
 def buildings(
     areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: MapSummary
 ) -> list[dict[str, Any]]:
-    """Make the recipe's buildings from map areas in metres."""
+    """Make the plan's buildings from map areas in metres."""
     outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
     parts = [a for a in areas if a.tags.get("building:part", "no") != "no" and not below_ground(a.tags)]
     levels = [n for a in outlines if (n := count(a.tags, "building:levels")) and n > 1]
@@ -124,7 +125,9 @@ def buildings(
     # Overlapping outlines are cut out of the larger building.
     for area in sorted(outlines, key=lambda a: (a.shape.area, a.key)):
         own = [parts[k] for k in sorted(tree.query(area.shape, predicate="contains"))]
-        plan = area.shape.difference(shapely.union_all(taken)) if taken else area.shape
+        # The union of thousands that are elsewhere takes minutes.
+        near = [taken[k] for k in np.flatnonzero(shapely.intersects(taken, area.shape))]
+        plan = area.shape.difference(shapely.union_all(near)) if near else area.shape
         taken = [*taken, area.shape]
         bodies = [
             b

@@ -65,7 +65,7 @@ _WATERWAYS = {"river": 8.0, "canal": 8.0, "stream": 1.6, "ditch": 1.0}
 
 
 def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> list[dict[str, Any]]:
-    """Make the recipe's streets and paths, clipped to a window somewhat larger than the site."""
+    """Make the plan's streets and paths, clipped to a window somewhat larger than the site."""
     out = []
     for feature in lines:
         made = _street(feature.tags)
@@ -156,7 +156,7 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 def areas(
     found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: MapSummary
 ) -> list[dict[str, Any]]:
-    """Make the recipe's areas, larger ones first, water above land."""
+    """Make the plan's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
     for feature in found:
         rule = _ground(feature.tags)

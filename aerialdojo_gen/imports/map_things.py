@@ -48,7 +48,7 @@ _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
            built: BaseGeometry, summary: MapSummary) -> list[dict[str, Any]]:  # fmt: skip
-    """Make the recipe's things: points of the map, rows of trees and bollards, small things drawn as areas.
+    """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas.
 
     What lies in a building is no street furniture, and is counted as left out; what is drawn within its wall's
     thickness is put before the wall.

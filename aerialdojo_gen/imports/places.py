@@ -1,4 +1,4 @@
-"""``add-map`` and ``add-terrain`` as functions: real places as recipes in a project folder."""
+"""``add-map`` and ``add-terrain`` as functions: real places as plans in a project folder."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import PIPELINE, check_free, write_pipeline
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
-from aerialdojo_gen.imports.map_recipe import TownOptions, town_recipe
+from aerialdojo_gen.imports.map_plan import TownOptions, TownPlan, town_plan
 from aerialdojo_gen.imports.osm import read_maps
-from aerialdojo_gen.imports.relief import ReliefOptions, ground_sampler, relief_recipe
+from aerialdojo_gen.imports.relief import ReliefOptions, ReliefPlan, ground_sampler, relief_plan
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
+from aerialdojo_gen.scenes.plans.build import build_plan, build_site
+from aerialdojo_gen.scenes.plans.text import plan_text
+from aerialdojo_gen.scenes.site import MAX_NODES
 from aerialdojo_gen.store.atomic import atomic_file, make_folder
 
 # Margin around the box: streets continue, and building parts may lie outside.
@@ -30,7 +33,7 @@ class AddedPlace:
     """A scene made of a real place."""
 
     name: str  # Of the scene
-    scene: Scene  # As its recipe is built
+    scene: Scene  # As its plan is built
     recipe: Path  # Files of the project
     pipeline: Path
     notes: tuple[str, ...]  # Lines for the user
@@ -56,11 +59,11 @@ def add_map(
     heights = None if dem is None else ground_sampler(read_dem(dem), options.cell_m)
     wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
-    texts = []
+    towns = []
     for one, box, found in zip(names, boxes, maps, strict=True):
-        text, summary = town_recipe(found, box, extract.name, options, heights)
-        texts.append((one, text, tuple(_summary_lines(dict(summary.counts)))))
-    return [_write_place(one, text, project, notes) for one, text, notes in texts]
+        town, summary = town_plan(found, box, extract.name, options, heights)
+        towns.append((one, town, tuple(_summary_lines(dict(summary.counts)))))
+    return [_write_place(one, town, project, notes) for one, town, notes in towns]
 
 
 def add_terrain(
@@ -72,24 +75,44 @@ def add_terrain(
     model = read_dem(dem)
     if options.bbox is not None:
         check_bbox(options.bbox)
-    text, notes = relief_recipe(model, options)
-    return _write_place(name, text, project, tuple(notes))
+    relief, notes = relief_plan(model, options)
+    return _write_place(name, relief, project, tuple(notes))
 
 
-def _write_place(name: str, text: str, project: Path, notes: tuple[str, ...]) -> AddedPlace:
-    """Build a recipe, and write it if that succeeds."""
+def _write_place(name: str, place: TownPlan | ReliefPlan, project: Path, notes: tuple[str, ...]) -> AddedPlace:
+    """Build a plan, place things where that leaves room, build it whole, and write it if that succeeds."""
+    catalogue = load_catalogue(home() / "scene_assets")
+    plan, sections = dict(place.plan.plan), dict(place.plan.sections)
+    # File names may contain any character, newlines too.
+    comments = "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in place.plan.comments)
+    table = place.plan.heights
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.toml"
-        trial.write_text(text, encoding="utf-8")
+        if table is not None:
+            (Path(folder) / f"{name}{HEIGHTS_SUFFIX}").write_text(table.text(), encoding="ascii")
         try:
-            scene = build_scene(trial, load_catalogue(home() / "scene_assets"))
+            site, _ = build_site(name, plan, catalogue, f"{name}.toml", Path(folder))
+            placer = place.place_things(site)
+            things, more = placer.entries()
+            sections |= {len(plan["site"]) + k: text for k, text in more.items()}
+            plan["site"] = [*plan["site"], *things]
+            text = plan_text(plan, comments, sections)
+            trial.write_text(text, encoding="utf-8")
+            scene = build_plan(trial, catalogue)
         except AssetError as error:
             raise AssetError(str(error).replace(f"{trial}", f"{name}.toml")) from None
+    if placer.left_out:
+        notes += (f"{placer.left_out:,} things left out: a scene has {MAX_NODES:,} instances at most",)
     for inner in ("scenes", "annotations"):
         make_folder(project / inner)
+    heights = f"scenes/{name}{HEIGHTS_SUFFIX}"
+    if table is not None:
+        with atomic_file(project, heights) as path:
+            path.write_text(table.text(), encoding="ascii")
     with atomic_file(project, f"scenes/{name}.toml") as path:
         path.write_text(text, encoding="utf-8")
-    (project / "scenes" / f"{name}.glb").unlink(missing_ok=True)
+    for left in (f"scenes/{name}.glb", *([heights] if table is None else [])):
+        (project / left).unlink(missing_ok=True)
     write_pipeline(project)
     return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)
 

@@ -1,8 +1,9 @@
-"""Convert a height model to the recipe of a scene."""
+"""Convert a height model to the plan of a scene."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,11 @@ from scipy.ndimage import distance_transform_edt
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
-from aerialdojo_gen.imports.toml_text import recipe_text
+from aerialdojo_gen.imports.placing import Placer
+from aerialdojo_gen.imports.relief_things import place_things
+from aerialdojo_gen.scenes.height_table import heights_text
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +28,8 @@ MOST_CELLS = 40_000
 _FINEST_M = 0.25
 _LEAST_SHARE = 0.5
 _HEADROOM_M = 25.0
+_SETTLE_M = 0.5
+_ROCK_SLOPE = 0.75
 
 
 def grid(
@@ -67,9 +74,55 @@ def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]
     return round(x, 6), round(y, 6)
 
 
-def to_centimetres(z: Floats) -> list[list[float]]:
-    """Round heights to centimetres, as recipes state them."""
-    return [[round(float(v), 2) for v in row] for row in z]
+@dataclass(frozen=True, eq=False)
+class HeightTable:
+    """Heights about the origin, on a square grid."""
+
+    rows_m: Floats  # To the centimetre; rows run from south to north
+    cell_m: float
+    datum_m: float  # The model's height that is z = 0
+
+    @classmethod
+    def of(cls, z: Floats, cell_m: float) -> HeightTable:
+        """Count heights from the lowest."""
+        datum = round(float(z.min()), 2)
+        return cls(np.round(z - datum, 2), cell_m, datum)
+
+    def terrain(self) -> Terrain:
+        """Make the terrain."""
+        rows, columns = self.rows_m.shape
+        return Terrain(-(columns - 1) * self.cell_m / 2, -(rows - 1) * self.cell_m / 2, self.cell_m, self.rows_m)
+
+    def text(self) -> str:
+        """Write the file that lies beside the plan."""
+        return heights_text(self.rows_m, self.cell_m)
+
+
+@dataclass(frozen=True)
+class PlacePlan:
+    """The plan of a real place."""
+
+    plan: dict[str, Any]
+    sections: dict[int, str]  # Comments of the entries that sections begin with
+    comments: tuple[str, ...]  # At the top
+    heights: HeightTable | None = None
+
+
+@dataclass(frozen=True)
+class ReliefPlan:
+    """The plan of a relief, but what is placed on the ground that it builds."""
+
+    plan: PlacePlan
+    surfaces: dict[str, float]  # What shows where, as the plan has it
+    water_z_m: float | None
+    bare: bool
+
+    def place_things(self, site: Site) -> Placer:
+        """Place things on the site that the plan has built."""
+        placer = Placer(site, _SETTLE_M)
+        if not self.bare:
+            place_things(placer, self.surfaces, self.water_z_m)
+        return placer
 
 
 def native_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
@@ -96,8 +149,8 @@ class ReliefOptions:
     attribution: str = ""
 
 
-def relief_recipe(dem: Dem, options: ReliefOptions) -> tuple[str, list[str]]:
-    """Write the recipe of a relief, and notes for the user."""
+def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[ReliefPlan, list[str]]:
+    """Make the plan of a relief, and notes for the user."""
     frame, middle, size = _place(dem, options)
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
         raise UsageError(
@@ -106,24 +159,26 @@ def relief_recipe(dem: Dem, options: ReliefOptions) -> tuple[str, list[str]]:
         )
     cell = round(choose_cell(size, options.cell_m, native_cell_m(dem, frame)), 4)
     size = whole_cells(size, cell)
-    z = grid(dem, size, cell, frame, middle)
-    datum = round(float(z.min()), 2)
-    top = float(z.max()) - datum
-    marks = {"water_z_m": options.water_m, "snow_z_m": options.snow_m, "sand_z_m": options.sand_m}
-    parameters: dict[str, Any] = {
-        **{key: round(value - datum, 2) for key, value in marks.items() if value is not None},
-        **({"bare": True} if options.bare else {}),
-        "heights": {"cell_m": cell, "rows_m": to_centimetres(z - datum)},
-    }
-    head = {
-        "layout": "relief", "seed": options.seed, "size_m": list(size),
+    table = HeightTable.of(grid(dem, size, cell, frame, middle), cell)
+    top = float(table.rows_m.max())
+    marks = {"water_m": options.water_m, "snow_from_m": options.snow_m, "sand_to_m": options.sand_m}
+    surfaces = {key: round(value - table.datum_m, 2) for key, value in marks.items() if value is not None}
+    water = surfaces.pop("water_m", None)
+    surfaces["rock_slope"] = _ROCK_SLOPE
+    plan = {
+        "plan": 1, "seed": options.seed, "size_m": list(size),
         "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if options.ceiling_m is None else options.ceiling_m,
         **({"attribution": options.attribution} if options.attribution else {}),
-        "origin": _origin(frame, middle, datum),
+        "origin": _origin(frame, middle, table.datum_m),
+        "ground": {"material": "meadow:#7a9148", "steps": [{"make": "surveyed_heights"}]},
+        "site": [
+            {"make": "surveyed_surfaces", **surfaces},
+            *([{"make": "water_over_low_ground", "to_m": water}] if water is not None else []),
+        ],
     }  # fmt: skip
     notes = [
         f"heights every {cell:g} m ({2 * round(size[0] / cell) * round(size[1] / cell):,} triangles), "
-        f"z = 0 is {datum:g} m, the highest point {top:.1f} m over it",
+        f"z = 0 is {table.datum_m:g} m, the highest point {top:.1f} m over it",
         "x east, y north, metres about "
         + (
             f"{frame.lat_deg:.6f} N, {frame.lon_deg:.6f} E"
@@ -137,7 +192,8 @@ def relief_recipe(dem: Dem, options: ReliefOptions) -> tuple[str, list[str]]:
             f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: filled with the nearest height"
         )
     comments = (f"Made by add-terrain of {dem.path.name}: {notes[0]}.", notes[1] + ".")
-    return recipe_text(head, parameters, comments), notes
+    whole = PlacePlan(plan, {0: "What shows by slope and height"}, comments, table)
+    return ReliefPlan(whole, surfaces, water, options.bare), notes
 
 
 def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:
@@ -158,15 +214,13 @@ def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float)
     return {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7), "z_m": datum}
 
 
-def ground_sampler(dem: Dem, cell_m: float | None = None) -> Any:
-    """Make the function that samples a town's ground: ``(frame, size_m) -> table``, with the datum in `z_m`."""
+def ground_sampler(dem: Dem, cell_m: float | None = None) -> Callable[[LocalFrame, tuple[float, float]], HeightTable]:
+    """Make the function that samples a town's ground: ``(frame, size_m) -> table``."""
 
-    def heights(frame: LocalFrame, size: tuple[float, float]) -> dict[str, Any]:
+    def heights(frame: LocalFrame, size: tuple[float, float]) -> HeightTable:
         cell = round(choose_cell(size, cell_m, native_cell_m(dem, frame)), 4)
         # Whole cells that cover the site: a town keeps the size of its bounding box.
         cover = tuple(math.ceil(s / cell / 2 - 1e-9) * 2 * cell for s in size)
-        z = grid(dem, (cover[0], cover[1]), cell, frame, (0.0, 0.0))
-        datum = round(float(z.min()), 2)
-        return {"cell_m": cell, "rows_m": to_centimetres(z - datum), "z_m": datum}
+        return HeightTable.of(grid(dem, (cover[0], cover[1]), cell, frame, (0.0, 0.0)), cell)
 
     return heights

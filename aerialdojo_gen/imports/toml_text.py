@@ -1,30 +1,10 @@
-"""Write recipes as readable TOML."""
+"""Values as TOML."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from typing import Any
-
-
-def recipe_text(head: Mapping[str, Any], parameters: Mapping[str, Any], comments: tuple[str, ...] = ()) -> str:
-    """Write a recipe."""
-    # File names may contain any character, newlines too.
-    lines = ["# " + "".join(c if c.isprintable() else "?" for c in line) for line in comments]
-    lines += [f"{key} = {toml_value(value)}" for key, value in head.items()]
-    plain = {k: v for k, v in parameters.items() if not _tables(v) and not isinstance(v, Mapping)}
-    lines += ["", "[parameters]", *(f"{key} = {toml_value(value)}" for key, value in plain.items())]
-    for key, value in parameters.items():
-        if isinstance(value, Mapping):
-            lines += ["", f"[parameters.{key}]", *(f"{k} = {toml_value(v)}" for k, v in value.items())]
-        elif _tables(value):
-            for table in value:
-                lines += ["", f"[[parameters.{key}]]", *(f"{k} = {toml_value(v)}" for k, v in table.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], Mapping)
 
 
 def toml_value(value: Any) -> str:

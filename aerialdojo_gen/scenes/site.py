@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,14 +23,17 @@ from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
 # The largest scene of the dataset has 479.
-_MAX_NODES = 5_000
+MAX_NODES = 5_000
 
 
 class Site:
     """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres."""
 
-    def __init__(self, name: str, recipe: Recipe, catalogue: Catalogue, parameters: Any = None) -> None:
+    def __init__(
+        self, name: str, recipe: Recipe, catalogue: Catalogue, parameters: Any = None, folder: Path | None = None
+    ) -> None:
         self.name = name
+        self.folder = folder  # Of the scene's file, and of a table of heights beside it
         self.recipe = recipe
         self.catalogue = catalogue
         self.parameters = parameters
@@ -257,8 +261,8 @@ class Site:
     def _reserve_node(self, node: str) -> str:
         if node in self._nodes:
             raise AssetError(f"{self.name}: node {node!r} exists already; choose another name")
-        if len(self._nodes) >= _MAX_NODES:
-            raise AssetError(f"{self.name}: more than {_MAX_NODES:,} instances in the scene")
+        if len(self._nodes) >= MAX_NODES:
+            raise AssetError(f"{self.name}: more than {MAX_NODES:,} instances in the scene")
         self._nodes.add(node)
         return node
 

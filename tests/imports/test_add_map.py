@@ -1,7 +1,9 @@
 """add-map: a town's buildings, streets and things are the map's, and stand on the ground that is given."""
 
+import re
 import sys
 
+import jsonschema
 import numpy as np
 import pytest
 import shapely
@@ -11,13 +13,13 @@ from support import maps
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.earth import format_bbox, size_m, tile_bboxes
-from aerialdojo_gen.imports.map_recipe import TownOptions
+from aerialdojo_gen.imports.map_plan import TownOptions
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
-from aerialdojo_gen.scenes.recipe import load_recipe
+from aerialdojo_gen.scenes.plans.schema import plan_schema
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +99,8 @@ def test_streets_lie_on_the_ground_with_marks_and_a_crossing(town):
     stripes = marks[(np.abs(marks[:, 0]) < 2) & (np.abs(marks[:, 1]) < 3.3)]
     assert len(np.unique(np.round(stripes[:, 1], 1))) >= 6  # both edges of three stripes or more
     # The tunnel is not there.
-    recipe = load_recipe(town.recipe)
-    assert all(abs(y + 70) > 1 for road in recipe.parameters["roads"] for _, y in road["line"])
+    streets = maps.made_by(town, "street_network")["streets"]
+    assert all(abs(y + 70) > 1 for street in streets for _, y in street["line"])
     assert any("1 ways in tunnels" in line for line in town.notes)
 
 
@@ -152,7 +154,7 @@ def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
     place = add_map(
         "Town", extract, tmp_path / "mine", bbox=[maps.box()], options=TownOptions(attribution="A survey"), dem=dem
     )[0]
-    datum = load_recipe(place.recipe).origin.z_m
+    datum = maps.plan_of(place)["origin"]["z_m"]
     places = np.random.default_rng(5).uniform(-55, 55, size=(300, 2))
     z = ground_of(place.scene, places) + datum
     # Between points of 2 m the hill bends by less than 3 cm; pavements rise by 12.
@@ -168,6 +170,41 @@ def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
     assert things
     assert np.abs(np.array([i.bounds[0, 2] for i in things]) - under).max() < 0.35
     assert "A survey" in place.scene.attribution
+
+
+def test_what_is_written_is_a_plan_as_the_schema_has_it(town):
+    validator = jsonschema.Draft202012Validator(plan_schema())
+    assert not [error.message for error in validator.iter_errors(maps.plan_of(town))]
+
+
+def test_what_a_person_changes_in_the_plan_is_what_is_built(town, tmp_path):
+    text = town.recipe.read_text()
+    assert "# Added by rule: parked and driving vehicles\n" in text
+    bench = re.search(r'\["bench:wooden", -40, 7.6, 270\]', text)
+    changed = text.replace(bench[0], '["bench:wooden", -44, 7.6, 90]').replace("top_m = 21.5", "top_m = 24.7")
+    # All that rules add, without which only the map is left.
+    changed = changed.partition("\n# Added by rule")[0] + "\n"
+    (tmp_path / "Town.toml").write_text(changed)
+    scene = build_scene(tmp_path / "Town.toml", load_catalogue(home() / "scene_assets"))
+    assert scene["bench_000"].centroid[:2] == pytest.approx((-44.0, 7.6), abs=0.3)
+    assert max(float(i.bounds[1, 2]) for i in scene.instances) == pytest.approx(24.7, abs=0.01)
+    left = {i.category for i in scene.instances}
+    assert {"bus_shelter", "statue", "urban_tree", "house"} <= left
+    assert not left & {"sedan", "street_lamp", "air_conditioner"}
+
+
+def test_beyond_the_most_that_a_scene_has_things_are_left_out_and_counted(extract, tmp_path, monkeypatch):
+    monkeypatch.setattr("aerialdojo_gen.imports.placing.MAX_NODES", 20)
+    place = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()])[0]
+    assert len(place.scene.instances) == 20
+    assert {"house", "statue", "bus_shelter"} <= {i.category for i in place.scene.instances}
+    assert re.search(r"^[1-9][0-9]* things left out: a scene has [0-9,]+ instances at most$", place.notes[-1])
+
+
+def test_a_recipe_of_an_older_version_says_what_to_run(tmp_path):
+    (tmp_path / "Town.toml").write_text('layout = "town"\nsize_m = [60, 60]\nceiling_m = 20\n[parameters]\n')
+    with pytest.raises(AssetError, match=r"plans since version 0\.2\.0: run add-map again, with --force$"):
+        build_scene(tmp_path / "Town.toml", load_catalogue(home() / "scene_assets"))
 
 
 def test_whose_data_it_is_stands_in_the_mesh_and_in_the_table(town, tmp_path):
@@ -190,14 +227,14 @@ def test_a_box_is_cut_into_tiles_with_a_shared_frame(extract, tmp_path):
     assert cut[3][2:] == pytest.approx((east, north), abs=1e-8)
     places = add_map("Tiles", extract, tmp_path / "mine", bbox=[box], tile_m=60.0)
     assert [p.name for p in places] == ["Tiles-1", "Tiles-2", "Tiles-3", "Tiles-4"]
-    origins = [load_recipe(p.recipe).origin for p in places]
-    x, y = maps.FRAME.metres([o.lon_deg for o in origins], [o.lat_deg for o in origins])
+    origins = [maps.plan_of(p)["origin"] for p in places]
+    x, y = maps.FRAME.metres([o["lon_deg"] for o in origins], [o["lat_deg"] for o in origins])
     assert np.round(np.column_stack([x, y])).tolist() == [[-30, -30], [30, -30], [-30, 30], [30, 30]]
     # The street runs on from one to the next.
     for place, side in ((places[0], 30.0), (places[2], -30.0)):
         assert (
             shapely.union_all(
-                [shapely.LineString(road["line"]) for road in load_recipe(place.recipe).parameters["roads"]]
+                [shapely.LineString(one["line"]) for one in maps.made_by(place, "street_network")["streets"]]
             ).distance(Point(-10, side))
             < 0.1
         )

@@ -61,9 +61,7 @@ def test_the_ground_is_the_models_by_interpolation(added):
 
 
 def read_dem_origin(place):
-    from aerialdojo_gen.scenes.recipe import load_recipe
-
-    return load_recipe(place.recipe).origin.z_m
+    return maps.plan_of(place)["origin"]["z_m"]
 
 
 def test_nobody_flies_below_the_relief(added):
@@ -105,6 +103,39 @@ def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
     for a, b in zip(rebuilt.instances, added.scene.instances, strict=True):
         assert a.node == b.node
         assert np.array_equal(a.vertices, b.vertices)
+
+
+def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path):
+    from aerialdojo_gen.pipeline.stage import ProjectPaths
+    from aerialdojo_gen.pipeline.stages.hooks import scene_sources
+
+    place = add_terrain("Hill", hill, tmp_path / "mine", ReliefOptions(bare=True))
+    table = place.recipe.with_name("Hill.heights.asc")
+    assets = home() / "scene_assets"
+    assert table in scene_sources(ProjectPaths(tmp_path, assets, table.parent, tmp_path), "Hill")
+    # An ESRI ASCII grid, that this program reads as any other one.
+    assert np.abs(read_dem(table).heights_m + read_dem_origin(place) - maps.heights(2.0, 60.0)).max() < 0.0051
+    text = table.read_text()
+    head, first, rest = text.split("\n", 6)[:5], text.split("\n", 6)[5], text.split("\n", 6)[6]
+    faults = {
+        "is it truncated": text[: len(text) // 2],
+        "ncols": text.replace("ncols", "columns"),
+        "each within 2,000 m": "\n".join([*head, first.replace("0.00", "-9999", 1), rest]),
+        "the site has 120 by 120 m": text.replace("cellsize 2.0", "cellsize 1.0"),
+    }
+    for said, wrong in faults.items():
+        table.write_text(wrong)
+        with pytest.raises(AssetError, match=said) as found:
+            build_scene(place.recipe, load_catalogue(assets))
+        assert str(found.value).startswith(f"{place.recipe}: [ground] steps[0] 'surveyed_heights': ")
+        assert "\n" not in str(found.value)
+    table.unlink()
+    with pytest.raises(AssetError, match=r"Hill\.heights\.asc cannot be read .*: it belongs beside the plan"):
+        build_scene(place.recipe, load_catalogue(assets))
+    (tmp_path / "elsewhere.asc").write_text(text)
+    table.symlink_to(tmp_path / "elsewhere.asc")
+    with pytest.raises(AssetError, match="leads out of its folder"):
+        build_scene(place.recipe, load_catalogue(assets))
 
 
 def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):

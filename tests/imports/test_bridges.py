@@ -13,7 +13,6 @@ from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.layouts.build import build_scene
-from aerialdojo_gen.scenes.recipe import load_recipe
 
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 
@@ -35,8 +34,8 @@ def hits(caster, places, z, way):
 
 
 def bridge_at(town, x, y):
-    """The recipe's bridge whose axis passes a place, and what was built of it."""
-    tables = load_recipe(town.recipe).parameters["bridges"]
+    """The plan's bridge whose axis passes a place, and what was built of it."""
+    tables = maps.made_by(town, "street_network")["bridges"]
     k = min(range(len(tables)), key=lambda k: LineString(tables[k]["line"]).distance(Point(x, y)))
     built = [i for i in town.scene.instances if i.category == "bridge"]
     assert len(built) == len(tables) == 3
@@ -98,11 +97,11 @@ def test_roads_climb_without_steps_and_decks_stand_on_something(town, caster, x,
 
 
 def test_ways_side_by_side_share_a_deck(town):
-    recipe = load_recipe(town.recipe).parameters
+    network = maps.made_by(town, "street_network")
     table, built = bridge_at(town, -30.0, 20.0)
-    number = recipe["bridges"].index(table)
-    on = [road for road in recipe["roads"] if road.get("bridge") == number]
-    assert {road["kind"] for road in on} == {"side", "path"}
+    number = network["bridges"].index(table)
+    on = [street for street in network["streets"] if street.get("bridge") == number]
+    assert {street.get("kind", "street") for street in on} == {"street", "path"}
     plan = shapely.union_all([LineString(road["line"]).buffer(road["width_m"] / 2, cap_style="flat") for road in on])
     west, east = plan.bounds[0], plan.bounds[2]
     low, high = built.bounds
@@ -157,7 +156,7 @@ def test_over_a_valley_the_deck_is_level_and_its_piers_reach_down(tmp_path):
     assert grid.reachable(np.array([1.5, 0.0, 5.0])) or grid.reachable(np.array([4.5, 0.0, 5.0]))
 
 
-def test_a_recipe_that_cannot_be_is_one_line(town, tmp_path):
+def test_a_plan_that_cannot_be_is_one_line(town, tmp_path):
     text = town.recipe.read_text()
     for wrong, said in (
         (text.replace("bridge = 0", "bridge = 7", 1), "bridge 7 is none of 3"),

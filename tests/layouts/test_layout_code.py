@@ -20,9 +20,7 @@ from aerialdojo_gen.scenes.recipe import load_recipe
 SOURCES = Path(aerialdojo_gen.__file__).parent
 PROJECT = SOURCES.parent
 ASSETS = PROJECT / "scene_assets"
-# Layouts of real places have no scene among the 42.
-PLACES = PROJECT / "tests" / "layouts" / "places"
-FILES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml"), *PLACES.glob("*.toml")])
+FILES = sorted([*ASSETS.glob("scenes/*.toml"), *ASSETS.glob("smoke/*.toml")])
 RECIPES = [path for path in FILES if not is_plan(path)]
 BUILD = BY_NAME["build-scenes"]
 # It calls the layouts, and belongs to none.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,17 @@ BRIDGES = [
 AREAS = [([(8, -18), (55, -18), (55, -55), (8, -55)], {"leisure": "park", "name": "Old Park"})]
 
 
+def plan_of(place) -> dict:
+    """The plan that was written of a place."""
+    return tomllib.loads(place.recipe.read_text(encoding="utf-8"))
+
+
+def made_by(place, builder: str) -> dict:
+    """The one entry of its plan that a builder makes."""
+    (entry,) = (one for one in plan_of(place)["site"] if one.get("make") == builder)
+    return entry
+
+
 def box(half_m: float = HALF_M) -> tuple[float, float, float, float]:
     """Bounding box of the town, degrees."""
     (west, east), (south, north) = FRAME.degrees([-half_m, half_m], [-half_m, half_m])
@@ -77,7 +89,7 @@ def write_map(path: Path, lines: list, points: list = (), *, order: int = 1) -> 
     """Write ways (points in metres, tags) and points of a map; ways share the points that lie in one place."""
     import osmium
 
-    ids = iter(range(1, 10_000))
+    ids = iter(range(1, 1_000_000))
     nodes, ways = [], []
 
     def node(x: float, y: float, tags: dict[str, str] | None = None) -> int:

@@ -12,6 +12,7 @@ from aerialdojo_gen.base.errors import AssetError, Malformed
 from aerialdojo_gen.base.safe_parse import loads_toml, read_toml
 from aerialdojo_gen.scenes import layouts
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
+from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.sections import AnchorSampleConfig, PlanConfig, RenderConfig, SplitConfig
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 
 
 def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
-    """List a scene's recipe, the mesh next to it, materials and catalogue."""
-    mesh = roots.recipes / f"{scene}.glb"
+    """List a scene's recipe, the mesh or the heights next to it, materials and catalogue."""
+    beside = (roots.recipes / f"{scene}{suffix}" for suffix in (".glb", HEIGHTS_SUFFIX))
     return [
         roots.recipes / f"{scene}.toml",
-        *([mesh] if mesh.is_file() else []),
+        *(path for path in beside if path.is_file()),
         roots.scene_assets / "materials.toml",
         *catalogue_files(roots.scene_assets),
     ]

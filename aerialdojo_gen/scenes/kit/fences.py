@@ -84,6 +84,29 @@ def _pieces(line: Line, piece_m: float) -> Iterator[Line]:
 
 
 @site_builder
+def garden_walls(
+    site: Site, *, lines: list[Line], height_m: Number = 1.4, thickness_m: Number = 0.3, material: Material = "stone"
+) -> None:
+    """Put up walls along lines, on the ground at their points."""
+    for line in lines:
+        body = wall(site, line, height_m, thickness_m)
+        site.add(None, "garden_wall", [(material, body)], footprint=LineString(line).buffer(0.2))
+
+
+@site_builder
+def bar_fences(site: Site, *, lines: list[Line], height_m: Number = 1.1, material: Material = "iron") -> None:
+    """Put up fences of three bars between posts along lines, on the ground at their points."""
+    for line in lines:
+        parts = [(material, wall(site, line, 0.06, 0.04, z=height_m * share)) for share in (0.2, 0.55, 0.92)]
+        leg = LineString(line)
+        count = max(round(leg.length / 2.0), 1)
+        for at in (leg.interpolate(leg.length * k / count) for k in range(count + 1)):
+            post = box(size=(0.06, 0.06, height_m))
+            parts.append((material, translated(post, (at.x, at.y, site.ground_z(at.x, at.y)))))
+        site.add(None, "railing", parts, footprint=leg.buffer(0.1))
+
+
+@site_builder
 def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Area) -> None:
     """Plant a hedge around a disc ``[x, y, radius]``, with an opening."""
     left = ground.disc(*disc, 12).exterior.difference(opening)

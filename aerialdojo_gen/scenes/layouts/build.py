@@ -19,6 +19,9 @@ from aerialdojo_gen.scenes.plans.build import build_plan, check_inventory, is_pl
 from aerialdojo_gen.scenes.recipe import Imported, Recipe, load_imported, load_recipe, validated
 from aerialdojo_gen.scenes.site import Site
 
+# Layouts of versions before 0.2.0, and the commands that make plans instead.
+_NOW_PLANS = {"town": "add-map", "relief": "add-terrain"}
+
 
 def build_scene(recipe_path: Path, catalogue: Catalogue) -> Scene:
     """Build the scene of a recipe.
@@ -85,6 +88,9 @@ def _imported(recipe_path: Path, imported: Imported) -> Scene:
 
 def _layout(recipe: Recipe, path: Path) -> ModuleType:
     known = layouts.layout_modules()
+    if recipe.layout in _NOW_PLANS:
+        again = f"run {_NOW_PLANS[recipe.layout]} again, with --force"
+        raise AssetError(f"{path}: scenes of real places are plans since version 0.2.0: {again}")
     if recipe.layout not in known:
         raise AssetError(f"{path}: unknown layout {recipe.layout!r}{nearest(recipe.layout, known)}")
     return importlib.import_module(f"{layouts.__name__}.{known[recipe.layout]}")

@@ -46,23 +46,30 @@ _HEAD_KEYS = (
 
 def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, str] | None = None) -> Scene:
     """Build the scene of a plan, and fill in the entry of each node; an `AssetError` names file, entry and key."""
-    return build_tables(path.stem, read_toml(path, AssetError), catalogue, entries, str(path))
+    return build_tables(path.stem, read_toml(path, AssetError), catalogue, entries, str(path), path.parent)
 
 
 def build_tables(
-    name: str, tables: Mapping[str, Any], catalogue: Catalogue, entries: dict[str, str] | None = None, where: str = ""
-) -> Scene:
+    name: str, tables: Mapping[str, Any], catalogue: Catalogue, entries: dict[str, str] | None = None,
+    where: str = "", folder: Path | None = None,
+) -> Scene:  # fmt: skip
     """Build the scene of a plan's tables; errors name it by `where`, its name by default."""
-    where = where or name
-    head = validated(PlanHead, dict(tables), where)
-    recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
-    site = Site(name, recipe, catalogue)
-    made = _Building(site, _names(head, catalogue, where), where).build(head)
+    site, made = build_site(name, tables, catalogue, where or name, folder)
     if entries is not None:
         entries.update(made)
     scene = site.scene()
-    check_inventory(scene, recipe, where)
+    check_inventory(scene, site.recipe, where or name)
     return scene
+
+
+def build_site(
+    name: str, tables: Mapping[str, Any], catalogue: Catalogue, where: str, folder: Path | None
+) -> tuple[Site, dict[str, str]]:
+    """Build all that a plan says on a site, where more may be placed, and list the entry of each node."""
+    head = validated(PlanHead, dict(tables), where)
+    recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
+    site = Site(name, recipe, catalogue, folder=folder)
+    return site, _Building(site, _names(head, catalogue, where), where).build(head)
 
 
 def is_plan(path: Path) -> bool:

@@ -9,16 +9,23 @@ from typing import Any
 _WIDTH = 150
 
 
-def plan_text(plan: Mapping[str, Any], comment: str = "") -> str:
-    """Write a plan; reading the text gives the same values."""
+def plan_text(plan: Mapping[str, Any], comment: str = "", sections: Mapping[int, str] | None = None) -> str:
+    """Write a plan; reading the text gives the same values.
+
+    `sections` has the comments of the entries that a section begins with; those between follow without a blank line.
+    """
     head = {key: value for key, value in plan.items() if key not in _TABLES and key != "site"}
     lines = [f"# {line}" for line in comment.splitlines()]
     lines += [line for key, value in head.items() for line in _pair(key, value)]
     for table in _TABLES:
         if plan.get(table):
             lines += ["", f"[{table}]", *(line for key, value in plan[table].items() for line in _pair(key, value))]
-    for entry in plan.get("site", ()):
-        lines += ["", *entry_lines(entry)]
+    for number, entry in enumerate(plan.get("site", ())):
+        if sections is None or number in sections:
+            lines.append("")
+        if sections is not None and number in sections:
+            lines.append(f"# {sections[number]}")
+        lines += entry_lines(entry)
     return "\n".join(lines) + "\n"
 
 

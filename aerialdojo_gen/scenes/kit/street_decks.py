@@ -1,21 +1,23 @@
-"""Bridges of a town: decks on piers between ramps, over what passes below."""
+"""Decks of bridges that streets, paths or rails lie on: piers between ramps, over what passes below."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import Field
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, polygons_of
-from aerialdojo_gen.scenes.layouts.places.town.model import Bridge
-from aerialdojo_gen.scenes.layouts.places.town.roofs import Parts
 from aerialdojo_gen.scenes.mesh import Mesh, flipped, merge, mesh, translated
+from aerialdojo_gen.scenes.plans.values import Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
@@ -32,26 +34,37 @@ _SLICE_M = 4.0
 
 
 @dataclass(frozen=True)
-class Deck:
-    """A bridge where it stands.
+class Bridge:
+    """A deck that streets, paths or rails lie on, with its ramps."""
 
-    Attributes
-    ----------
-    bridge : Bridge
-        Of the recipe.
-    plan : shapely geometry
-        Deck and ramps from above, where they are over the ground, metres.
-    span, solid : shapely geometry
-        What of the plan is free below, and what is not.
-    heights : Terrain
-        Of the road.
-    """
+    line: Line  # From the foot of one ramp to that of the other, points at equal distances
+    # Of the road at those points, over the straight line between the ground at both ends.
+    heights_m: Annotated[list[Annotated[Number, Field(ge=0, le=60)]], Field(min_length=2, max_length=1000)]
+    span_m: tuple[Number, Number]  # What of the line is bridge; before and behind it are ramps
+    depth_m: Annotated[Number, Field(ge=0.1, le=5)] = 0.8  # Thickness of the deck
+    rails: Annotated[list[Line], Field(max_length=100)] = field(default_factory=list)  # Tracks on it
+    name: str = ""  # What a person calls it
+    concrete: Material = "concrete:#a19d95"
+    paving: Material = "paving:#aaa59c"
+    abutment: Material = "stone"
+
+    def __post_init__(self) -> None:
+        """Check that the numbers make a bridge."""
+        if len(self.line) != len(self.heights_m):
+            raise ValueError("line and heights_m of a bridge must have as many points")
+        if not 0.0 <= self.span_m[0] < self.span_m[1]:
+            raise ValueError("span_m of a bridge runs from a place on its line to one farther along")
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A bridge where it stands."""
 
     bridge: Bridge
-    plan: BaseGeometry
-    span: BaseGeometry
+    plan: BaseGeometry  # Deck and ramps from above, where they are over the ground
+    span: BaseGeometry  # What of the plan is free below, and what is not
     solid: BaseGeometry
-    heights: Terrain
+    heights: Terrain  # Of the road
 
 
 def deck(site: Site, bridge: Bridge, ways: Sequence[BaseGeometry]) -> Deck | None:
@@ -83,32 +96,20 @@ def deck(site: Site, bridge: Bridge, ways: Sequence[BaseGeometry]) -> Deck | Non
 
 
 def put_up_bridge(site: Site, deck: Deck, surfaces: Sequence[Surface], below: BaseGeometry) -> None:
-    """Build a bridge.
-
-    Parameters
-    ----------
-    site : Site
-        Where.
-    deck : Deck
-        Where it stands.
-    surfaces : sequence of Surface
-        What is painted on it, in order.
-    below : shapely geometry
-        Streets, paths and rails below, which piers keep off.
-    """
+    """Build a bridge with surfaces painted on it; piers keep off the streets and rails `below`."""
     depth, axis = deck.bridge.depth_m, LineString(deck.bridge.line)
-    concrete = site.material("bridge", "concrete:#a19d95")
+    concrete = deck.bridge.concrete
     rim = _parapets(site, deck, axis)
     painted = [*surfaces, *(Surface(p, concrete, _PARAPET_M, concrete) for p in polygons_of(rim))]
     parts: Parts = []
     for plan in polygons_of(deck.plan):
-        parts += ground_meshes(deck.heights, plan, site.material("pavement", "paving:#aaa59c"), painted)
+        parts += ground_meshes(deck.heights, plan, deck.bridge.paving, painted)
     for plan in polygons_of(deck.span):
         under = [m for _, m in ground_meshes(deck.heights, plan, concrete, ())]
         parts += [(concrete, flipped(translated(m, (0.0, 0.0, -depth)))) for m in under]
         parts.append((concrete, _walls(plan, deck.heights, deck.heights, -depth)))
     for plan in polygons_of(deck.solid):
-        parts.append((site.material("abutment", "stone"), _walls(plan, deck.heights, site.terrain, -_SUNK_M)))
+        parts.append((deck.bridge.abutment, _walls(plan, deck.heights, site.terrain, -_SUNK_M)))
     parts += [(concrete, pier) for pier in _piers(site, deck, axis, below)]
     attributes = {"place": f"called {deck.bridge.name}"} if deck.bridge.name else {}
     site.add(None, "bridge", [(material, m) for material, m in parts if len(m.faces)], attributes)
@@ -211,6 +212,3 @@ def _occupy(site: Site, deck: Deck, axis: LineString) -> None:
         if not part.is_empty:
             z = deck.heights.z(*shapely.get_coordinates(part).T)
             site.occupy(part.buffer(0.1), float(z.min()) - deck.bridge.depth_m - 0.1, 1000.0)
-
-
-__all__ = ["Deck", "deck", "put_up_bridge"]

@@ -1,0 +1,234 @@
+"""Convert map data to the plan of a town."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_things
+from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
+from aerialdojo_gen.imports.map_buildings import MapSummary
+from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows, plan_of
+from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
+from aerialdojo_gen.imports.placing import Placer
+from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M, HeightTable, PlacePlan
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.kit.street_decks import Bridge
+from aerialdojo_gen.scenes.kit.street_network import Street, lay_out
+from aerialdojo_gen.scenes.site import Site
+
+# Streets extend beyond the border, to hide their ends.
+_BEYOND_M = 15.0
+_HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0
+# Built-up share above which the ground is paved.
+_PAVED = 0.12
+_MAX_ITEMS, _MAX_BUILDINGS = 1000, 3000
+_SETTLE_M = 0.5
+
+
+@dataclass(frozen=True)
+class TownOptions:
+    """What of a town the map does not say."""
+
+    cell_m: float | None = None  # Of the ground
+    attribution: str = ""  # Of the ground's heights
+    seed: int = 0
+    ceiling_m: float | None = None
+    drive_on: str = "right"
+
+    def __post_init__(self) -> None:
+        """Check the side of the road."""
+        if self.drive_on not in ("right", "left"):
+            raise UsageError(f"--drive-on {self.drive_on[:20]!r}: right or left")
+
+
+@dataclass(frozen=True)
+class TownPlan:
+    """The plan of a town, but what is placed where the built streets leave room."""
+
+    plan: PlacePlan
+    town: Mapping[str, list[Any]]  # What the map has, in metres
+    drive_on: str
+
+    def place_things(self, site: Site) -> Placer:
+        """Place things on the site that the plan has built."""
+        streets = [Street(**_points(table)) for table in map(_street, self.town["roads"])]
+        bridges = [Bridge(**_points(table)) for table in self.town["bridges"]]
+        layout = lay_out(site, streets, bridges, self.town["crossings"])
+        level = [
+            road for road, street in zip(self.town["roads"], streets, strict=True)
+            if street.kind != "path" and layout.on_ground(street)
+        ]  # fmt: skip
+        found = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
+        placer = Placer(site, None if self.plan.heights is None else _SETTLE_M)
+        furniture = Furniture(placer, self.town, found, self.drive_on)
+        furniture.place_mapped()
+        furniture.place_by_rule()
+        return placer
+
+
+def town_plan(
+    found: Map, bbox: Bbox, source: str, options: TownOptions,
+    heights: Callable[[LocalFrame, tuple[float, float]], HeightTable] | None,
+) -> tuple[TownPlan, MapSummary]:  # fmt: skip
+    """Make the plan of a town; its origin is the centre of the bounding box (degrees)."""
+    width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
+    if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
+        raise UsageError(
+            f"--bbox {format_bbox(bbox)} is {width:,.0f} by {depth:,.0f} m, a scene "
+            f"{SMALLEST_M:g} to {LARGEST_M:,.0f} m: --tiles 200 cuts a large one into several"
+        )
+    frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
+    table = None if heights is None else heights(frame, (width, depth))
+    summary = MapSummary()
+    town, built_share = _town(found, frame, site, table, summary)
+    if not any(town[key] for key in ("buildings", "roads", "areas", "things")):
+        raise UsageError(
+            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(found.extent)}"
+        )
+    entries, sections = _entries(town, site)
+    tops = [b["top_m"] for one in town["buildings"] for b in one["bodies"]]
+    tops += [max(b["heights_m"]) for b in town["bridges"]]
+    top = max(tops, default=0.0) + (0.0 if table is None else float(table.rows_m.max()))
+    ceiling = options.ceiling_m
+    if ceiling is None:
+        ceiling = max(math.ceil(top + _HEADROOM_M), _LOWEST_CEILING_M)
+    plan = {
+        "plan": 1, "seed": options.seed, "size_m": [width, depth], "ceiling_m": float(ceiling),
+        "attribution": "; ".join(filter(None, (ATTRIBUTION, options.attribution))),
+        "origin": {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7),
+                   **({} if table is None else {"z_m": table.datum_m})},
+        "ground": {"material": "paving:#98958d" if built_share > _PAVED else "grass",
+                   **({} if table is None else {"steps": [{"make": "surveyed_heights"}]})},
+        "site": entries,
+    }  # fmt: skip
+    comments = (
+        f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",
+        "Metres about the middle of the box, x east, y north. Change what is not so, and run again.",
+    )
+    return TownPlan(PlacePlan(plan, sections, comments, table), town, options.drive_on), summary
+
+
+def _town(
+    found: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: MapSummary
+) -> tuple[dict[str, list[Any]], float]:
+    """Collect what the map has, in metres, and the share of the site that is built up."""
+    window = site.buffer(_BEYOND_M, join_style="mitre")
+    points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
+    inner = site.buffer(-0.3, join_style="mitre")
+    shops = map_things.shop_points(points, areas)
+    buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, summary)
+    built = shapely.union_all([plan_of(b) for one in buildings for b in one["bodies"]])
+    ground = None if table is None else table.terrain()
+    raised, lines = map_bridges.bridges(
+        lines, areas, site, (lambda x, y: 0.0) if ground is None else lambda x, y: float(ground.z(x, y)), summary
+    )
+    town: dict[str, list[Any]] = {
+        "rails": map_ground.rails(lines, window),
+        "crossings": map_things.crossings(points, site),
+        "signals": map_things.signals(points, site),
+        "areas": map_ground.areas(areas, lines, window, summary),
+        "roads": map_ground.streets(lines, window, summary),
+        "bridges": [
+            b.to_plan() | ({"rails": rails} if (rails := map_ground.rails(lines, window, str(k))) else {})
+            for k, b in enumerate(raised)
+        ],
+        "buildings": buildings,
+        "barriers": map_ground.barriers(lines, inner),
+        "things": map_things.things(points, lines, areas, inner, built, summary),
+    }
+    for key, value in town.items():
+        most = _MAX_BUILDINGS if key == "buildings" else _MAX_ITEMS
+        if len(value) > most:
+            summary.add(f"{key} beyond the first {most:,} left out", len(value) - most)
+            town[key] = value[:most]
+    return town, built.area / site.area
+
+
+def _entries(town: Mapping[str, list[Any]], site: shapely.Polygon) -> tuple[list[dict[str, Any]], dict[int, str]]:
+    """Make the entries of what lies on the ground and of what is built, and the comments of their sections."""
+    out: list[dict[str, Any]] = []
+    sections: dict[int, str] = {}
+
+    def add(section: str, entries: Sequence[dict[str, Any]]) -> None:
+        if entries:
+            sections[len(out)] = section
+            out.extend(entries)
+
+    # Later ones cover earlier ones: only neighbours of one material share an entry.
+    groups = [(key, list(group)) for key, group in groupby(town["areas"], key=lambda area: area["material"])]
+    add("Kinds of ground", [{"paint": [_area(one) for one in group], "material": key} for key, group in groups])
+    streets = {"make": "street_network", "streets": [_street(road) for road in town["roads"]]}
+    streets |= {key: town[key] for key in ("bridges", "rails", "crossings") if town[key]}
+    add("Streets, paths and bridges", [streets] if town["roads"] or town["bridges"] or town["rails"] else [])
+    rows = [row for area in town["areas"] if area.get("parking") for row in car_park_rows(area, site)]
+    add("Bays of car parks", [{"make": "parking_rows", "rows": rows}] if rows else [])
+    whole = [{**one, "bodies": [_body(body) for body in one["bodies"]]} for one in town["buildings"]]
+    add("Buildings", [{"make": "buildings", "buildings": whole}] if whole else [])
+    wet = [_area(area) for area in town["areas"] if area["material"].startswith("water")]
+    add("Nothing stands in the water", [{"make": "keep_free", "areas": wet}] if wet else [])
+    add("Walls, fences and hedges", list(_barriers(town["barriers"], site)))
+    return out, sections
+
+
+def _barriers(barriers: Sequence[Mapping[str, Any]], site: shapely.Polygon) -> list[dict[str, Any]]:
+    """Make the entries of barriers, by kind and height, of the legs that lie on the site."""
+    groups: dict[tuple[str, float], list[Any]] = {}
+    for barrier in barriers:
+        line = shapely.intersection(LineString(barrier["line"]), site.buffer(-0.4))
+        for leg in shapely.get_parts(line):
+            if isinstance(leg, LineString) and leg.length > 0.6:
+                points = [[round(x, 2), round(y, 2)] for x, y in leg.simplify(0.1).coords]
+                groups.setdefault((barrier["kind"], barrier["height_m"]), []).append(points)
+    made = {
+        "wall": lambda lines, high: {"make": "garden_walls", "height_m": high, "lines": lines},
+        "fence": lambda lines, high: {"make": "bar_fences", "height_m": high, "lines": lines},
+        "hedge": lambda lines, high: {"make": "fence_panels", "of": "hedge_block", "panel_m": 4, "lines": lines},
+    }
+    return [made[kind](lines, high) for (kind, high), lines in groups.items()]
+
+
+def _street(road: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a street as the plan has it: whether cars park and drive there is seen by the cars."""
+    kind = {} if road["kind"] in ("main", "side") else {"kind": road["kind"]}
+    return kind | {key: value for key, value in road.items() if key not in ("kind", "parking")}
+
+
+def _area(table: Mapping[str, Any]) -> dict[str, Any]:
+    holes = [{"polygon": hole} for hole in table.get("holes", ())]
+    return {"polygon": table["outline"], **({"minus": holes} if holes else {})}
+
+
+def _body(table: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in table.items() if key not in ("outline", "holes")}
+    return {"outline": _area(table), **kept}
+
+
+def _points(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the points of lines the type that builders get."""
+    rails = {"rails": [[tuple(at) for at in line] for line in table["rails"]]} if "rails" in table else {}
+    return {**table, **rails, "line": [tuple(at) for at in table["line"]]}
+
+
+def _in_metres(frame: LocalFrame, features: Sequence[Feature]) -> list[Feature]:
+    def moved(at: NDArray[Any]) -> NDArray[Any]:
+        x, y = frame.metres(at[:, 0], at[:, 1])
+        return shapely.get_coordinates(shapely.points(x, y))
+
+    return [Feature(f.key, _make_valid(shapely.transform(f.shape, moved)), f.tags) for f in features]
+
+
+def _make_valid(shape: Any) -> Any:
+    if shape.is_valid:
+        return shape
+    made = shapely.make_valid(shape)
+    # Repairing an area may leave lines, which overlays do not accept.
+    return shapely.MultiPolygon(polygons_of(made)) if shape.geom_type.endswith("Polygon") else made

@@ -1,1 +1,0 @@
-"""Real places: towns from a map and reliefs from a height model."""

@@ -1,1 +1,0 @@
-"""What the layouts of real places share."""

@@ -1,1 +1,0 @@
-"""Open country from a height model."""

@@ -1,1 +1,0 @@
-"""A town from a map."""
