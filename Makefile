@@ -110,6 +110,7 @@ format: .venv/.dev  ## let ruff format the code
 
 gallery: .venv/.installed  ## picture every prop and every scene into docs/gallery/
 	@$(RUN) gallery --out docs/gallery
+	@$(RUN) gallery --kit --small --out docs/gallery
 
 docs: .venv/.dev  ## build the documentation's site into build/site/; a broken link or a page left out ends it
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict --quiet

@@ -192,6 +192,7 @@ def gallery(
     scene: Scene = None, pipeline: PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
+    kit: Annotated[bool, typer.Option("--kit", help="Draw the builders that plans call instead.")] = False,
     references: Annotated[bool, typer.Option(
         "--references", help="Draw the objects' reference images with their descriptions instead.")] = False,
     data: Data = "data",
@@ -212,6 +213,12 @@ def gallery(
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
+    if kit:
+        from aerialdojo_gen.rendering.kit_gallery import kit_sheets
+
+        for name, sheet in kit_sheets(catalogue, [roots.recipes / f"{name}.toml" for name in chosen]):
+            print(write_picture(sheet, out, f"{name}.{suffix}", width))
+        return
     for name in chosen:
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))

@@ -19,7 +19,7 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.build import build_tables
 
 SETTINGS = 3
-_WIDTH, _HEIGHT = 320, 240
+_WIDTH, _HEIGHT = 272, 204
 # By these a number of a builder's first use is varied.
 _SCALES = (1.5, 0.6)
 # Numbers that show best what a builder can do come first.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -13,7 +15,10 @@ import typer.main
 import aerialdojo_gen
 from aerialdojo_gen.base.config.keys import Key, config_keys, plain, section_meanings
 from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.store.layout import LAYOUT
+
+_DOCS = Path(__file__).resolve().parents[1]
 
 
 def pages() -> dict[str, str]:
@@ -23,6 +28,7 @@ def pages() -> dict[str, str]:
         "reference/config.md": config_page(),
         "reference/tables.md": tables_page(),
         "reference/python.md": python_page(),
+        "reference/kit.md": kit_page(),
     }
 
 
@@ -144,6 +150,34 @@ def python_page() -> str:
     for name, module in homes.items():
         out += ["", f"## {name}", "", f"::: {module}.{name}"]
     return "\n".join(out) + "\n"
+
+
+def kit_page() -> str:
+    """Describe every builder of the kit with its arguments."""
+    out = [
+        "# The kit",
+        "",
+        "The builders that [plans](../plans.md) call by name, grouped by what they build. Ground builders are steps",
+        "of `[ground]`, part builders stand in `parts`, all others are entries of their own.",
+    ]
+    found = sorted(kit().values(), key=lambda one: (one.function.__module__, one.name))
+    for module, builders in groupby(found, lambda one: one.function.__module__.rpartition(".")[2]):
+        picture = f"gallery/kit-{module.replace('_', '-')}.jpg"
+        out += ["", f"## {module.replace('_', ' ').capitalize()}"]
+        out += ["", f"![Its builders with three settings each](../{picture})"] if (_DOCS / picture).is_file() else []
+        for one in builders:
+            kind = {"site": "", "ground": " (ground)", "parts": " (parts)"}[one.kind]
+            out += ["", f"### {one.name}{kind}", "", _prose(one.summary)]
+            out += ["", "| argument | takes | default |", "|---|---|---|"]
+            out += [_argument(name, field) for name, field in inspect.signature(one.function).parameters.items()
+                    if name in one.arguments.model_fields]  # fmt: skip
+    return "\n".join(out) + "\n"
+
+
+def _argument(name: str, parameter: inspect.Parameter) -> str:
+    kind = re.sub(r"Annotated\[([^,]+),.*\]$", r"\1", str(parameter.annotation))
+    default = "required" if parameter.default is parameter.empty else f"`{parameter.default!r}`"
+    return f"| `{name}` | {_cell(kind)} | {_cell(default)} |"
 
 
 def _prose(text: str) -> str:

@@ -280,6 +280,14 @@ def test_the_plan_of_the_contributors_page_is_built(tmp_path, catalogue):
     assert {"barn", "tractor_000", "beehive_000"} <= {instance.node for instance in scene.instances}
 
 
+def test_the_plan_of_the_documents_page_is_built(tmp_path, catalogue):
+    blocks = (ASSETS.parent / "docs/plans.md").read_text().split("```toml\n")[1:]
+    path = tmp_path / "U_Farm_0.toml"
+    path.write_text("".join(block.partition("```")[0] for block in blocks))
+    nodes = {instance.node for instance in build_plan(path, catalogue).instances}
+    assert {"barn", "tractor_000", "beehive_001", "stone_wall_000", "bench_000"} <= nodes
+
+
 def test_every_builder_says_what_it_builds():
     for name, one in kit().items():
         assert one.summary.endswith("."), name
