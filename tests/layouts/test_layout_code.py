@@ -61,11 +61,11 @@ def test_what_one_type_alone_uses_lies_in_its_folder_and_what_several_share_in_p
 
 
 def test_a_name_that_stands_twice_is_refused(tmp_path, monkeypatch):
-    other = tmp_path / "elsewhere" / "mall" / "layout.py"
+    other = tmp_path / "elsewhere" / "town" / "layout.py"
     other.parent.mkdir(parents=True)
     other.write_text("")
     monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path)])
-    with pytest.raises(RuntimeError, match=r"'mall' stands twice: urban\.mall\.layout and elsewhere\.mall\.layout"):
+    with pytest.raises(RuntimeError, match=r"'town' stands twice: places\.town\.layout and elsewhere\.town\.layout"):
         layouts.layout_modules()
 
 
@@ -98,7 +98,7 @@ def test_what_a_process_imports_to_build_a_type_is_what_counts():
 
 @pytest.mark.parametrize(
     ("module", "users"),
-    [("urban.mall.shops", {"mall"})],
+    [("places.town.streets", {"town"})],
 )
 def test_a_layout_counts_what_it_is_built_with_and_nothing_else(module, users):
     name = f"aerialdojo_gen.scenes.layouts.{module}"
@@ -127,7 +127,7 @@ def test_a_recipe_that_is_wrong_counts_all_layouts_and_an_imported_scene_none(tm
 def test_the_fingerprint_of_a_scene_follows_its_layout(tmp_path):
     """Two recipes that differ in nothing but the layout's name differ in code, not in their bytes alone."""
     pipeline = load_pipeline(PROJECT / "pipelines" / "smoke.toml")
-    texts = {"a": 'layout = "mall"', "b": 'layout = "courtyard"'}
+    texts = {"a": 'layout = "town"', "b": 'layout = "relief"'}
     for name, text in texts.items():
         (tmp_path / f"{name}.toml").write_text(text)
     roots = ProjectPaths(tmp_path, ASSETS, tmp_path, tmp_path)

@@ -7,6 +7,8 @@ from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.pipeline.stages.hooks import layout_of
 from aerialdojo_gen.scenes import layouts
 
+TOWN = ("aerialdojo_gen.scenes.layouts.places.town.layout",)
+
 
 def chosen(folder, scene):
     return layout_of(ProjectPaths(folder, folder, folder, folder), scene)
@@ -26,14 +28,11 @@ def test_every_recipe_names_its_own(project):
 @pytest.mark.parametrize(
     ("text", "modules"),
     [
-        ('layout = "mall"\n[parameters]\nlayout = "park"\n', ("aerialdojo_gen.scenes.layouts.urban.mall.layout",)),
-        (
-            'note = """\n[x]\nlayout = "park"\n"""\nlayout = "mall"\n',
-            ("aerialdojo_gen.scenes.layouts.urban.mall.layout",),
-        ),
-        ('list = [\n[1],\n[2],\n]\nlayout = "mall"\n', ("aerialdojo_gen.scenes.layouts.urban.mall.layout",)),
-        ('layout = "mall"\n[imported]\nmesh = "a.glb"\n', ()),
-        ('[parameters]\nlayout = "mall"\n', None),
+        ('layout = "town"\n[parameters]\nlayout = "park"\n', TOWN),
+        ('note = """\n[x]\nlayout = "park"\n"""\nlayout = "town"\n', TOWN),
+        ('list = [\n[1],\n[2],\n]\nlayout = "town"\n', TOWN),
+        ('layout = "town"\n[imported]\nmesh = "a.glb"\n', ()),
+        ('[parameters]\nlayout = "town"\n', None),
         ('layout = "none"\n', None),
         ("layout = [\n", None),
     ],

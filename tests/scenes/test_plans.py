@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -113,6 +114,18 @@ def test_a_yard_is_built_in_order(tmp_path, catalogue):
     assert [i.bounds.tolist() for i in again.instances] == [i.bounds.tolist() for i in scene.instances]
 
 
+def test_things_stand_in_rows_and_rings(tmp_path, catalogue):
+    row = {"what": "bollard:steel", "at": [-8, 2], "count": 4, "step": [3, 0.5]}
+    ring = {"of": ["bench", "planter"], "ring": [1, 2, 5, 4, 45]}
+    plan = {**HEAD, "site": [{"place": [row], "phrase": "in a row"}, {"pattern": ring}]}
+    _, *things = build(tmp_path, catalogue, plan).instances
+    middles = np.array([i.centroid[:2] for i in things])
+    assert [i.attributes.get("place") for i in things] == ["in a row"] * 4 + [None] * 4
+    assert middles[:4] == pytest.approx(np.array([[-8, 2], [-5, 2.5], [-2, 3], [1, 3.5]]), abs=0.1)
+    assert [i.category for i in things[4:]] == ["bench", "planter"] * 2
+    assert np.hypot(*(middles[4:] - (1, 2)).T) == pytest.approx(5, abs=0.3)
+
+
 def test_things_stand_in_a_frame_and_settle_on_a_slope(tmp_path, catalogue):
     rise = {"make": "rises", "axis": "x", "stations": [[-20, 20, 8]]}
     flat = {"make": "rolling_ground", "cell_m": 1, "height_m": 0, "wavelength_m": 9}
@@ -201,6 +214,10 @@ def test_things_are_strewn_by_a_field_made_of_others(tmp_path, catalogue):
         ({"place": [["tractor", "loft + x", 0]]}, "unknown parameter 'x'"),
         ({"place": [["tractor", 300, 0]], "fit": "must"}, "no room for tractor"),
         ({"pattern": {"of": ["oak_tree"]}}, "a pattern has one of"),
+        (
+            {"place": [{"what": "bench", "at": [0, 0], "count": 1001}]},
+            "count = 1001: Input should be less than or equal",
+        ),
         ({"note": "nothing"}, "an entry has one of paint, make, parts, place, pattern"),
     ],
 )

@@ -27,6 +27,7 @@ from aerialdojo_gen.scenes.site import Site
 
 Parts = list[tuple[str, Mesh]]
 Point = tuple[float, float]
+_Spacing = Annotated[Number, Field(ge=0.5)]
 
 
 def block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
@@ -80,15 +81,17 @@ def railing(
 @part_builder
 def deck(
     plan: Area, z_m: Number, *, floor: Material, under: Material = "plaster", thickness_m: Number = 0.3,
-    posts: Sequence[At] = (), foot_m: Number = 0.0, post: Material = "plaster", post_radius_m: Number = 0.28,
+    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: _Spacing = 6.0, foot_m: Number = 0.0,
+    post: Material = "plaster", post_radius_m: Number = 0.28,
 ) -> Parts:  # fmt: skip
-    """Make a floor at `z_m` (its top) on round columns that stand on `foot_m`."""
+    """Make a floor at `z_m` (its top) on round columns that stand on `foot_m`, in rows or one by one."""
     parts: Parts = [
         (floor, slab(plan, z_m - 0.05, z_m)),
         (under, slab(plan.buffer(-0.02, join_style="mitre"), z_m - thickness_m, z_m - 0.05)),
     ]
-    if posts:
-        parts.append((post, columns(posts, foot_m, z_m - thickness_m, post_radius_m)))
+    stand = [*_in_rows(post_rows, post_every_m), *posts]
+    if stand:
+        parts.append((post, columns(stand, foot_m, z_m - thickness_m, post_radius_m)))
     return parts
 
 
@@ -142,14 +145,15 @@ def flights(
 
 @part_builder
 def canopy(
-    x0: Number, y0: Number, x1: Number, y1: Number, z_m: Number, *, roof: Material, post: Material = "chrome",
-    posts: Sequence[At] = (), foot_m: Number = 0.0,
+    box: tuple[Number, Number, Number, Number], z_m: Number, *, roof: Material, post: Material = "chrome",
+    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: _Spacing = 6.0, foot_m: Number = 0.0,
 ) -> Parts:  # fmt: skip
-    """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, metres."""
-    ring = rectangle(x0, y0, x1, y1).exterior.buffer(0.09, join_style="mitre", cap_style="flat")
-    parts: Parts = [(roof, block(x0, y0, x1, y1, z_m + 0.08, z_m + 0.22)), (post, slab(ring, z_m, z_m + 0.34))]
-    if posts:
-        parts.append((post, columns(posts, foot_m, z_m + 0.08, 0.12)))
+    """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, in rows or one by one."""
+    ring = rectangle(*box).exterior.buffer(0.09, join_style="mitre", cap_style="flat")
+    parts: Parts = [(roof, block(*box, z_m + 0.08, z_m + 0.22)), (post, slab(ring, z_m, z_m + 0.34))]
+    stand = [*_in_rows(post_rows, post_every_m), *posts]
+    if stand:
+        parts.append((post, columns(stand, foot_m, z_m + 0.08, 0.12)))
     return parts
 
 
@@ -201,6 +205,11 @@ def spaced(a: Point, b: Point, spacing_m: float) -> list[Point]:
     line = LineString([a, b])
     count = max(round(line.length / spacing_m), 1)
     return [(float(p.x), float(p.y)) for p in (line.interpolate(line.length * k / count) for k in range(count + 1))]
+
+
+def _in_rows(rows: Sequence[Sequence[Point]], spacing_m: float) -> list[Point]:
+    """List points along every leg of lines, about `spacing_m` apart."""
+    return [point for row in rows for a, b in pairwise(row) for point in spaced(a, b, spacing_m)]
 
 
 def _posed(body: Mesh, turn: np.ndarray, at: tuple[float, float, float]) -> Mesh:

@@ -16,7 +16,7 @@ def layout_modules() -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        By the type's name, as recipes say it: ``{"mall": "urban.mall.layout"}``, relative to this package.
+        By the type's name, as recipes say it: ``{"town": "places.town.layout"}``, relative to this package.
 
     Raises
     ------

@@ -173,10 +173,10 @@ class _Building:
             # Heights that builders return are not known yet.
             entry = self._read(Place, {key: body[key] for key in ("place", "frame") if key in body}, where)
             for raw in entry.place:
-                thing = self._thing(raw[:4] if isinstance(raw, list) else {**raw, "on": None}, where)
-                category, variant, pose = self._pose(thing, entry, where)
-                outline = outline_of(self._site, category, variant, pose[:2], pose[2])
-                self._site.footings.append((outline, Point(pose[:2])))
+                for thing in self._row(raw[:4] if isinstance(raw, list) else {**raw, "on": None}, where):
+                    category, variant, pose = self._pose(thing, entry, where)
+                    outline = outline_of(self._site, category, variant, pose[:2], pose[2])
+                    self._site.footings.append((outline, Point(pose[:2])))
 
     def _ground(self, body: Mapping[str, Any]) -> None:
         ground = self._read(Ground, body, f"{self._where}: [ground]")
@@ -233,12 +233,19 @@ class _Building:
     def _place(self, body: dict[str, Any], where: str) -> None:
         entry = self._read(Place, {**self._placing, **body}, where)
         for number, raw in enumerate(entry.place):
-            self._stand(self._thing(raw, f"{where}[{number}]"), entry, where)
+            for thing in self._row(raw, f"{where}[{number}]"):
+                self._stand(thing, entry, where)
         if entry.pattern is not None:
             placed = 0
             for pose in poses_of(self._site, entry.pattern):
                 what = entry.pattern.of[placed % len(entry.pattern.of)]
                 placed += self._stand(self._thing([what, *pose], where), entry, where)
+
+    def _row(self, raw: Any, where: str) -> list[Thing]:
+        """Read a thing, or a straight row of them."""
+        thing = self._thing(raw, where)
+        (x, y), (dx, dy) = thing.at, thing.step
+        return [thing.model_copy(update={"at": (x + k * dx, y + k * dy)}) for k in range(thing.count)]
 
     def _thing(self, raw: Any, where: str) -> Thing:
         if isinstance(raw, list):

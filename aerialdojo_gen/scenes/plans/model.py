@@ -109,6 +109,8 @@ class Thing(BaseModel):
     at: At
     yaw_deg: Number = 0.0
     on: Number | None = None
+    count: Annotated[int, Field(ge=1, le=1000)] = 1  # Of a straight row that begins there
+    step: At = (0.0, 0.0)  # From one to the next, metres
     phrase: Annotated[str, Field(max_length=200)] = ""  # In place of that of the entry
     above_ground_m: Number = 0.0  # The same
     node: str | None = None
@@ -127,22 +129,24 @@ class Pattern(BaseModel):
     of: Annotated[list[_Text], Field(min_length=1)]
     along: Line | None = None  # A line, with a thing every `spacing_m`
     grid: tuple[list[Number], list[Number]] | None = None  # Every x with every y
+    # About a point, facing away from it: x, y, radius, number, direction of the first.
+    ring: tuple[Number, Number, Number, Annotated[int, Field(ge=1, le=1000)], Number] | None = None
     poses: list[tuple[Number, Number, Number]] = []  # x, y, yaw
     scatter: Area | None = None  # An area, strewn at least `spacing_m` apart
     spacing_m: Annotated[Number, Field(gt=0)] = 5.0
     offset_m: Number = 0.0  # To the left of the line
     start_m: Number = 0.0  # What stays free at the ends of the line
     end_m: Number = 0.0
-    turn_deg: Number = 0.0  # Of the things, from the line's direction
+    turn_deg: Number = 0.0  # Of the things, from the line's direction or the ring's outwards
     yaw: str | float = 0.0  # An expression over x and y for the poses of a grid
     limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000
     stream: str = ""  # Name of the random stream of a scatter
 
     @model_validator(mode="after")
     def _one_kind(self) -> Pattern:
-        kinds = sum((self.along is not None, self.grid is not None, bool(self.poses), self.scatter is not None))
-        if kinds != 1:
-            raise ValueError("a pattern has one of along, grid, poses, scatter")
+        given = (self.along, self.grid, self.ring, self.scatter, self.poses or None)
+        if sum(one is not None for one in given) != 1:
+            raise ValueError("a pattern has one of along, grid, ring, scatter, poses")
         return self
 
 

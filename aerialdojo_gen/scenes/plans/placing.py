@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -96,6 +97,11 @@ def poses_of(site: Site, pattern: Pattern) -> Iterator[Pose]:
             for y in pattern.grid[1]:
                 yaw = pattern.yaw
                 yield Pose(x, y, evaluate(yaw, {"x": x, "y": y}) if isinstance(yaw, str) else float(yaw))
+    elif pattern.ring is not None:
+        x, y, radius_m, count, start_deg = pattern.ring
+        for k in range(count):
+            a = math.radians(start_deg + 360.0 / count * k)
+            yield Pose(x + radius_m * math.cos(a), y + radius_m * math.sin(a), math.degrees(a) + pattern.turn_deg)
     elif pattern.scatter is not None:
         stream = site.rng_for(*(pattern.stream or "scatter").split("/"))
         yield from poisson_disc(pattern.scatter, pattern.spacing_m, stream, limit=pattern.limit)

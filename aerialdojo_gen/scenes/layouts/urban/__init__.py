@@ -1,1 +1,0 @@
-"""Urban layouts, one folder a type."""
