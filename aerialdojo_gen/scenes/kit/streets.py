@@ -1,4 +1,4 @@
-"""Streets: carriageways with marks and pavements, zebra crossings, arrows, rows of parking bays."""
+"""Streets: carriageways with marks and pavements, zebra crossings, arrows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic import Field
 
 from aerialdojo_gen.scenes import grammar_streets
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -22,14 +22,6 @@ def streets(
         site, paths, lanes=lanes, lane_m=lane_m, pavement_m=pavement_m, surface=surface, pavement=pavement,
         marks=marks,
     )  # fmt: skip
-
-
-@site_builder
-def crossing(
-    site: Site, *, at: At, yaw_deg: Number, length_m: Number, width_m: Number = 3.0, surface: Material = "asphalt"
-) -> None:
-    """Paint a zebra crossing, walked along `yaw_deg`."""
-    grammar_streets.crossing(site, *at, yaw_deg, length_m, width_m, surface)
 
 
 @site_builder
@@ -49,12 +41,3 @@ def arrows(
     """Paint straight arrows on the ground: middle and direction of each (x, y, yaw_deg)."""
     for one in at:
         grammar_streets.arrow(site, *one, length_m, material)
-
-
-@site_builder
-def parking_row(
-    site: Site, *, at: At, yaw_deg: Number, count: Annotated[int, Field(ge=1, le=200)],
-    bay_m: tuple[Number, Number] = (2.6, 5.2), material: Material = "marking",
-) -> None:  # fmt: skip
-    """Mark a row of parking bays; `at` is the middle of the closed side, which they face."""
-    grammar_streets.parking_row(site, *at, yaw_deg, count, bay_m=bay_m, material=material)
