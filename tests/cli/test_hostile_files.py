@@ -128,21 +128,6 @@ def test_what_a_plan_draws_has_a_length_and_an_area(project, tmp_path, entry, sa
     assert says in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("layout", "parameters", "place"),
-    [
-        ("mountain", {"ridges": [{"line": [], "width_m": 9}]}, "ridges.0.line: "),
-        ("mountain", {"ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}, "ridges.0.line.0.2: Input should"),
-        ("mountain", {"ridges": [], "paths": [[[-2000, 0], [2000, 0]] * 2]}, "paths.0: a line may be 5,000 m long"),
-    ],
-)  # fmt: skip
-def test_a_layout_s_lines_and_sizes_are_bounded_at_their_key(project, tmp_path, layout, parameters, place):
-    path = recipe(tmp_path, COURT | {"layout": layout, "parameters": parameters})
-    with pytest.raises(AssetError) as refused:
-        build_scene(path, load_catalogue(project / "scene_assets"))
-    assert_named(str(refused.value), f"{path}: parameters: ", place)
-
-
 ROLLING = {"make": "rolling_ground", "cell_m": 1, "height_m": 1, "wavelength_m": 20}
 FAR = {"disc": [200, 100, 4]}
 
@@ -154,6 +139,8 @@ FAR = {"disc": [200, 100, 4]}
          "the ground about (200, 100) lies off the site"),
         ({"ground": {"steps": [{"make": "stepped_valley", "cell_m": 2, "bed": [[-9, 0], [9, 0]], "roughness_m": 1,
                                 "steps": [[5, 5, 1]]}]}}, "a step ends 0.05 m or more beyond where it begins"),
+        ({"ground": {"steps": [{"make": "massif", "ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}]}},
+         "line.0.2 = -1: Input should be greater than or equal to 0"),
         ({"ground": {"steps": [{"make": "level_along", "lines": [[[-2000, 0], [2000, 0]]], "width_m": 2}]}},
          "a way may be 3,000 m long"),
         ({"site": [{"make": "layered_rocks", "bands": ["rock"],

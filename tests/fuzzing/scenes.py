@@ -9,10 +9,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from fuzzing import layouts
 from fuzzing.cases import ASSETS, ROOT, Case, Target, utterable
 from fuzzing.meshes import court_glb
 from fuzzing.mutate import toml_dumped
+from fuzzing.plans import PLANS
 from support import annotation_scenes
 
 from aerialdojo_gen.annotations.check import check_source
@@ -123,11 +123,11 @@ def _build_imported(folder: Path) -> None:
     write_glb(scene, folder / "built.glb")
 
 
-def _layouts() -> list[Case]:
-    return [{f"scenes/{name}.toml": toml_dumped(recipe).encode()} for name, recipe in layouts.RECIPES.items()]
+def _plans() -> list[Case]:
+    return [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()]
 
 
-def _build_layout(folder: Path) -> None:
+def _build_plan(folder: Path) -> None:
     (path,) = (folder / "scenes").iterdir()
     build_scene(path, load_catalogue(ASSETS))
 
@@ -172,7 +172,7 @@ TARGETS = {
     "annotations": Target(_annotations, _read_annotations),
     "pipeline": Target(_pipelines, _read_pipeline),
     "recipe": Target(_recipes, _build),
-    "recipe-layouts": Target(_layouts, _build_layout, share=0.05),
+    "plan": Target(_plans, _build_plan, share=0.05),
     "recipe-imported": Target(_imported_recipes, _build_imported, ".toml", names_the_file=False),
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),

@@ -5,12 +5,10 @@ import pytest
 import shapely
 from support.layout_checks import catalogue, each_scene, props_of
 
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.kit.layered_rocks import Rock, layered_rocks
 from aerialdojo_gen.scenes.kit.mudbrick import MudbrickHouse, mudbrick_houses
 from aerialdojo_gen.scenes.kit.sands import dunes, stepped_valley
 from aerialdojo_gen.scenes.kit.snow import banks_beside, moguls, profile_slope
-from aerialdojo_gen.scenes.layouts.natural.parts.groups import Group, plan_groups
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
@@ -69,14 +67,3 @@ def test_rocks_and_houses_give_the_heights_of_what_carries_things():
     assert [float(i.bounds[1, 2]) for i in site.instances[:2]] == pytest.approx(tops, abs=1e-5)
     parapet = float(site.instances[2].bounds[1, 2])
     assert parapet - 1.0 < roofs[0] < parapet
-
-
-def test_impossible_groups_say_so():
-    site = blank()
-    crowd = Group(name="crowd", at=(0, 0), radius_m=2, things=("log_cabin", "log_cabin"))
-    with pytest.raises(AssetError, match="has no room for 'log_cabin'"):
-        plan_groups(site, [crowd], [], {}, lambda _x, _y: 0.0)
-    with pytest.raises(AssetError, match="which is no deck"):
-        plan_groups(site, [Group(name="a", at=(0, 0), things=(), on="attic")], [], {}, lambda _x, _y: 0.0)
-    with pytest.raises(AssetError, match="is no thing"):
-        plan_groups(site, [Group(name="a", at=(0, 0), things=("two words here",))], [], {}, lambda _x, _y: 0.0)

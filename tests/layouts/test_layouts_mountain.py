@@ -6,8 +6,11 @@ import shapely
 from support.layout_checks import catalogue, each_scene
 
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.kit.mountains import Ridge, above, massif, steep
+from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.terrain import flat_terrain
 
 SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
 of_each_scene = each_scene(SCENES)
@@ -34,13 +37,16 @@ def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
 
 
 def test_mountains_rise_to_their_crests_and_show_rock_where_they_are_steep():
-    ridge = Ridge(line=((0.0, 10.0, 20.0),), width_m=25.0, hollow=1.0)
-    plain = massif((60.0, 60.0), 1.5, 3, [ridge], 0.0, 0.0)
+    site = Site("N_T_0", Recipe(layout="none", seed=3, size_m=(60, 60), ceiling_m=20), catalogue())
+    ridge = Ridge([(0.0, 10.0, 20.0)], 25.0, hollow=1.0)
+    flat = flat_terrain((60, 60))
+    plain = massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=0.0, rough_m=0.0)
     assert float(plain.z(0.0, 10.0)) == pytest.approx(20.0, abs=1.5)
     assert float(plain.z(-29.0, -29.0)) == pytest.approx(0.0, abs=1e-9)
-    benched = massif((60.0, 60.0), 1.5, 3, [ridge], 4.0, 0.0)
-    assert steep(plain, 1.2).area < 0.1 * steep(benched, 1.2).area
-    top = above(plain, 17.0, 2.0)
+    site.set_ground(plain)
+    faces, top = steep_ground(site, slope=1.2), high_ground(site, above_m=17.0, slope=2.0)
     assert shapely.contains_xy(top, 0.0, 10.0)
     assert not shapely.contains_xy(top, 0.0, -10.0)
-    assert above(plain, 50.0, 2.0).is_empty
+    assert high_ground(site, above_m=50.0, slope=2.0).is_empty
+    site.set_ground(massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=4.0, rough_m=0.0))
+    assert faces.area < 0.1 * steep_ground(site, slope=1.2).area

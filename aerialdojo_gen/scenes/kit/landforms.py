@@ -216,6 +216,12 @@ def ground_height(site: Site, *, at: At) -> float:
     return site.ground_z(*at)
 
 
+@site_builder
+def named_area(_site: Site, *, area: Area) -> BaseGeometry:
+    """Give an area, made of others that builders have named, to be named by `as`."""
+    return area
+
+
 def grid(terrain: Terrain) -> tuple[Floats, Floats]:
     """Give x and y of the terrain's corners, metres, in the shape of its heights."""
     xy = terrain.corners().reshape(*terrain.heights_m.shape, 3)

@@ -2,80 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
-from aerialdojo_gen.scenes.values import At, Crest, Length
 
 _SMOOTH_MAX = 5.0
 
 
-class Ridge(BaseModel):
-    """A ridge, as a recipe gives it.
+@dataclass(frozen=True)
+class Ridge:
+    """A crest of points (x, y, z), or a peak of one; its flanks reach so far, hollow above 1 and bulging below."""
 
-    Attributes
-    ----------
-    line : tuple of (x, y, z)
-        Its crest, metres; one point makes a peak.
-    width_m : float
-        How far its flanks reach, metres.
-    hollow : float
-        Above 1 the flanks are hollow, as ice leaves them; below 1 they bulge.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    line: Crest
-    width_m: Length
-    hollow: Annotated[float, Field(ge=0.1, le=4)] = 1.3
+    line: Annotated[list[tuple[Number, Number, Annotated[Number, Field(ge=0)]]], Field(min_length=1, max_length=1000)]
+    width_m: Annotated[Number, Field(gt=0)]
+    hollow: Annotated[Number, Field(ge=0.1, le=4)] = 1.3
 
 
-class Crag(BaseModel):
-    """A crag that stands on the ground: middle, radius and height, metres, and how many blocks it is made of."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+@dataclass(frozen=True)
+class Crag:
+    """A crag that stands on the ground, of so many blocks."""
 
     at: At
-    radius_m: Length
-    height_m: Length
+    radius_m: Annotated[Number, Field(gt=0)]
+    height_m: Annotated[Number, Field(gt=0)]
     blocks: Annotated[int, Field(ge=1, le=12)] = 5
 
-    def area(self) -> BaseGeometry:
-        """Ground that it takes, world frame, metres."""
-        return Point(self.at).buffer(self.radius_m * 1.15, quad_segs=4)
 
-
+@ground_builder
 def massif(
-    size_m: tuple[float, float], cell_m: float, seed: int, ridges: Sequence[Ridge], bench_m: float, rough_m: float
-) -> Terrain:
-    """Make mountains.
+    site: Site, _terrain: Terrain, *, ridges: list[Ridge], cell_m: Annotated[Number, Field(ge=0.5)] = 1.6,
+    bench_m: Annotated[Number, Field(ge=0)] = 4.5, rough_m: Number = 2.0,
+) -> Terrain:  # fmt: skip
+    """Make mountains in place of what was there; where ridges overlap, the higher shows, with a soft valley between.
 
-    Parameters
-    ----------
-    size_m : (float, float)
-        Extent along x and y, metres.
-    cell_m : float
-        Edge of a cell, metres.
-    seed : int
-        Of the roughness.
-    ridges : sequence of Ridge
-        Where they overlap, the higher one shows, with a soft valley between.
-    bench_m : float
-        Height of the steps in which the flanks fall; 0 leaves them plain.
-    rough_m : float
-        Height of gullies and spurs on the steepest ground, metres.
+    The flanks fall in steps of `bench_m`, if any; gullies and spurs on the steepest ground are `rough_m` high.
     """
+    size_m, seed = site.recipe.size_m, site.recipe.seed
     columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
     cell = max(size_m[0] / columns, size_m[1] / rows)
     ground = replace(flat_terrain(size_m), cell_m=cell, heights_m=np.zeros((rows + 1, columns + 1)))
@@ -107,19 +81,7 @@ def massif(
     return replace(ground, heights_m=height.reshape(ground.heights_m.shape))
 
 
-def steep(terrain: Terrain, slope: float) -> BaseGeometry:
-    """Outline the ground that rises more than `slope` metres a metre, world frame."""
-    dy, dx = np.gradient(terrain.heights_m, terrain.cell_m)
-    return cells_where(terrain, np.hypot(dx, dy) > slope)
-
-
-def above(terrain: Terrain, z_m: float, slope: float) -> BaseGeometry:
-    """Outline the ground above a height that is gentle enough for snow to lie, world frame."""
-    dy, dx = np.gradient(terrain.heights_m, terrain.cell_m)
-    return cells_where(terrain, (terrain.heights_m > z_m) & (np.hypot(dx, dy) < slope))
-
-
-def cells_where(terrain: Terrain, chosen: np.ndarray) -> BaseGeometry:
+def _cells_where(terrain: Terrain, chosen: np.ndarray) -> BaseGeometry:
     """Join the cells about chosen corners into areas with round outlines; single corners are left out."""
     points = terrain.corners()[chosen.ravel(), :2]
     if not len(points):
@@ -129,24 +91,40 @@ def cells_where(terrain: Terrain, chosen: np.ndarray) -> BaseGeometry:
     return area.buffer(-0.8, quad_segs=2).buffer(1.3, quad_segs=2).simplify(0.25)
 
 
-def put_up_crag(site: Site, crag: Crag, number: int, materials: tuple[str, str]) -> None:
-    """Pile a crag of angular blocks, the tallest in the middle; it takes its ground."""
-    rng = site.rng_for("crag", number)
-    parts: list[tuple[str, Mesh]] = []
-    for k in range(crag.blocks):
-        angle = float(rng.uniform(0, 2 * np.pi))
-        out = 0.0 if k == 0 else crag.radius_m * float(rng.uniform(0.45, 0.7))
-        x, y = crag.at[0] + out * float(np.cos(angle)), crag.at[1] + out * float(np.sin(angle))
-        tall = crag.height_m * (1.0 if k == 0 else float(rng.uniform(0.35, 0.75)))
-        wide = crag.radius_m * (0.62 if k == 0 else float(rng.uniform(0.35, 0.5)))
-        # A crown reaches as far below its middle as above: half of it stays in the ground.
-        body = crown(radii=(wide, wide * 0.8, tall), noise=0.34, subdivisions=2, seed=int(rng.integers(1 << 20)))
-        body = _faceted(
-            rotated(body, rotation(float(rng.uniform(-8, 8)), float(rng.uniform(-8, 8)), float(rng.uniform(0, 360))))
-        )
-        parts.append((materials[k % 2], translated(body, (x, y, site.ground_z(x, y) - 0.15 * tall))))
-    by_material = {m: merge([b for n, b in parts if n == m]) for m in dict.fromkeys(m for m, _ in parts)}
-    site.add(None, "crag", list(by_material.items()), footprint=crag.area())
+@site_builder
+def steep_ground(site: Site, *, slope: Number) -> BaseGeometry:
+    """Give the ground that rises more than `slope` metres a metre, to be named by `as`."""
+    dy, dx = np.gradient(site.terrain.heights_m, site.terrain.cell_m)
+    return _cells_where(site.terrain, np.hypot(dx, dy) > slope)
+
+
+@site_builder
+def high_ground(site: Site, *, above_m: Number, slope: Number) -> BaseGeometry:
+    """Give the ground above a height that is gentle enough for snow to lie, to be named by `as`."""
+    dy, dx = np.gradient(site.terrain.heights_m, site.terrain.cell_m)
+    return _cells_where(site.terrain, (site.terrain.heights_m > above_m) & (np.hypot(dx, dy) < slope))
+
+
+@site_builder
+def crags(site: Site, *, crags: list[Crag], materials: tuple[Material, Material]) -> None:
+    """Pile crags of angular blocks, the tallest in the middle of each; they take their ground."""
+    for number, crag in enumerate(crags):
+        rng = site.rng_for("crag", number)
+        parts: list[tuple[str, Mesh]] = []
+        for k in range(crag.blocks):
+            angle = float(rng.uniform(0, 2 * np.pi))
+            out = 0.0 if k == 0 else crag.radius_m * float(rng.uniform(0.45, 0.7))
+            x, y = crag.at[0] + out * float(np.cos(angle)), crag.at[1] + out * float(np.sin(angle))
+            tall = crag.height_m * (1.0 if k == 0 else float(rng.uniform(0.35, 0.75)))
+            wide = crag.radius_m * (0.62 if k == 0 else float(rng.uniform(0.35, 0.5)))
+            # A crown reaches as far below its middle as above: half of it stays in the ground.
+            body = crown(radii=(wide, wide * 0.8, tall), noise=0.34, subdivisions=2, seed=int(rng.integers(1 << 20)))
+            tilt = (float(rng.uniform(-8, 8)), float(rng.uniform(-8, 8)), float(rng.uniform(0, 360)))
+            body = _faceted(rotated(body, rotation(*tilt)))
+            parts.append((materials[k % 2], translated(body, (x, y, site.ground_z(x, y) - 0.15 * tall))))
+        by_material = {m: merge([b for n, b in parts if n == m]) for m in dict.fromkeys(m for m, _ in parts)}
+        area = Point(crag.at).buffer(crag.radius_m * 1.15, quad_segs=4)
+        site.add(None, "crag", list(by_material.items()), footprint=area)
 
 
 def _faceted(body: Mesh) -> Mesh:

@@ -1,9 +1,6 @@
-"""How things sit on natural ground: organic outlines, slopes, and groups of props set out about a spot."""
+"""How things sit on natural ground: organic outlines, slopes, and room about things."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -14,81 +11,6 @@ from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 
 _BELOW_M = 100.0
-
-
-@dataclass(frozen=True)
-class Thing:
-    """A prop of a group.
-
-    Attributes
-    ----------
-    category : str
-        Of the catalogue.
-    x, y : float
-        In the group's frame (x along the group's yaw), metres.
-    yaw_deg : float
-        Its front, counter-clockwise from the group's x.
-    variant : str or None
-        None draws one.
-    lift_m : float or None
-        Height of its base above the group's origin; None stands it on the ground.
-    words : mapping of str to str
-        Attributes of its own.
-    params : mapping of str to float
-        Fixed sizes.
-    """
-
-    category: str
-    x: float
-    y: float
-    yaw_deg: float = 0.0
-    variant: str | None = None
-    lift_m: float | None = None
-    words: Mapping[str, str] = field(default_factory=dict)
-    params: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A place with a name where a group of things stands: world frame, metres and degrees."""
-
-    x: float
-    y: float
-    yaw_deg: float
-    place: str
-
-    def world(self, x: float, y: float) -> tuple[float, float]:
-        """Turn a point of the spot's own frame into the world's, metres."""
-        c, s = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
-        return float(self.x + c * x - s * y), float(self.y + s * x + c * y)
-
-
-def place_near(site: Site, spot: Spot, things: Sequence[Thing], margin_m: float = 1.3) -> list[Instance]:
-    """Set a group out and keep the room around every thing, so that trees leave it to be seen and flown around.
-
-    Parameters
-    ----------
-    site : Site
-        Gets the props; each says in its attribute ``place`` where it stands.
-    spot : Spot
-        The group's frame.
-    things : sequence of Thing
-        In the group's frame.
-    margin_m : float
-        Room kept around each, metres.
-    """
-    base = site.ground_z(spot.x, spot.y)
-    out = []
-    for t in things:
-        x, y = spot.world(t.x, t.y)
-        z = settled_z(site, x, y) if t.lift_m is None else base + t.lift_m
-        words = {"place": spot.place} | dict(t.words)
-        instance = site.place(
-            t.category, x, y, spot.yaw_deg + t.yaw_deg, z=z, variant=t.variant, attributes=words, params=t.params
-        )
-        keep_clear(site, instance, margin_m)
-        out.append(instance)
-    return out
 
 
 def keep_clear(site: Site, instance: Instance, margin_m: float) -> None:

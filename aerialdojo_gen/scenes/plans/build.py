@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from shapely.errors import GEOSException
 from shapely.geometry import Point
+from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError, brief
 from aerialdojo_gen.base.explain import explain
@@ -160,7 +162,7 @@ class _Building:
         arguments = self._read(found.arguments, {k: v for k, v in body.items() if k != "make"}, f"{where} {name!r}")
         try:
             return found.function(*fixed, **{key: getattr(arguments, key) for key in found.arguments.model_fields})
-        except (AssetError, ValueError, ArithmeticError) as error:
+        except (AssetError, ValueError, ArithmeticError, GEOSException) as error:
             # Numbers that are each within bounds and make no body together.
             raise AssetError(f"{where} {name!r}: {error}") from error
 
@@ -194,10 +196,13 @@ class _Building:
             self._site.paint(area, entry.material, entry.rise_m, entry.edge)
 
     def _make(self, body: dict[str, Any], where: str) -> None:
-        """Call a builder; ``as`` names the height that it returns, e.g. of a roof, or the heights, for later."""
+        """Call a builder; ``as`` names the height that it returns, e.g. of a roof, the heights, or the area."""
         made = self._call("site", {k: v for k, v in body.items() if k != "as"}, where, self._site)
         if "as" in body:
             names = body["as"] if isinstance(body["as"], list) else [body["as"]]
+            if isinstance(made, BaseGeometry) and isinstance(body["as"], str):
+                self._names.areas[body["as"]] = made
+                return
             heights = made if isinstance(made, list) else [made]
             if len(names) != len(heights) or not all(isinstance(height, float) for height in heights):
                 raise AssetError(f"{where}: {body['make']!r} returns no height for each name of 'as'")

@@ -130,10 +130,13 @@ class PlanNames:
         kinds = [key for key in _AREAS if key in value]
         if len(kinds) != 1:
             raise ValueError(f"an area has one of {', '.join(_AREAS)}, got {', '.join(kinds) or 'none'}")
-        area = _AREAS[kinds[0]](self, value)
-        for key, change in _CHANGES.items():
-            if key in value:
-                area = change(self, area, value[key])
+        try:
+            area = _AREAS[kinds[0]](self, value)
+            for key, change in _CHANGES.items():
+                if key in value:
+                    area = change(self, area, value[key])
+        except shapely.errors.GEOSException as error:
+            raise ValueError(f"an outline crosses itself: {error}") from None
         if area.is_empty:
             raise ValueError("the area is empty")
         return area

@@ -1,1 +1,0 @@
-"""Natural layouts, one folder a type."""

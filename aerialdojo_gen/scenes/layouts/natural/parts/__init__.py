@@ -1,1 +1,0 @@
-"""What several types of this family share."""
