@@ -20,7 +20,7 @@ BROUGHT = {
     "reference/scene-assets.md": "scene_assets/README.md", "reference/annotations.md": "annotations/README.md",
 }  # fmt: skip
 _AT = {source: page for page, source in BROUGHT.items()}
-_LINK = re.compile(r"(?<=\])\((?!https?:|#|mailto:)([^)\s#]+)(#[^)]*)?\)")
+_LINK = re.compile(r"\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\((?!https?:|#|mailto:)([^)\s#]+)(#[^)]*)?\)")
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -44,10 +44,10 @@ def _relinked(text: str, source: str, page: str) -> str:
     """Turn links of a file of the repository into those of its page; what the site lacks is named, not linked."""
 
     def link(at: re.Match[str]) -> str:
-        target = posixpath.normpath(posixpath.join(posixpath.dirname(source), at[1]))
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(source), at[2]))
         there = _AT.get(target) or (target.removeprefix("docs/") if target.startswith("docs/") else None)
         if there is None:
-            return f" (`{target}`)"
-        return f"({posixpath.relpath(there, posixpath.dirname(page) or '.')}{at[2] or ''})"
+            return f"{at[1]} (`{target.removeprefix('aerialdojo_gen/')}`)"
+        return f"[{at[1]}]({posixpath.relpath(there, posixpath.dirname(page) or '.')}{at[3] or ''})"
 
     return _LINK.sub(link, text)
