@@ -7,8 +7,6 @@ from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.pipeline.stages.hooks import layout_of
 from aerialdojo_gen.scenes import layouts
 
-TOWN = ("aerialdojo_gen.scenes.layouts.places.town.layout",)
-
 
 def chosen(folder, scene):
     return layout_of(ProjectPaths(folder, folder, folder, folder), scene)
@@ -28,9 +26,8 @@ def test_every_recipe_names_its_own(project):
 @pytest.mark.parametrize(
     ("text", "modules"),
     [
-        ('layout = "town"\n[parameters]\nlayout = "park"\n', TOWN),
-        ('note = """\n[x]\nlayout = "park"\n"""\nlayout = "town"\n', TOWN),
-        ('list = [\n[1],\n[2],\n]\nlayout = "town"\n', TOWN),
+        ("plan = 1\n", ()),
+        ('note = """\n[x]\nlayout = "park"\n"""\nplan = 1\n', ()),
         ('layout = "town"\n[imported]\nmesh = "a.glb"\n', ()),
         ('[parameters]\nlayout = "town"\n', None),
         ('layout = "none"\n', None),
