@@ -1,6 +1,7 @@
 """Figures of an evaluation, PNG and SVG: success against the radius, and the radar charts of the paper's Fig. 5.
 
-A radar's axes end where the data does: for agents that solve 1 % of the tasks an axis to 100 % would show a dot.
+A radar's axes end where the data does: for agents that solve 1 % of the tasks an axis to 100 % would show a dot. Or
+they are the paper's, which are fixed; a value beyond an axis is drawn at its end.
 """
 
 from __future__ import annotations
@@ -86,6 +87,8 @@ _RINGS = 4
 # An axis ends at one of these times a power of ten: all are divided into four without odd digits.
 _ENDS = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0)
 _FAMILIES = tuple(FAMILIES.values())
+# Where the axes of the paper's Fig. 5 end: per cent and metres.
+PAPER_ENDS = {"sr": 5.0, "osr": 15.0, "spl": 5.0, "dts_m": 40.0, "cr": 100.0}
 
 
 def contenders(runs: Sequence[Run]) -> list[tuple[int, Run]]:
@@ -102,9 +105,9 @@ def axis_end(largest: float, most: float = math.inf) -> float:
     return min(most, next(power * end for end in _ENDS if power * end >= largest * (1.0 - 1e-9)))
 
 
-def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
-    """Draw a chart a metric, an axis a family."""
-    values, ends = _values(runs, profile)
+def metric_radars(runs: Sequence[Run], profile: Profile, paper: bool = False) -> Figure:
+    """Draw a chart a metric, an axis a family; `paper` takes the paper's axes."""
+    values, ends = _values(runs, profile, paper)
     angles = np.linspace(0.0, 2.0 * math.pi, len(_FAMILIES), endpoint=False)
 
     def draw(figure: Figure) -> None:
@@ -125,9 +128,9 @@ def metric_radars(runs: Sequence[Run], profile: Profile) -> Figure:
     return draw_figure(draw, (7.6, 5.4))
 
 
-def family_radars(runs: Sequence[Run], profile: Profile) -> Figure:
-    """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them."""
-    values, ends = _values(runs, profile)
+def family_radars(runs: Sequence[Run], profile: Profile, paper: bool = False) -> Figure:
+    """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them, or at the paper's."""
+    values, ends = _values(runs, profile, paper)
     angles = np.linspace(0.0, 2.0 * math.pi, len(PAPER_METRICS), endpoint=False)
     tips = [
         f"{_LABELS[m]}\n{'0' if m in _INWARDS else f'{end:g}'} {_UNITS[m]}"
@@ -157,7 +160,7 @@ def _note(runs: Sequence[Run]) -> str | None:
     return "without the oracle" if len(contenders(runs)) < len(runs) else None
 
 
-def _values(runs: Sequence[Run], profile: Profile) -> tuple[list[Any], list[float]]:
+def _values(runs: Sequence[Run], profile: Profile, paper: bool) -> tuple[list[Any], list[float]]:
     """Score the families: for every run (4, 5) float64, per cent and metres; and where the axes end."""
     found = []
     for _, run in contenders(runs):
@@ -167,6 +170,8 @@ def _values(runs: Sequence[Run], profile: Profile) -> tuple[list[Any], list[floa
             for family in _FAMILIES
         ]
         found.append(np.array(rows) * [1.0 if m == "dts_m" else 100.0 for m in PAPER_METRICS])
+    if paper:
+        return found, [PAPER_ENDS[metric] for metric in PAPER_METRICS]
     largest = np.nanmax(np.stack(found), axis=(0, 1))
     most = [math.inf if metric == "dts_m" else 100.0 for metric in PAPER_METRICS]
     return found, [axis_end(float(value), limit) for value, limit in zip(largest, most, strict=True)]
@@ -180,7 +185,7 @@ def _chart(
     inwards = np.array([metric in _INWARDS for metric, _ in scales])
     ends = np.array([end for _, end in scales])
     for k, label, values in curves:
-        share = np.where(inwards, 1.0 - values / ends, values / ends)
+        share = np.clip(np.where(inwards, 1.0 - values / ends, values / ends), 0.0, 1.0)
         colour = COLOURS[k % len(COLOURS)]
         # Where curves coincide, the later ones are smaller marks on the earlier.
         axes.plot(

@@ -184,6 +184,20 @@ def caveats(runs: Sequence[Run]) -> list[str]:
     return notes
 
 
+def sample_notes(request: ReportRequest, runs: Sequence[Run]) -> list[str]:
+    """Say what the paper's protocol flies and what runs lack of it; nothing where the report is of all tasks."""
+    if request.sample is None:
+        return []
+    maps = sorted({scene for run in runs for scene in run.episodes.scene.tolist()})
+    notes = [f"Tasks of the paper's protocol alone; ± is the sample standard deviation over {', '.join(maps)}."]
+    for run in runs:
+        settings, flown = set(run.episodes.setting.tolist()), len(run.episodes)
+        whole = sum(len(own.get(setting, ())) for own in request.sample.tasks.values() for setting in settings)
+        if flown < whole:
+            notes.append(f"{run.label}: {flown:,} of the sample's {whole:,} tasks.")
+    return notes
+
+
 def in_setting(runs: Sequence[Run], setting: str) -> list[Run]:
     """Return the runs' episodes of a setting, without runs that have none."""
     masks = [run.episodes.setting == setting for run in runs]
@@ -205,7 +219,8 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
         rows = run_rows(replace(request, runs=runs)) + theirs
         counts = {len(run.episodes) for run in runs}
         sizes = ", ".join(f"{run.label} {len(run.episodes):,}" for run in runs)
-        notes = [_MEANS.format(""), f"{counts.pop():,} episodes each." if len(counts) == 1 else f"Episodes: {sizes}."]
+        each = f"{counts.pop():,} episodes each." if len(counts) == 1 else f"Episodes: {sizes}."
+        notes = [_MEANS.format(""), each, *sample_notes(request, runs)]
         if results:
             notes.append(
                 "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks; its ± fits "
@@ -249,7 +264,7 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
 _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
     "overall": TableSpec(
         "Overall", run_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes",), headed=False,
-        notes=lambda r: [_MEANS.format("four "), *caveats(r.runs)],
+        notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
     ),
     "results": result_tables,
     "partition": TableSpec(

@@ -27,6 +27,7 @@ from aerialdojo_gen.store.atomic import atomic_file
 
 # Long tables, folded away on the page.
 _FOLDED = ("type", "scene")
+_PAPER_AXES = "the axes of the paper's Fig. 5; what is beyond one is drawn at its end"
 
 
 def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -> list[Path]:
@@ -34,9 +35,10 @@ def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -
     named = named_tables(request, ["all"])
     tables = [table for made in named.values() for table in made]
     drawn_runs, _ = _of_the_radar(request.runs)
+    paper = request.sample is not None
     drawn = {
-        "families": metric_radars(drawn_runs, request.profiles[0]),
-        "radar": family_radars(drawn_runs, request.profiles[0]),
+        "families": metric_radars(drawn_runs, request.profiles[0], paper),
+        "radar": family_radars(drawn_runs, request.profiles[0], paper),
         "radius": radius_curve(request.runs, request.profiles[0]),
     }
     figures = {(name, kind): encode_figure(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}
@@ -80,8 +82,9 @@ def html(
     }  # fmt: skip
     first = request.profiles[0]
     _, tasks = _of_the_radar(request.runs)
+    axes = "axes end where the data does" if request.sample is None else _PAPER_AXES
     captions = {
-        "families": f"{tasks} at {first.radius_m:g} m, a chart a metric: axes end where the data does",
+        "families": f"{tasks} at {first.radius_m:g} m, a chart a metric: {axes}",
         "radar": f"{tasks} at {first.radius_m:g} m, a chart a family; outwards is better",
         "radius": "SR (solid) and OSR (dashed) against the radius that counts as success",
     }

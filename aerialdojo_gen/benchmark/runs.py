@@ -17,6 +17,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
+from aerialdojo_gen.dataset.protocol import Sample
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
@@ -89,20 +90,27 @@ class Run:
         return path_clearances(self.table, read_run(self.log, self.name, "steps", STEP_COLUMNS))
 
 
-def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
-    """Read runs."""
+def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = None) -> list[Run]:
+    """Read runs; with a sample, only their episodes of its tasks."""
     root = open_root(data)
-    tables = {name: read_run(root, name) for name in (names or runs(root))}
+
+    def read(name: str, table: str = "episodes") -> pa.Table:
+        rows = read_run(root, name, table)
+        return rows if sample is None else rows.filter(pc.is_in(rows["task_id"], pa.array(sample.ids(), pa.string())))
+
+    tables = {name: read(name) for name in (names or runs(root))}
     if not names:
         tables = {name: table for name, table in tables.items() if table.num_rows}
     if not tables:
-        raise StoreError(f"no runs in {root}: run {command('evaluate')}")
+        what = "no runs" if sample is None else "no episodes of the paper's sample"
+        raise StoreError(f"{what} in {root}: run {command('evaluate', protocol=sample and 'paper')}")
     for name, table in tables.items():
         if not table.num_rows:
-            failed = read_run(root, name, "failures").num_rows
+            failed = read(name, "failures").num_rows
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
-            again = command("evaluate", run=name, rerun_failed=bool(failed))
-            raise StoreError(f"run {name!r} has no finished episode{said} {again}")
+            again = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
+            of = "" if sample is None else " of the paper's sample"
+            raise StoreError(f"run {name!r} has no finished episode{of}{said} {again}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
     told = [table["told"][0].as_py() or "" for table in tables.values()]
     # With hints it is another contender.
@@ -115,7 +123,7 @@ def load_runs(data: Where, names: Sequence[str] = ()) -> list[Run]:
             table["agent_options"][0].as_py(),
             table,
             episodes_of(table),
-            read_run(root, name, "failures").num_rows,
+            read(name, "failures").num_rows,
             root,
             told=more,
         )

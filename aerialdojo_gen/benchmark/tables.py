@@ -17,6 +17,7 @@ from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views
 from aerialdojo_gen.benchmark.outcome_table import Cut, OutcomeTable
 from aerialdojo_gen.benchmark.runs import Run
+from aerialdojo_gen.dataset.protocol import Sample
 from aerialdojo_gen.store.root import DataRoot
 
 NONE = "–"
@@ -33,6 +34,7 @@ class ReportRequest:
     radii_m: Sequence[float] = DEFAULT_RADII_M  # Of the table of radii, metres
     intervals: bool = True  # Whether 95 % intervals are shown
     paper_results: Sequence[PaperResult] = ()  # Results of the paper to show beside the runs'
+    sample: Sample | None = None  # The tasks of the paper's protocol, to which the runs are cut
 
     @cached_property
     def breakdowns(self) -> Breakdowns:

@@ -20,6 +20,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import HINTS, Goal, Heading, Rules
 from aerialdojo_gen.dataset.contents import scenes_in_release
+from aerialdojo_gen.dataset.protocol import check_protocol, read_sample
 from aerialdojo_gen.geometry.frames import compass_heading
 from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.scenes.stored import mesh_copy
@@ -55,6 +56,8 @@ class Selection:
         Draw so many tasks, spread over the scenes as evenly as they go; a larger limit only adds to them.
     seed : int
         Of the draw.
+    protocol : str
+        ``paper`` for the tasks of the paper's sample (`aerialdojo_gen.dataset.protocol`) alone; empty for all.
     """
 
     splits: tuple[str, ...] = ()
@@ -63,6 +66,7 @@ class Selection:
     scenes: tuple[str, ...] = ()
     limit: int | None = None
     seed: int = 0
+    protocol: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what does not exist, with what there is; give splits their names."""
@@ -76,6 +80,7 @@ class Selection:
                 if name not in known:
                     also = tuple(_USUAL) if what == "split" else ()
                     raise UsageError(unknown(f"no {what}", name, (*known, *also)))
+        check_protocol(self.protocol)
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")
 
@@ -132,20 +137,25 @@ def select(data: Where, selection: Selection) -> pa.Table:
         There is no release, or a part of it is damaged.
     """
     root = open_root(data)
+    sample = read_sample(root) if selection.protocol else None
     tables = []
     for scene in scenes_in_release(root, selection.scenes):
-        for subset in ("train", "test"):
+        if sample is not None and scene not in sample.tasks:
+            continue
+        for subset in ("train", "test") if sample is None else ("test",):
             split = f"{store.partition(scene)}_{subset}"
             if split not in (selection.splits or SUBSETS):
                 continue
             table = store.read_scene(root, f"tasks/{subset}", scene, _COLUMNS)
+            table = table if sample is None else sample.of(scene, table)
             for column, chosen in (("setting", selection.settings), ("modality", selection.modalities)):
                 if chosen:
                     table = table.filter(pc.is_in(table[column], pa.array(chosen, pa.string())))
             tables.append(table.append_column("split", pa.array([split] * table.num_rows, pa.string())))
     found = pa.concat_tables(tables) if tables else None
     if found is None or not found.num_rows:
-        raise UsageError("no task of the release fits: widen --split, --setting, --modality or --scene")
+        what = "the paper's sample, test tasks of base and standard," if selection.protocol else "the release"
+        raise UsageError(f"no task of {what} fits: widen --split, --setting, --modality or --scene")
     found = found.sort_by([(key, "ascending") for key in TASKS.key])
     return found if selection.limit is None else _sample(found, selection.limit, selection.seed)
 

@@ -114,6 +114,10 @@ Address = Annotated[
         help="Address of a running Ray cluster.  (default: start one on this machine)",
     ),
 ]
+Protocol = Annotated[
+    Literal["paper"] | None,
+    typer.Option("--protocol", help="paper: the tasks of the paper's sample alone, two maps a family."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
 Replace = Annotated[
     bool, typer.Option("--replace", help="Overwrite a release made by another pipeline; it is deleted.")

@@ -22,6 +22,7 @@ from aerialdojo_gen.cli.common import (
     Data,
     ExecutorName,
     PipelineFile,
+    Protocol,
     Quiet,
     RendererName,
     Scene,
@@ -34,6 +35,8 @@ from aerialdojo_gen.cli.common import (
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.agents.goal import Sensors
+    from aerialdojo_gen.benchmark.evaluation import Outcome
+    from aerialdojo_gen.pipeline.progress import Reporter
 
 app = typer.Typer()
 
@@ -77,6 +80,7 @@ def evaluate(
     modality: Annotated[
         list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
     ] = None,
+    protocol: Protocol = None,
     scene: Scene = None,
     limit: Annotated[
         int | None,
@@ -165,6 +169,7 @@ def evaluate(
     from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
     from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.benchmark.worker import RetryPolicy
+    from aerialdojo_gen.dataset.protocol import sample_shortfall
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
@@ -177,7 +182,7 @@ def evaluate(
             run or name.replace(".", "-").replace(":", "-"),
             agent,
             options,
-            Selection(splits, settings, modalities, chosen, limit, seed),
+            Selection(splits, settings, modalities, chosen, limit, seed, protocol or ""),
             _sensors(agent, options, view, width, height),
             config.embodiment,
             renderer,
@@ -185,6 +190,8 @@ def evaluate(
             requests_per_minute,
             tell=tuple(tell or ()),
         )
+    if protocol and (less := sample_shortfall(data)):
+        print(f"--protocol {protocol}: {less}", file=sys.stderr)
     if estimate:
         from aerialdojo_gen.benchmark.estimate import estimate as estimate_cost
 
@@ -201,8 +208,13 @@ def evaluate(
     except KeyboardInterrupt:
         print("interrupted: finished episodes are kept, the same command continues from here", file=sys.stderr)
         raise SystemExit(130) from None
-    scores = f"; for all scores: {command('report', evaluation.run, log=out)}" if outcome.finished else ""
-    reporter.line(f"evaluate {evaluation.run}: {outcome}{scores}")
+    scores = command("report", evaluation.run, log=out, protocol=protocol)
+    _tell(outcome, evaluation.run, scores, data, reporter)
+
+
+def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
+    """Say what a run gave, the command for its scores, and how to fly again what failed."""
+    reporter.line(f"evaluate {run}: {outcome}{f'; for all scores: {scores}' if outcome.finished else ''}")
     last = outcome.failure_message(rerun_command(["--rerun-failed"], without=["--restart"], data=data))
     if outcome.stopped or outcome.all_failed:
         raise AerialDojoError(last)

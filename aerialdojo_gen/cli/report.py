@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width, wrapped
-from aerialdojo_gen.cli.common import Data, Json
+from aerialdojo_gen.cli.common import Data, Json, Protocol
 
 app = typer.Typer()
 
@@ -60,6 +60,7 @@ def report(
         typer.Option("--radius", min=0.0, help="Success radii in metres for the radius table: --radius 1 3 "
             "5 10.  (default: 3 5)"),
     ] = None,
+    protocol: Protocol = None,
     beside: Annotated[
         Literal["paper"] | None, typer.Option("--beside", help="paper: add the paper's own results, from "
             "its simulator.")
@@ -100,6 +101,7 @@ def report(
     from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
     from aerialdojo_gen.benchmark.tables import DEFAULT_RADII_M, ReportRequest
     from aerialdojo_gen.dataset.contents import release_scenes
+    from aerialdojo_gen.dataset.protocol import read_sample
     from aerialdojo_gen.store.root import open_root
 
     if as_json:
@@ -111,10 +113,11 @@ def report(
     root, written = open_root(data), open_root(log or data)
     if log is None and not runs_there(root):
         release_scenes(root)  # a folder without either is the wrong one
-    named = load_runs(written, runs or ())
+    sample = read_sample(root) if protocol else None
+    named = load_runs(written, runs or (), sample)
     loaded = group_runs(with_baselines(written, named) if floors else named, groups)
     request = ReportRequest(
-        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else ()
+        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else (), sample
     )
     if style in ("csv", "json"):
         extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]

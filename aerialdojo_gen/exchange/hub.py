@@ -20,7 +20,7 @@ from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 # What stands beside the tables; the dataset card is what the Hub shows of a data set.
-_BESIDE = ("README.md", "croissant.json", "pipeline.json")
+_BESIDE = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
 _AT_ONCE = 8
 _CHUNK = 1 << 20
 

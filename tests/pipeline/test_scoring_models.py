@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
+from support.tiny_clip import write_clip
 from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
@@ -20,55 +21,13 @@ from aerialdojo_gen.pipeline.scoring.ensemble import scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.vlm import VlmScorer, read_order
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 
-WORDS = {"[UNK]": 0, "a": 1, "photo": 2, "of": 3, "red": 4, "blue": 5, "post": 6}
 KEY = "sk-test-0123456789"
 RED, GREY, BLUE = plain_view((220, 30, 30)), plain_view((128, 128, 128)), plain_view((30, 40, 210))
 
 
 @pytest.fixture(scope="session")
 def clip(tmp_path_factory):
-    """A CLIP whose embeddings are colours: a picture's mean, and what a word stands for."""
-    import onnx
-    from onnx import TensorProto, helper, numpy_helper
-
-    folder = tmp_path_factory.mktemp("clip")
-
-    def save(name, graph):
-        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
-        onnx.checker.check_model(model)
-        onnx.save(model, str(folder / name))
-
-    value = helper.make_tensor_value_info
-    save(
-        "vision.onnx",
-        helper.make_graph(
-            [helper.make_node("ReduceMean", ["pixel_values"], ["image_embeds"], axes=[2, 3], keepdims=0)],
-            "vision",
-            [value("pixel_values", TensorProto.FLOAT, ["n", 3, 32, 32])],
-            [value("image_embeds", TensorProto.FLOAT, ["n", 3])],
-        ),
-    )
-    meaning = np.zeros((len(WORDS), 3), np.float32)
-    meaning[WORDS["red"]], meaning[WORDS["blue"]] = (1.0, -0.5, -0.5), (-0.5, -0.5, 1.0)
-    save(
-        "text.onnx",
-        helper.make_graph(
-            [
-                helper.make_node("Gather", ["meaning", "input_ids"], ["words"]),
-                helper.make_node("ReduceSum", ["words", "axes"], ["text_embeds"], keepdims=0),
-            ],
-            "text",
-            [value("input_ids", TensorProto.INT64, ["n", "length"])],
-            [value("text_embeds", TensorProto.FLOAT, ["n", 3])],
-            [numpy_helper.from_array(meaning, "meaning"), numpy_helper.from_array(np.array([1], np.int64), "axes")],
-        ),
-    )
-    from tokenizers import Tokenizer, models, pre_tokenizers
-
-    tokenizer = Tokenizer(models.WordLevel(WORDS, unk_token="[UNK]"))
-    tokenizer.pre_tokenizer = pre_tokenizers.Whitespace()
-    tokenizer.save(str(folder / "tokenizer.json"))
-    return ClipConfig(vision=folder / "vision.onnx", text=folder / "text.onnx", tokenizer=folder / "tokenizer.json")
+    return write_clip(tmp_path_factory.mktemp("clip"))
 
 
 def selected(config, name, folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -155,3 +156,16 @@ class DepthMap:
             cell = min((c for c in around if steps[c] >= 0), key=lambda c: int(steps[c]))
             way.append(cell)
         return [self.point(c) for c in reversed(way)]
+
+
+def free_ahead_m(depth_m: NDArray[np.float32], sensors: Sensors, radius_m: float) -> float:
+    """Depth of the nearest thing in the corridor that the body would fly through, along the view's axis, metres."""
+    depth = np.where(depth_m > 0.0, depth_m, np.inf)
+    corridor = _off_axis(sensors) * np.where(np.isfinite(depth), depth, 0.0) <= 2.0 * radius_m
+    return float(np.where(corridor, depth, np.inf).min())
+
+
+@lru_cache(maxsize=4)
+def _off_axis(sensors: Sensors) -> NDArray[np.float64]:
+    """How far from a view's axis its pixels look, per metre of depth, (H, W)."""
+    return np.asarray(np.abs(sensors.camera.rays()[..., :2]).max(axis=-1))

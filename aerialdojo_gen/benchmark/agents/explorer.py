@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.agents.base import AgentBase
-from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
+from aerialdojo_gen.benchmark.agents.depth_map import DepthMap, free_ahead_m
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, TURN_RAD, TURNS
 from aerialdojo_gen.store.schemas import ACTION_NAMES, MOVE_UP_1, STOP, TURN_LEFT, TURN_RIGHT
@@ -54,8 +54,6 @@ class ExplorerAgent(AgentBase):
         self._map = DepthMap(self._sensors)
         self._x_m = self._y_m = 0.0
         self._headings = 0
-        rays = self._sensors.camera.rays()
-        self._across = np.abs(rays[..., :2]).max(axis=-1)
         self._before = STOP
         self._way: list[tuple[float, float]] = []
 
@@ -105,7 +103,7 @@ class ExplorerAgent(AgentBase):
                 return TURN_LEFT if turns > 0 else TURN_RIGHT
             # Until here the way stays what it was: the nearest frontier may change sides with every look.
             self._way = []
-            free, straight = self._free_ahead_m(depth_m), self._straight_m(way)
+            free, straight = free_ahead_m(depth_m, self._sensors, self._radius_m), self._straight_m(way)
             for action, metres in _FORWARD:
                 if metres + self._clearance_m <= free and (metres <= straight or metres == 1.0):
                     return action
@@ -124,12 +122,6 @@ class ExplorerAgent(AgentBase):
                 break
             farthest = max(farthest, cos * dx + sin * dy)
         return farthest
-
-    def _free_ahead_m(self, depth_m: NDArray[np.float32]) -> float:
-        """Depth of the nearest thing in the corridor that the body would fly through."""
-        depth = np.where(depth_m > 0.0, depth_m, np.inf)
-        corridor = self._across * np.where(np.isfinite(depth), depth, 0.0) <= 2.0 * self._radius_m
-        return float(np.where(corridor, depth, np.inf).min())
 
 
 def thumbnail(rgb: NDArray[np.uint8]) -> NDArray[np.float64]:

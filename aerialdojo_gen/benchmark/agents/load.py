@@ -34,6 +34,7 @@ BUILT_IN = {
     "stop": f"{_HERE}.simple:StopAgent",
     "constant": f"{_HERE}.simple:ConstantAgent",
     "explorer": f"{_HERE}.explorer:ExplorerAgent",
+    "clip": f"{_HERE}.clip_heuristic:ClipHeuristicAgent",
     "openai": "aerialdojo_gen.benchmark.llm.openai_agent:OpenAIAgent",
     "anthropic": "aerialdojo_gen.benchmark.llm.anthropic_agent:AnthropicAgent",
     "policy": "aerialdojo_gen.learning.policy:Policy",

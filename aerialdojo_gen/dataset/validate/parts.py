@@ -24,6 +24,7 @@ _BESIDE = {
     "README.md",
     "croissant.json",
     "pipeline.json",
+    "protocol.json",
     "LICENSE",
     "CITATION.cff",
     ".gitattributes",

@@ -62,17 +62,19 @@ class ClipScorer:
     def similarity(self, name: str, rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Cosines (n,) between a name's embedding and those of pictures (n, H, W, 3) uint8."""
         if name not in self._known:
-            self._known[name] = self._embed_text(_PROMPT.format(name))
-        return self._embed_pictures(rgb) @ self._known[name]
+            self._known[name] = self.embed_text(_PROMPT.format(name))
+        return self.embed_pictures(rgb) @ self._known[name]
 
-    def _embed_text(self, text: str) -> NDArray[np.float64]:
+    def embed_text(self, text: str) -> NDArray[np.float64]:
+        """Embed a text, cut after 77 tokens: (d,), of length 1."""
         self._tokenizer.enable_truncation(_TOKENS)
         encoded = self._tokenizer.encode(text)
         given = {"input_ids": encoded.ids, "attention_mask": encoded.attention_mask}
         feed = {i.name: np.array([given[i.name]], _dtype(i)) for i in self._text.get_inputs() if i.name in given}
         return _unit(_run(self._text, feed, "text_embeds"))[0]
 
-    def _embed_pictures(self, rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def embed_pictures(self, rgb: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Embed pictures (n, H, W, 3) uint8: (n, d), rows of length 1."""
         edge = self._pixels.shape[2] if isinstance(self._pixels.shape[2], int) else _EDGE_PX
         scaled = [cv2.resize(picture, (edge, edge), interpolation=cv2.INTER_CUBIC) for picture in rgb]
         pixels = (np.stack(scaled).astype(np.float32) / 255.0 - _MEAN) / _STD
