@@ -66,7 +66,7 @@ def evaluate(
     reporter = reporter or Reporter(quiet=True)
     folder = log.below(f"runs/{check_run_name(evaluation.run)}")
     rows = select(root, evaluation.selection)
-    run = _Run(root, log, folder, evaluation, rows)
+    run = RunLog(root, log, folder, evaluation, rows)
     made = make_executor(
         executor,
         workers,
@@ -116,8 +116,8 @@ def evaluate(
     )  # fmt: skip
 
 
-class _Run:
-    """A run's folder and tables."""
+class RunLog:
+    """A run's folder and tables: what is in them, and what is left to fly."""
 
     def __init__(
         self, data: DataRoot, out: DataRoot, folder: DataRoot, evaluation: Evaluation, rows: pa.Table

@@ -18,6 +18,7 @@ from aerialdojo_gen.cli import (
     config,
     evaluate,
     exchange,
+    fly,
     places,
     release,
     render,
@@ -29,7 +30,7 @@ from aerialdojo_gen.cli import (
 
 _HEADINGS = {
     "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
-    "Evaluate and train agents": ("evaluate", "report", "train"),
+    "Evaluate and train agents": ("evaluate", "fly", "report", "train"),
     "Add your own scenes": ("add-scene", "add-map", "add-terrain", "annotate-draft", "annotate"),
     "Exchange and share": ("export", "import-benchmark", "push-to-hub", "pull"),
 }
@@ -91,7 +92,7 @@ def _program(
 
 
 _GROUPS = (
-    stages, render, sources, places, evaluate, release, validate, exchange, report
+    stages, render, sources, places, evaluate, fly, release, validate, exchange, report
 )  # fmt: skip
 for _group in _GROUPS:
     app.add_typer(_group.app)

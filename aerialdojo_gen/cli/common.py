@@ -79,6 +79,36 @@ Scenes = Annotated[
     list[str] | None,
     typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
 ]
+# Which tasks are flown.
+Split = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--split",
+        help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  (default: all)",
+    ),
+]
+Setting = Annotated[
+    list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
+]  # fmt: skip
+Modality = Annotated[list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")]
+TaskLimit = Annotated[
+    int | None,
+    typer.Option(
+        "--limit",
+        min=1,
+        help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
+        "separately.  (default: all)",
+    ),
+]
+SelectionSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")]
+Tell = Annotated[
+    list[str] | None,
+    typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
+]
+Out = Annotated[
+    str | None,
+    typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
+]
 PipelineFile = Annotated[
     Path | None,
     typer.Option(

@@ -21,12 +21,19 @@ from aerialdojo_gen.cli.common import (
     Address,
     Data,
     ExecutorName,
+    Modality,
+    Out,
     PipelineFile,
     Protocol,
     Quiet,
     RendererName,
     Scene,
     Scenes,
+    SelectionSeed,
+    Setting,
+    Split,
+    TaskLimit,
+    Tell,
     Workers,
     default_workers,
     merge_scenes,
@@ -66,33 +73,13 @@ def evaluate(
     run: Annotated[
         str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")
     ] = None,
-    split: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--split",
-            help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  "
-            "(default: all)",
-        ),
-    ] = None,
-    setting: Annotated[
-        list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
-    ] = None,
-    modality: Annotated[
-        list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
-    ] = None,
+    split: Split = None,
+    setting: Setting = None,
+    modality: Modality = None,
     protocol: Protocol = None,
     scene: Scene = None,
-    limit: Annotated[
-        int | None,
-        typer.Option(
-            "--limit",
-            min=1,
-            help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
-            "separately.  "
-            "(default: all)",
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")] = 0,
+    limit: TaskLimit = None,
+    seed: SelectionSeed = 0,
     view: Annotated[
         list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
     ] = None,
@@ -103,14 +90,8 @@ def evaluate(
         int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
     ] = None,
     renderer: RendererName = "auto",
-    tell: Annotated[
-        list[str] | None,
-        typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
-    ] = None,
-    out: Annotated[
-        str | None,
-        typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
-    ] = None,
+    tell: Tell = None,
+    out: Out = None,
     attempts: Annotated[
         int,
         typer.Option(

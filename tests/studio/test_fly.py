@@ -1,0 +1,222 @@
+"""`fly`: a person is an agent of the evaluator's own loop, and the page does what its keys say."""
+
+import io
+import re
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from PIL import Image
+from starlette.testclient import TestClient
+from support.browser import chromium, errors, until
+
+from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.benchmark.agents import Sensors
+from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.tasks import Selection, reference_actions, select
+from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.studio.fly.server import fly_app
+from aerialdojo_gen.studio.fly.session import Session, agent_name
+
+TWO = Selection(modalities=("semantic",), limit=2)
+TOLD = ("target_name", "landmark", "direction", "description")
+OWN = ["run_id", "agent", "agent_options"]
+UP_2, DOWN_1, DOWN_2 = 11, 12, 13
+
+
+def evaluation(selection=TWO, **changes):
+    sensors = Sensors(width=64, height=48)
+    return Evaluation("human-ann", agent_name("ann"), selection=selection, sensors=sensors, **changes)
+
+
+@contextmanager
+def flying(data, out, selection=TWO):
+    """Run a session with its page's app; gives a client and what the page shows first."""
+    session = Session(data, evaluation(selection), out)
+    with session.running():
+        client = TestClient(fly_app(session), base_url="http://127.0.0.1")
+        yield client, until("the loop waits", lambda: waits(client.get("/api/state").json()))
+    assert session.error is None
+
+
+def waits(state):
+    return state if state["phase"] != "busy" else None
+
+
+def post(client, what, state, **more):
+    answer = client.post(f"/api/{what}", json={"version": state["version"], **more})
+    assert answer.status_code == 200, answer.text
+    state = answer.json()
+    return state if waits(state) else until("the loop waits", lambda: waits(client.get("/api/state").json()))
+
+
+def reference(data, rows, state):
+    """The task that is shown, and its reference's actions."""
+    (row,) = [row for row in rows if all(row[name] == state["goal"][name] for name in TOLD)]
+    routes = reference_actions(open_root(data), row["scene"], (row["subset"],), "agent_action")
+    return row["task_id"], routes[row["nav_id"]]
+
+
+def fly(client, state, actions):
+    for action in actions:
+        assert state["phase"] == "flying"
+        state = post(client, "act", state, action=action)
+    return state
+
+
+def test_flights_are_logged_as_the_oracles_are_and_no_task_is_offered_twice(smoke, tmp_path):
+    rows = select(smoke, TWO).to_pylist()
+    with flying(smoke, tmp_path) as (client, state):
+        assert (state["phase"], state["selected"], state["flown"]) == ("consent", 2, 0)
+        state = post(client, "agree", state)
+        first, actions = reference(smoke, rows, state)
+        assert state["remaining_actions"] == state["goal"]["action_budget"] > len(actions)
+        state = fly(client, state, actions)
+        assert (state["phase"], state["flown"], state["successes"]) == ("ended", 1, 1)
+        assert (state["result"]["termination"], state["result"]["success"]) == ("stop", True)
+        state = post(client, "next", state)
+        second, actions = reference(smoke, rows, state)
+        fly(client, state, actions[:3])
+    assert read_run(tmp_path, "human-ann")["task_id"].to_pylist() == [first]
+    with flying(smoke, tmp_path) as (client, state):
+        state = post(client, "agree", state)
+        assert (reference(smoke, rows, state), state["step"]) == ((second, actions), 0)
+        state = fly(client, state, actions)
+        assert (state["phase"], state["flown"], state["successes"]) == ("done", 2, 2)
+    with flying(smoke, tmp_path) as (_, state):
+        assert (state["phase"], state["flown"]) == ("done", 2)
+    evaluate(smoke, Evaluation("o", "oracle", {"actions": "agent_action"}, TWO), out=tmp_path)
+    for table in ("episodes", "steps"):
+        own, oracles = (read_run(tmp_path, run, table).to_pandas() for run in ("human-ann", "o"))
+        kept = [name for name in own.columns if name not in OWN]
+        assert own[kept].equals(oracles[kept])
+    assert set(read_run(tmp_path, "human-ann")["agent"].to_pylist()) == {"human:ann"}
+    assert (read_run(tmp_path, "human-ann", "timings").to_pandas().agent_s > 0).all()
+
+
+def test_what_is_refused_what_collides_and_how_deep_it_is(smoke, tmp_path):
+    with flying(smoke, tmp_path) as (client, state):
+        state = fly(client, post(client, "agree", state), [UP_2])
+        before = client.get("/api/depth/down/at?x=0.5&y=0.5").json()["depth_m"]
+        state = fly(client, state, [DOWN_1])
+        assert client.get("/api/depth/down/at?x=0.5&y=0.5").json()["depth_m"] == pytest.approx(before - 1, abs=0.011)
+        for kind in ("pictures", "depth"):
+            picture = Image.open(io.BytesIO(client.get(f"/api/{kind}/front").content))
+            assert (picture.format, picture.size) == ("JPEG", (64, 48))
+            assert np.ptp(np.asarray(picture)) > 50
+        n = state["remaining_actions"]
+        while not state["refused"]:
+            state = fly(client, state, [UP_2])
+            n -= 1
+            assert (state["remaining_actions"], state["last"]) == (n, UP_2)
+        while state["phase"] == "flying":
+            state = fly(client, state, [DOWN_2])
+        assert (state["result"]["termination"], state["result"]["success"]) == ("collision", False)
+    (row,) = read_run(tmp_path, "human-ann").to_pylist()
+    assert (row["termination"], row["n_refused"], row["success"]) == ("collision", 1, False)
+
+
+def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, tmp_path):
+    with flying(smoke, tmp_path) as (client, consent):
+        assert client.get("/api/pictures/front").status_code == 404
+        assert client.post("/api/act", json={"version": consent["version"], "action": 1}).status_code == 409
+        state = post(client, "agree", consent)
+        version = state["version"]
+        for what, body in (
+            ("act", {"version": version - 1, "action": 0}),
+            ("agree", {"version": consent["version"]}),
+            ("next", {"version": version}),
+        ):
+            answer = client.post(f"/api/{what}", json=body)
+            assert (answer.status_code, answer.json()["state"]) == (409, state)
+        for body in (
+            {"version": version, "action": 16},
+            {"version": version, "action": "1"},
+            {"action": 1},
+            [],
+            None,
+        ):
+            assert client.post("/api/act", json=body).status_code == 422
+        act = {"version": version, "action": 0}
+        assert client.post("/api/act", json=act, headers={"Origin": "http://example.org"}).status_code == 403
+        assert client.post("/api/act", json=act, headers={"Host": "example.org"}).status_code == 403
+        assert client.post("/api/act", content=b" " * 5000).status_code == 413
+        assert client.get("/api/depth/front/at?x=1&y=0").status_code == 422
+        assert client.get("/api/depth/behind/at?x=0&y=0").status_code == 404
+        assert client.get("/api/pictures/goal").status_code == 404
+        assert client.get("/api/state").json() == state
+
+
+def test_another_selection_or_a_second_pilot_of_a_run_is_refused(smoke, tmp_path):
+    with flying(smoke, tmp_path) as (client, state):
+        with pytest.raises(StoreError, match="another run is writing"), flying(smoke, tmp_path):
+            pass
+        fly(client, post(client, "agree", state), [0])
+    with pytest.raises(UsageError, match="was begun with limit = 2, not 3"):
+        flying(smoke, tmp_path, Selection(modalities=("semantic",), limit=3)).__enter__()
+    for name in ("Ann", "a b", "../x", "", "ä", "a" * 41, "-a"):
+        with pytest.raises(UsageError, match="small letters"):
+            agent_name(name)
+
+
+@pytest.mark.browser
+def test_a_person_flies_to_the_goal_by_keys_and_report_has_the_rate(smoke, tmp_path):
+    one = Selection(modalities=("image",), limit=1)
+    (row,) = select(smoke, one).to_pylist()
+    routes = reference_actions(open_root(smoke), row["scene"], (row["subset"],), "agent_action")
+    program = [sys.executable, "-m", "aerialdojo_gen.cli"]
+    where = ["--data", str(smoke), "--modality", "image", "--limit", "1", "--no-browser"]
+    process = subprocess.Popen(
+        [*program, "fly", "--name", "pilot-1", "--out", str(tmp_path), *where], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        url = re.search(r"http://127\.0\.0\.1:\d+/", process.stdout.readline())[0]
+        with chromium("the page of fly") as driver:
+            follow(driver, url, row, routes[row["nav_id"]])
+    finally:
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "1 flown, success rate 100.0%" in out
+    told = [*program, "report", "human-pilot-1", "--log", str(tmp_path), "--data", str(smoke)]
+    report = subprocess.run(told, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"human:pilot-1 .*100\.0", report), report
+
+
+def follow(driver, url, row, actions):
+    """Agree, look at the depth, and press the keys of a reference."""
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    keys = [Keys.ENTER, *"xswzaqcde", "f", "r", "g", "t", Keys.ARROW_LEFT, Keys.ARROW_RIGHT]
+
+    def shown(name):
+        return driver.execute_script(f"return document.body.dataset.{name}")
+
+    def text(name):
+        return driver.find_element("id", name).text
+
+    driver.get(url)
+    until("the person is asked", lambda: shown("phase") == "consent")
+    assert "as human:pilot-1" in text("dialog-text")
+    ActionChains(driver).send_keys(Keys.ENTER).perform()
+    until("the flight begins", lambda: shown("phase") == "flying")
+    assert row["target_name"] in text("target")
+    width = "return document.getElementById('goal-image').naturalWidth"
+    until("the goal's picture is there", lambda: driver.execute_script(width) > 0)
+    ActionChains(driver).send_keys("v").perform()
+    assert driver.find_element("id", "depth").get_attribute("aria-pressed") == "true"
+    driver.find_element("id", "down-view").click()
+    until("the distance is told", lambda: re.search(r"down: [\d.]+ m deep", text("reading")))
+    for done, action in enumerate(actions):
+        assert text("left") == f"{row['action_budget'] - done} of {row['action_budget']} actions left"
+        version = shown("version")
+        ActionChains(driver).send_keys(keys[action]).perform()
+        until("the action is done", lambda before=version: shown("version") != before)
+    assert shown("phase") == "done"
+    assert text("dialog-title") == "Success"
+    assert errors(driver) == []
