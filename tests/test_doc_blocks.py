@@ -36,8 +36,10 @@ NOT_RUN = {
     r"(\S*/)?(uv )?pip install .*": "installs packages",
     r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
     "extra train: tests/learning/test_training.py does",
-    r"(annotate|view) .*|build-scenes --watch .*": "serves until Ctrl-C: "
-    "tests/studio/test_annotate_tool_browser.py, tests/studio/test_view_page.py, tests/studio/test_plan_page.py",
+    r"(annotate|view|fly) .*|build-scenes --watch .*": "serves until Ctrl-C: "
+    "tests/studio/test_annotate_tool_browser.py, tests/studio/test_view_page.py, tests/studio/test_plan_page.py, "
+    "tests/studio/test_fly.py",
+    r"report human-.*": "scores what a person flew: tests/studio/test_fly.py",
     r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
     r"add-scene \S+ (odm_|city\.).*": "reads a scan, a city: tests/imports/test_cuts.py and "
     "tests/imports/test_surfaces.py make some",

@@ -18,8 +18,10 @@ from aerialdojo_gen.pipeline.registry import STAGES, upstream
 from aerialdojo_gen.store import shards
 
 STAGE_NAMES = [stage.name for stage in STAGES]
-NEEDED = {"run": ["smoke"], "export": ["--format", "habitat"], "evaluate": ["--agent", "stop"]}
-OF_A_RELEASE = ["evaluate", "export", "stats", "view", "validate"]
+NEEDED = {
+    "run": ["smoke"], "export": ["--format", "habitat"], "evaluate": ["--agent", "stop"], "fly": ["--name", "x"],
+}  # fmt: skip
+OF_A_RELEASE = ["evaluate", "fly", "export", "stats", "view", "validate"]
 
 
 @pytest.fixture

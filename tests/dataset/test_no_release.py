@@ -22,6 +22,7 @@ COMMANDS = {
     "view": ["view", "--scene", "U_Courtyard_0", "--no-browser"],
     "export": ["export", "--format", "habitat", "--out", "exported"],
     "evaluate": ["evaluate", "--agent", "stop"],
+    "fly": ["fly", "--name", "pilot-1"],
     "evaluate --estimate": ["evaluate", "--agent", "openai", "--option", "model=m", "--estimate"],
 }
 

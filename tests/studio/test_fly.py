@@ -13,11 +13,14 @@ from PIL import Image
 from starlette.testclient import TestClient
 from support.browser import chromium, errors, until
 
+from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
-from aerialdojo_gen.benchmark.tasks import Selection, reference_actions, select
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
+from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.studio.fly.server import fly_app
 from aerialdojo_gen.studio.fly.session import Session, agent_name
@@ -25,7 +28,7 @@ from aerialdojo_gen.studio.fly.session import Session, agent_name
 TWO = Selection(modalities=("semantic",), limit=2)
 TOLD = ("target_name", "landmark", "direction", "description")
 OWN = ["run_id", "agent", "agent_options"]
-UP_2, DOWN_1, DOWN_2 = 11, 12, 13
+STOP, FORWARD_5, UP_2, DOWN_1, TURN_LEFT = 0, 3, 11, 12, 14
 
 
 def evaluation(selection=TWO, **changes):
@@ -98,8 +101,27 @@ def test_flights_are_logged_as_the_oracles_are_and_no_task_is_offered_twice(smok
     assert (read_run(tmp_path, "human-ann", "timings").to_pandas().agent_s > 0).all()
 
 
+def into_a_wall(data, selection):
+    """Actions that collide from a task's start."""
+    (task,) = read_tasks(data, select(data, selection))
+    space = flight_space(*mesh_of(open_root(data), task.row["scene"]), RADIUS_M)
+    for turns in range(24):
+        episode = Episode(space, task.start, task.goal, 90)
+        actions = [TURN_LEFT] * turns
+        for action in actions:
+            episode.step(action)
+        while episode.termination is None and not episode.refused:
+            actions.append(FORWARD_5)
+            episode.step(FORWARD_5)
+        if episode.termination == "collision":
+            return actions
+    raise AssertionError("there is no wall")
+
+
 def test_what_is_refused_what_collides_and_how_deep_it_is(smoke, tmp_path):
-    with flying(smoke, tmp_path) as (client, state):
+    one = Selection(scenes=("U_Courtyard_1",), modalities=("semantic",), limit=1)
+    wall = into_a_wall(smoke, one)
+    with flying(smoke, tmp_path, one) as (client, state):
         state = fly(client, post(client, "agree", state), [UP_2])
         before = client.get("/api/depth/down/at?x=0.5&y=0.5").json()["depth_m"]
         state = fly(client, state, [DOWN_1])
@@ -113,11 +135,14 @@ def test_what_is_refused_what_collides_and_how_deep_it_is(smoke, tmp_path):
             state = fly(client, state, [UP_2])
             n -= 1
             assert (state["remaining_actions"], state["last"]) == (n, UP_2)
-        while state["phase"] == "flying":
-            state = fly(client, state, [DOWN_2])
+        state = fly(client, state, [STOP])
+        assert (state["result"]["termination"], state["result"]["success"]) == ("stop", False)
+    with flying(smoke, tmp_path / "wall", one) as (client, state):
+        state = fly(client, post(client, "agree", state), wall)
         assert (state["result"]["termination"], state["result"]["success"]) == ("collision", False)
-    (row,) = read_run(tmp_path, "human-ann").to_pylist()
-    assert (row["termination"], row["n_refused"], row["success"]) == ("collision", 1, False)
+    missed, hit = (read_run(log, "human-ann").to_pylist()[0] for log in (tmp_path, tmp_path / "wall"))
+    assert (missed["termination"], missed["n_refused"], missed["stop_called"]) == ("stop", 1, True)
+    assert (hit["termination"], hit["n_actions"], hit["collision"]) == ("collision", len(wall), True)
 
 
 def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, tmp_path):

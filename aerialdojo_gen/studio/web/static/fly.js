@@ -93,8 +93,7 @@ function goal() {
     $("goal-from").textContent = g.image_distance_m ? `Taken from ${g.image_distance_m} m behind the goal viewpoint.`
       : g.image_distance_m === 0 ? "Taken from the goal viewpoint." : "";
   }
-  $("rule").textContent = `Stop counts within ${g.success_radius_m} m of the goal viewpoint, which is in front of the target, about 1 m from it. `
-    + "A collision ends the flight.";
+  $("rule").textContent = `Stop within ${g.success_radius_m} m of the goal viewpoint, about 1 m in front of the target. A collision ends the flight.`;
   $("most").textContent = `${Math.round(g.max_depth_m)} m`;
 }
 
