@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerialdojo_gen.scenes.grammar_props import next_variant
-from aerialdojo_gen.scenes.kit.natural_ground import settled_z
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.site import MAX_NODES, Site
 
 _MAX_ROWS = 2000
@@ -36,10 +35,9 @@ class Placer:
             return False
         x, y, yaw_deg = round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1)
         settle_m = None if on is not None else settle_m or self._settle_m
-        z = on if settle_m is None else settled_z(self.site, x, y, settle_m)
-        look = variant if drawn or variant is not None else next_variant(self.site, category)
-        words = {"place": phrase} if phrase else None
-        thing = self.site.try_place(category, x, y, yaw_deg, z=z, variant=look, scale=scale, attributes=words)
+        look = DRAWN if drawn and variant is None else variant
+        one = Placement(category, x, y, yaw_deg, look, on, phrase, scale=scale)
+        thing = self.site.place(one, "skip", settle_m=settle_m)
         if thing is None:
             return False
         what = f"{category}:{thing.variant}" if thing.variant else category

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -15,7 +15,6 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.scenes.mesh import Mesh
-from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -80,27 +79,18 @@ def along(
     return poses
 
 
-def place_along(
-    site: Site, category: str, path: Polyline, spacing_m: float, *, offset_m: float = 0.0, turn_deg: float = 0.0,
-    closed: bool = False, **options: Any,
-) -> list[Instance]:  # fmt: skip
-    """Set a prop in the middle of every stretch of `spacing_m` (fence panels, hedges, rails), turned with the path.
+def stretches(path: Polyline, spacing_m: float) -> list[Pose]:
+    """Return the middle of every stretch of `spacing_m`, for fence panels and rails, turned with the path.
 
-    The stretches are shortened or lengthened to fit each straight leg; legs shorter than half a stretch stay empty.
-    A panel along its own y axis needs ``turn_deg=90``.
+    The stretches are shortened or lengthened to fit each straight leg; legs shorter than half a stretch have none.
     """
-    points = [*path, path[0]] if closed else list(path)
     out = []
-    for a, b in pairwise(points):
+    for a, b in pairwise(path):
         dx, dy = b[0] - a[0], b[1] - a[1]
-        length = float(np.hypot(dx, dy))
-        count = round(length / spacing_m)
+        count = round(float(np.hypot(dx, dy)) / spacing_m)
         for k in range(count):
             t = (k + 0.5) / count
-            x = a[0] + dx * t - dy / length * offset_m
-            y = a[1] + dy * t + dx / length * offset_m
-            yaw = float(np.degrees(np.arctan2(dy, dx)))
-            out.append(site.place(category, x, y, yaw + turn_deg, **options))
+            out.append(Pose(a[0] + dx * t, a[1] + dy * t, float(np.degrees(np.arctan2(dy, dx)))))
     return out
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPoint, Point
+from shapely.affinity import rotate, translate
+from shapely.geometry import MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
@@ -19,11 +21,14 @@ from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
+from aerialdojo_gen.scenes.placement import DRAWN, Fit, Placement, Room
 from aerialdojo_gen.scenes.recipe import Recipe
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
 # The largest scene of the dataset has 479.
 MAX_NODES = 5_000
+# What is kept free is so from here up, metres.
+_BELOW_M = 100.0
 
 
 class Site:
@@ -103,65 +108,92 @@ class Site:
 
     # Things
 
-    def place(
-        self,
-        category: str,
-        x: float,
-        y: float,
-        yaw_deg: float = 0.0,
-        *,
-        z: float | None = None,
-        variant: str | None = None,
-        scale: float = 1.0,
-        params: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-        attributes: Mapping[str, str] | None = None,
-        node: str | None = None,
-        solid: bool = True,
-    ) -> Instance:
-        """Place a prop of the catalogue at x, y in metres, its front towards `yaw_deg`.
+    @overload
+    def place(self, thing: Placement, fit: Literal["as_is", "must"] = ..., **room: Unpack[Room]) -> Instance: ...
 
-        On the ground unless `z` is given.
+    @overload
+    def place(self, thing: Placement, fit: Fit, **room: Unpack[Room]) -> Instance | None: ...
+
+    def place(self, thing: Placement, fit: Fit = "as_is", **room: Unpack[Room]) -> Instance | None:
+        """Place a prop of the catalogue; None where it has no room and `fit` is ``"skip"``.
+
+        Parameters
+        ----------
+        thing : Placement
+        fit : str
+            Without room on the site for its footprint: ``"as_is"`` places it all the same, ``"skip"`` leaves it out,
+            ``"must"`` raises an `AssetError`.
+        settle_m : float, optional
+            On a slope, stand it between the heights about a foot of this radius, metres.
+        clear_m, margin_m, room_m : float, optional
+            Keep free of what follows: a disc about it, so much about its rectangle, so much about its outline.
         """
-        name = self._reserve_node(node or self.node(category))
-        base = self.ground_z(x, y) if z is None else z
-        instance = self.catalogue.instantiate(
-            category,
-            name,
-            self.rng_for("prop", name),
-            (x, y, base),
-            yaw_deg,
-            variant,
-            scale,
-            params,
-            roles,
-            attributes,
-        )
-        if solid:
-            self._footprints.add(footprint(instance, base), base, float(instance.bounds[1, 2]))
-        options = {"variant": variant, "scale": scale, "params": params, "roles": roles, "attributes": attributes}
-        self.instances.append(self._at_moved_pose(category, name, (x, y, base), yaw_deg, options) or instance)
-        return instance
-
-    def try_place(self, category: str, x: float, y: float, yaw_deg: float = 0.0, **options: Any) -> Instance | None:
-        """Place a prop where its footprint is free and inside the site; otherwise place nothing and return None."""
-        z = options.get("z")
-        base = self.ground_z(x, y) if z is None else float(z)
+        z, at = thing.z, (thing.x, thing.y)
+        settle_m = room.get("settle_m")
+        if z is None and settle_m is not None:
+            z = self.settled_z(*at, settle_m)
+        base = self.ground_z(*at) if z is None else z
         before = dict(self._counts)
-        name = options.pop("node", None) or self.node(category)
-        trial = {k: v for k, v in options.items() if k not in ("z", "solid")}
+        name = thing.node or self.node(thing.category)
+        variant = self.next_variant(thing.category) if thing.variant is None else thing.variant
+        attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
+        options = {
+            "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
+            "roles": thing.roles, "attributes": attributes or None,
+        }  # fmt: skip
         instance = self.catalogue.instantiate(
-            category, name, self.rng_for("prop", name), (x, y, base), yaw_deg, **trial
+            thing.category, name, self.rng_for("prop", name), (*at, base), thing.yaw_deg, **options
         )
-        area = footprint(instance, base)
-        if not (self.extent.contains(area) and self._footprints.is_free(area, base, float(instance.bounds[1, 2]))):
+        area = footprint(instance, base) if thing.solid or fit != "as_is" else None
+        high = float(instance.bounds[1, 2])
+        if area is not None and fit != "as_is" and not self._has_room(area, base, high):
             self._counts = before
+            if fit == "must":
+                raise AssetError(f"no room for {thing.category} at ({thing.x:g}, {thing.y:g})")
             return None
         self._reserve_node(name)
-        if options.get("solid", True):
-            self._footprints.add(area, base, float(instance.bounds[1, 2]))
-        self.instances.append(self._at_moved_pose(category, name, (x, y, base), yaw_deg, trial) or instance)
+        if thing.solid and area is not None:
+            self._footprints.add(area, base, high)
+        moved = self._at_moved_pose(thing.category, name, (*at, base), thing.yaw_deg, options)
+        self.instances.append(moved or instance)
+        self._keep_free(thing, instance, room)
         return instance
+
+    def _has_room(self, area: BaseGeometry, low: float, high: float) -> bool:
+        return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
+
+    def _keep_free(self, thing: Placement, instance: Instance, room: Room) -> None:
+        if room.get("clear_m"):
+            self.occupy(disc(thing.x, thing.y, room["clear_m"]))
+        if room.get("margin_m"):
+            (x0, y0, _), (x1, y1, z1) = instance.bounds
+            corners = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+            self.occupy(corners.buffer(room["margin_m"], quad_segs=2), -_BELOW_M, float(z1) + 8.0)
+        if room.get("room_m"):
+            low, high = instance.bounds[:, 2]
+            variant = instance.variant or None
+            outline = self.outline_of(thing.category, variant, (thing.x, thing.y), thing.yaw_deg)
+            self.occupy(outline.buffer(room["room_m"], quad_segs=2), float(low) - 1.0, float(high) + 6.0)
+
+    def next_variant(self, category: str) -> str | None:
+        """Name the variant of a category used least so far; None where it has none."""
+        names = [variant.name for variant in self.catalogue[category].variants]
+        used = Counter(i.variant for i in self.instances if i.category == category)
+        return min(names, key=lambda name: (used[name], names.index(name)), default=None)
+
+    def settled_z(self, x: float, y: float, radius_m: float = 0.5) -> float:
+        """Give the height at which a prop of that radius neither floats nor is buried on a slope, metres."""
+        angles = np.arange(6) * np.pi / 3
+        ring = [self.ground_z(x + radius_m * float(np.cos(a)), y + radius_m * float(np.sin(a))) for a in angles]
+        return (self.ground_z(x, y) + min(ring)) / 2.0
+
+    def outline_of(self, category: str, variant: str | None, at: tuple[float, float], yaw_deg: float) -> BaseGeometry:
+        """Outline of a thing on the ground, grown by 0.1 m, world frame."""
+        trial = self.catalogue.instantiate(
+            category, "outline", self.rng_for("outline", category, variant), variant=variant
+        )
+        shape = MultiPoint(trial.vertices[:, :2]).convex_hull.buffer(0.1, quad_segs=2)
+        return translate(rotate(shape, yaw_deg, origin=(0, 0)), *at)
 
     def _at_moved_pose(
         self, category: str, node: str, at: tuple[float, float, float], yaw_deg: float, options: Mapping[str, Any]

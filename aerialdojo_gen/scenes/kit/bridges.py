@@ -13,9 +13,9 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import Mesh, merge
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -170,5 +170,5 @@ def footbridge(
     """Lay a footbridge of the catalogue over a gap, a little lower than the higher bank."""
     frame = Frame(*at, yaw_deg)
     z = max(site.ground_z(*frame.at(side * span_m / 2, 0.0)) for side in (-1.0, 1.0)) - sunk_m
-    bridge = site.place("footbridge", *at, yaw_deg, z=z, params={"span": span_m}, attributes={"place": place})
-    keep_clear(site, bridge, margin_m)
+    bridge = Placement("footbridge", *at, yaw_deg, DRAWN, z, place, params={"span": span_m})
+    site.place(bridge, margin_m=margin_m)

@@ -13,11 +13,11 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
 from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_scatter import along, place_along, slab, wall
+from aerialdojo_gen.scenes.grammar_scatter import along, slab, stretches, wall
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import keep_clear
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
@@ -144,13 +144,10 @@ def fence_panels(
 ) -> None:  # fmt: skip
     """Set a panel of the catalogue in the middle of every stretch of lines, turned with them."""
     category, _, variant = of.partition(":")
-    words = {"place": place} if place else None
     for line in lines:
-        panels = place_along(
-            site, category, line, panel_m, turn_deg=turn_deg, variant=variant or None, attributes=words
-        )
-        for panel in panels if margin_m else ():
-            keep_clear(site, panel, margin_m)
+        for x, y, yaw_deg in stretches(line, panel_m):
+            panel = Placement(category, x, y, yaw_deg + turn_deg, variant or DRAWN, place=place)
+            site.place(panel, margin_m=margin_m)
 
 
 @site_builder

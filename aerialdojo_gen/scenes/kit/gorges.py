@@ -13,8 +13,7 @@ from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.ground import ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.landforms import grid, smooth
-from aerialdojo_gen.scenes.kit.natural_ground import keep_clear, settled_z
-from aerialdojo_gen.scenes.plans.placing import Placement, place
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Material, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -85,10 +84,8 @@ def by_stream(
     """Place things by how far east of a winding stream they are, y, and yaw; on its banks, or at a height."""
     for category, dx, y, yaw in things:
         x = stream.x(y) + dx
-        z = settled_z(site, x, y) if on is None else on
-        instance = place(site, Placement(category, x, y, yaw, z=z, place=phrase))
-        if on is None and instance is not None:
-            keep_clear(site, instance, 1.6)
+        thing = Placement(category, x, y, yaw, z=on, place=phrase)
+        site.place(thing, settle_m=0.5, margin_m=1.6 if on is None else 0.0)
 
 
 @ground_builder

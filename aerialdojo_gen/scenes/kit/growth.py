@@ -10,7 +10,7 @@ from shapely import contains_xy
 
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import settled_z
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -39,7 +39,7 @@ def strew_trees(
 ) -> None:  # fmt: skip
     """Strew trees over an area, of categories in turn; a spot without room stays empty."""
     for k, spot in enumerate(poisson_disc(area, spacing_m, site.rng_for(stream), limit=limit)):
-        site.try_place(of[k % len(of)], *spot)
+        site.place(Placement(of[k % len(of)], *spot, DRAWN), "skip")
 
 
 @site_builder
@@ -66,7 +66,8 @@ def growth(
         zone = next((one for one in zones if one.area is None or contains_xy(one.area, x, y)), None)
         if count >= limit or zone is None:
             continue
-        z = settled_z(site, x, y, settle_m)
+        z = site.settled_z(x, y, settle_m)
         steep = abs(site.ground_z(x + 1.0, y) - site.ground_z(x - 1.0, y))
         if steep <= zone.steepest_m and site.is_free(x, y, room_m, z=z):
-            count += site.try_place(zone.of[count % len(zone.of)], *pose, z=z) is not None
+            plant = Placement(zone.of[count % len(zone.of)], *pose, DRAWN, z)
+            count += site.place(plant, "skip") is not None

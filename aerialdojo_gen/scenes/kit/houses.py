@@ -8,8 +8,8 @@ from typing import Any, Literal
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
-from aerialdojo_gen.scenes.grammar_props import deal
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -63,9 +63,11 @@ def terrace(
         house(site, own, style, {"colour": one.colour, "place": name})
         whose = f"the {one.colour} house of the {name}"
         if one.front:
-            deal(site, [one.front], [own.pose(depth_m / 2 + 2.3, 2.0, 90.0)], f"in front of {whose}")
+            pose = own.pose(depth_m / 2 + 2.3, 2.0, 90.0)
+            site.place(Placement(one.front, *pose, place=f"in front of {whose}"), "skip")
         if one.back:
-            deal(site, [one.back], [own.pose(-depth_m / 2 - 3.1, 0.2, 180.0)], f"behind {whose}")
+            pose = own.pose(-depth_m / 2 - 3.1, 0.2, 180.0)
+            site.place(Placement(one.back, *pose, place=f"behind {whose}"), "skip")
         if k:
             fence(site, own.path([(behind, -pitch_m / 2), (behind - 5.2, -pitch_m / 2)]), "board")
     hedge = [(behind, -half), (behind - 5.4, -half), (behind - 5.4, half), (behind, half)]

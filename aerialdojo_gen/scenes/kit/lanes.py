@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, deck, railing, stairs
 from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, sphere
 from aerialdojo_gen.scenes.shapes_extruded import prism, sweep
@@ -56,7 +56,8 @@ def balconies(
         hung = site.add(None, "balcony", Frame(*one.at, one.yaw_deg).parts(parts, one.z_m))
         if one.thing:
             x, y = (float(c) for c in hung.centroid[:2])
-            put(site, one.thing, x, y, one.yaw_deg + one.turn_deg, phrase, z=one.z_m, solid=False)
+            yaw_deg = one.yaw_deg + one.turn_deg
+            site.place(Placement(one.thing, x, y, yaw_deg, z=one.z_m, place=phrase, solid=False))
 
 
 @site_builder

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -10,10 +11,10 @@ from pydantic import Field
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import FLOOR_M, HouseStyle, house
-from aerialdojo_gen.scenes.grammar_props import deal, put
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -101,7 +102,7 @@ def _back_garden(site: Site, lot: Lot) -> None:
     place = f"in the back garden of the {lot.colour} house"
     if lot.trees:
         corners = [lot.frame.pose(-d - back + 1.3, s * (side - 1.3)) for s in (1, -1)]
-        deal(site, lot.trees, corners[: len(lot.trees)], place)
+        _in_turn(site, lot.trees, corners[: len(lot.trees)], place)
     rng = site.rng_for("garden", f"{lot.colour} house")
     columns = (len(lot.back) + 1) // 2
     for k, thing in enumerate(lot.back):
@@ -110,8 +111,16 @@ def _back_garden(site: Site, lot: Lot) -> None:
         v = (column + 0.5 - columns / 2) * (2 * side - 3.0) / columns + (0.5 if row else -0.3)
         x, y, yaw = lot.frame.pose(u, v, float(rng.uniform(-50, 50)))
         for dx, dy in ((0.0, 0.0), (0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8)):
-            if deal(site, [thing], [Pose(x + dx, y + dy, yaw)], place):
+            if site.place(Placement(thing, x + dx, y + dy, yaw, place=place), "skip"):
                 break
+
+
+def _in_turn(site: Site, categories: Sequence[str], poses: Sequence[Pose], place: str) -> None:
+    """Place things at poses where there is room, of categories in turn."""
+    count = 0
+    for pose in poses:
+        thing = Placement(categories[count % len(categories)], *pose, place=place)
+        count += site.place(thing, "skip") is not None
 
 
 def _front_garden(site: Site, lot: Lot) -> None:
@@ -122,7 +131,7 @@ def _front_garden(site: Site, lot: Lot) -> None:
         (d + lot.front_m - 1.6, free * (w - 0.6)), (d + porch_m + 1.4, -free * (w - 2.4)),
     ]  # fmt: skip
     poses = [lot.frame.pose(u, v, 90.0 * k) for k, (u, v) in enumerate(spots)]
-    deal(site, lot.front, poses[: len(lot.front)], f"in front of the {lot.colour} house")
+    _in_turn(site, lot.front, poses[: len(lot.front)], f"in front of the {lot.colour} house")
 
 
 def _porch_and_garage(site: Site, lot: Lot) -> None:
@@ -131,10 +140,13 @@ def _porch_and_garage(site: Site, lot: Lot) -> None:
     spots = [lot.frame.pose(d + lot.style.porch_m * 0.45, s * w * f) for s, f in ((1, 0.55), (-1, 0.55), (1, 0.82))]
     for thing, pose in zip(lot.porch, spots, strict=False):
         # The porch itself has taken the ground: its floor is what the thing stands on.
-        put(site, thing, *pose, place=f"on the porch {whose}", z=ground + FLOOR_M, solid=False)
+        z = ground + FLOOR_M
+        site.place(Placement(thing, *pose, z=z, place=f"on the porch {whose}", solid=False))
     if lot.vehicle:
-        deal(site, [lot.vehicle], [lot.frame.pose(d + 3.4, lot.garage_m, 180.0)], f"in the drive {whose}")
+        pose = lot.frame.pose(d + 3.4, lot.garage_m, 180.0)
+        site.place(Placement(lot.vehicle, *pose, place=f"in the drive {whose}"), "skip")
     if lot.garage_roof:
         # The house has taken its ground over its whole height, the garage's roof with it.
         pose = lot.frame.pose(d - 3.0, lot.garage_m)
-        put(site, lot.garage_roof, *pose, place=f"on the garage {whose}", z=ground + _GARAGE_ROOF_M)
+        z = ground + _GARAGE_ROOF_M
+        site.place(Placement(lot.garage_roof, *pose, z=z, place=f"on the garage {whose}"))

@@ -28,6 +28,7 @@ from aerialdojo_gen.scenes.kit.structures import (
     stairs,
 )
 from aerialdojo_gen.scenes.mesh import Mesh, merge
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -128,7 +129,8 @@ def park_cars(
         category = names[int(np.searchsorted(np.cumsum(weights) / weights.sum(), rng.random(), side="right"))]
         yaw = bay.yaw_deg + (180.0 if rng.random() < 0.25 else 0.0) + rng.uniform(-2.0, 2.0)
         shift = rng.uniform(-0.15, 0.15)
-        site.try_place(category, bay.x + shift, bay.y - shift, yaw, z=z, attributes={"place": place})
+        car = Placement(category, bay.x + shift, bay.y - shift, yaw, DRAWN, z, attributes={"place": place})
+        site.place(car, "skip")
 
 
 @site_builder

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen.scenes.grammar_props import next_variant
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.kit.wreckage import Parts
 from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -44,9 +43,8 @@ def strew_things(
         for pose in spots:
             if not site.is_free(pose.x, pose.y, 0.6 + clear_m):
                 continue
-            z = settled_z(site, pose.x, pose.y)
-            words = {"place": place}
-            thing = site.try_place(category, *pose, z=z, variant=next_variant(site, category), attributes=words)
+            z = site.settled_z(pose.x, pose.y)
+            thing = site.place(Placement(category, *pose, z=z, place=place), "skip")
             if thing is not None:
                 (x0, y0, _), (x1, y1, _) = thing.bounds
                 room = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]).buffer(clear_m - 0.4, quad_segs=2)

@@ -16,13 +16,13 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house, window_parts
-from aerialdojo_gen.scenes.grammar_props import put
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -174,7 +174,7 @@ def drift(site: Site, area: Area, categories: list[str], spacing_m: Number, limi
             return
         category = categories[count % len(categories)]
         if site.is_free(x, y, 2.0):
-            put(site, category, x, y, yaw, place, z=-0.12)
+            site.place(Placement(category, x, y, yaw, z=-0.12, place=place))
             count += 1
 
 

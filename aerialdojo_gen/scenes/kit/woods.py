@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import shapely
@@ -12,8 +12,9 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import downhill_deg, settled_z
+from aerialdojo_gen.scenes.kit.natural_ground import downhill_deg
 from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.fields import ScalarField
 from aerialdojo_gen.scenes.plans.values import Area, Material, Number
 from aerialdojo_gen.scenes.shapes import crown, cylinder
@@ -70,8 +71,7 @@ def woods(
         if rng.random() > species[pick].share:
             continue
         category, _, variant = named[pick]
-        words = {"place": place} if place else None
-        site.try_place(category, x, y, yaw, z=settled_z(site, x, y, 0.3), variant=variant or None, attributes=words)
+        site.place(Placement(category, x, y, yaw, variant or DRAWN, place=place), "skip", settle_m=0.3)
 
 
 @site_builder
@@ -93,8 +93,7 @@ def strew(
     """Strew undergrowth or stones over an area, where there is room; things that lie are turned along the slope."""
     category, _, variant = of.partition(":")
     rng = site.rng_for("strew", category)
-    options: dict[str, Any] = {"scale": scale, "roles": roles, "params": params, "solid": solid}
-    options |= {"variant": variant or None, "attributes": ({"place": place} if place else {}) | (attributes or {})}
+    words = ({"place": place} if place else {}) | (attributes or {})
     count = 0
     for x, y, yaw in poisson_disc(area, spacing_m, rng, density.on(site) if density else None, limit * 3):
         if count >= limit:
@@ -102,7 +101,11 @@ def strew(
         if not site.is_free(x, y, _STEM_M):
             continue
         turn = downhill_deg(site, x, y) if category == "fallen_log" else yaw
-        count += site.try_place(category, x, y, turn, z=settled_z(site, x, y), **options) is not None
+        thing = Placement(
+            category, x, y, turn, variant or DRAWN, scale=scale, roles=roles, params=params, attributes=words,
+            solid=solid,
+        )  # fmt: skip
+        count += site.place(thing, "skip", settle_m=0.5) is not None
 
 
 @site_builder

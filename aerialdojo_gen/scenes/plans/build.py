@@ -20,10 +20,10 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.kit import kit
-from aerialdojo_gen.scenes.kit.natural_ground import settled_z
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.placement import Placement, Room
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
-from aerialdojo_gen.scenes.plans.placing import Placement, outline_of, place, poses_of, prop_height
+from aerialdojo_gen.scenes.plans.placing import poses_of, prop_height
 from aerialdojo_gen.scenes.plans.values import PlanNames
 from aerialdojo_gen.scenes.recipe import Recipe, validated
 from aerialdojo_gen.scenes.site import Site
@@ -177,7 +177,7 @@ class _Building:
             for raw in entry.place:
                 for thing in self._row(raw[:4] if isinstance(raw, list) else {**raw, "on": None}, where):
                     category, variant, pose = self._pose(thing, entry, where)
-                    outline = outline_of(self._site, category, variant, pose[:2], pose[2])
+                    outline = self._site.outline_of(category, variant, pose[:2], pose[2])
                     self._site.footings.append((outline, Point(pose[:2])))
 
     def _ground(self, body: Mapping[str, Any]) -> None:
@@ -276,7 +276,7 @@ class _Building:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
         z, above_m = thing.on if thing.on is not None else entry.on, thing.above_ground_m or entry.above_ground_m
         if z is None and entry.settle_m is not None:
-            z = settled_z(self._site, x, y, entry.settle_m) + above_m
+            z = self._site.settled_z(x, y, entry.settle_m) + above_m
         elif z is None and above_m:
             z = self._site.ground_z(x, y) + above_m
         if entry.sunk is not None:
@@ -284,12 +284,13 @@ class _Building:
             height_m = prop_height(self._site, category, variant, x, y)
             z = (z or 0.0) - min(share * height_m, most_m)
         given = {key: getattr(thing, key) for key in ("scale", "roles", "params", "attributes")}
-        options = {key: value for key, value in given.items() if value and value != 1.0}
-        if not thing.solid:
-            options["solid"] = False
-        one = Placement(category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, options)
+        given = {key: value for key, value in given.items() if value}
+        one = Placement(
+            category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid, **given
+        )
+        room: Room = {"clear_m": entry.clear_m, "margin_m": entry.margin_m, "room_m": entry.room_m}
         try:
-            placed = place(self._site, one, entry.fit, entry.clear_m, entry.margin_m, entry.room_m) is not None
+            placed = self._site.place(one, entry.fit, **room) is not None
         except AssetError as error:
             raise AssetError(f"{where}: {error}") from error
         if placed and entry.spots:
