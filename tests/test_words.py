@@ -6,8 +6,7 @@ from pathlib import Path
 import aerialdojo_gen
 
 PACKAGE = Path(aerialdojo_gen.__file__).parent
-CONTENT = PACKAGE / "scenes" / "layouts"  # what scenes consist of, in words of its own
-FILES = [path for path in sorted(PACKAGE.rglob("*.py")) if not path.is_relative_to(CONTENT)]
+FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
 ROOMS = {
     "annotations", "base", "benchmark", "cli", "dataset", "exchange", "geometry", "imports", "learning", "pipeline",

@@ -204,8 +204,8 @@ def gallery(
         return
     from aerialdojo_gen.pipeline import runner
     from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
+    from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
-    from aerialdojo_gen.scenes.layouts.build import build_scene
     from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)

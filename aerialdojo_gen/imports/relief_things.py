@@ -54,7 +54,7 @@ def _landmarks(placer: Placer, water_z_m: float | None) -> None:
         x, y, _ = dry[int(np.argmax(dry[:, 2]))]
         placer.place(category, float(x), float(y), 90.0 * k, settle_m=1.0, drawn=True)
         # The next one stands far from it.
-        spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.recipe.size_m)]
+        spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.head.size_m)]
 
 
 def _level_places(placer: Placer, grass: BaseGeometry) -> list[tuple[float, float]]:

@@ -50,7 +50,6 @@ BY_NAME: dict[str, tuple[str, ...]] = {
     "rendering.gl": ("moderngl",),
     "scenes.builders": ("scenes.builders.*",),
     "scenes.kit": ("scenes.kit.*",),
-    "scenes.layouts.build": ("scenes.layouts.*",),
 }
 
 # Files that modules read, relative to the package. Files outside it are sources of stages.
@@ -80,17 +79,16 @@ class Code:
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
 
-def stage_code(stage: str, chosen: tuple[str, ...] | None = None, idle: tuple[str, ...] = ()) -> Code:
+def stage_code(stage: str, idle: tuple[str, ...] = ()) -> Code:
     """Return the code of a stage's work, by the stage's name; the table of stages and its hooks do not count."""
-    return code_of(work_module(stage), chosen, idle)
+    return code_of(work_module(stage), idle)
 
 
 @cache
-def code_of(module: str, chosen: tuple[str, ...] | None = None, idle: tuple[str, ...] = ()) -> Code:
+def code_of(module: str, idle: tuple[str, ...] = ()) -> Code:
     """Return the code that a module of this package depends on, as of the first call in this process.
 
-    `chosen` are the layouts that are imported by name, all of them if None; `idle` are modules and libraries that are
-    imported and not used.
+    `idle` are modules and libraries that are imported and not used.
     """
     found: set[str] = set()
     libraries: set[str] = set()
@@ -103,7 +101,7 @@ def code_of(module: str, chosen: tuple[str, ...] | None = None, idle: tuple[str,
             libraries |= {name} - _SHAPELESS - sys.stdlib_module_names
         elif name == module or not _is_cut(name):
             found.add(name)
-            waiting += [*_graph().find_modules_directly_imported_by(name), *_by_name(name, chosen)]
+            waiting += [*_graph().find_modules_directly_imported_by(name), *_by_name(name)]
     parts = {
         name: _source_digest(name) for name in sorted(found | {above for name in found for above in _above(name)})
     }
@@ -128,10 +126,8 @@ def _is_cut(module: str) -> bool:
     return module == _NAME or (below(CUT) and not below(KEPT))
 
 
-def _by_name(module: str, chosen: tuple[str, ...] | None) -> list[str]:
+def _by_name(module: str) -> list[str]:
     names = BY_NAME.get(module.partition(".")[2], ())
-    if names == ("scenes.layouts.*",) and chosen is not None:
-        return list(chosen)
     found = [name for name in names if not name.endswith("*")]
     for name in set(names) - set(found):
         found += _graph().find_descendants(f"{_NAME}.{name.removesuffix('.*')}")

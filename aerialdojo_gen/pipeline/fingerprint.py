@@ -12,7 +12,7 @@ from aerialdojo_gen.base import paper_figures
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.pipeline.code_digest import Code, stage_code
+from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import file_digest
@@ -24,7 +24,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, sce
     Inputs count by content, not by fingerprint: if an upstream stage runs again and writes the same rows, nothing
     downstream is stale. Code counts as in `aerialdojo_gen.pipeline.code_digest`; absolute paths do not count.
     """
-    code = scene_code(stage, roots, scene, pipeline.section(stage.name))
+    code = stage_code(stage.name, stage.idle(pipeline.section(stage.name)))
     # The paper's figures are next to the package in a checkout, inside it in a wheel.
     figures = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []
     sources = [*stage.sources(roots, scene), *figures]
@@ -43,11 +43,6 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, sce
     # As json.dumps would write it; the schemas are long, and the same for all scenes.
     whole = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
     return hashlib.sha256(f"{{{whole}}}".encode()).hexdigest()
-
-
-def scene_code(stage: Stage, roots: ProjectPaths, scene: str, config: Section | None = None) -> Code:
-    """Return the code that a stage runs for a scene; without a configuration, for any configuration."""
-    return stage_code(stage.name, stage.imports(roots, scene), () if config is None else stage.idle(config))
 
 
 @lru_cache(maxsize=4096)

@@ -15,7 +15,8 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.environment_errors import check_memory
 from aerialdojo_gen.base.errors import AerialDojoError, DamagedFile
-from aerialdojo_gen.pipeline.fingerprint import scene_code, scene_fingerprint
+from aerialdojo_gen.pipeline.code_digest import stage_code
+from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
 from aerialdojo_gen.pipeline.options import RunLimits
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths, Stage
@@ -100,7 +101,7 @@ class ShardFinder:
                 if summary is not None:
                     found.fresh.append(summary)
                     continue
-                code = scene_code(stage, roots, scene, config).digest
+                code = stage_code(stage.name, stage.idle(config)).digest
                 job = Job(
                     stage.name, scene, part, parts, pipeline.seed, pipeline.embodiment, roots,
                     deadline=limits.deadline, force=force, verify=limits.verify, code=code,

@@ -11,11 +11,10 @@ from aerialdojo_gen.rendering.resolve_config import renderer_choices, resolve_re
 STAGES: tuple[Stage, ...] = (
     Stage(
         "build-scenes",
-        "Build the scenes' meshes from their recipes.",
+        "Build the scenes' meshes from their plans.",
         reads=(),
         writes=("scenes",),
         sources=hooks.scene_sources,
-        imports=hooks.layout_of,
         seconds=(4.0, 0.0),
     ),
     Stage(

@@ -172,10 +172,6 @@ def _no_missing_input(_roots: ProjectPaths, _scene: str) -> str:
     return ""
 
 
-def _no_module_choice(_roots: ProjectPaths, _scene: str) -> tuple[str, ...] | None:
-    return None
-
-
 def _no_idle_modules(_config: Any) -> tuple[str, ...]:
     return ()
 
@@ -199,9 +195,6 @@ class Stage:
     missing_input : callable
         ``(roots, scene) -> str``: why a scene is left out of this stage and those downstream because its author has
         not made an input, in a line that says how to make it; empty if nothing is missing.
-    imports : callable
-        ``(roots, scene) -> tuple of str or None``: the layouts that the scene's work imports by name; the code of the
-        others does not make the scene stale. None if unknown: all count.
     idle : callable
         ``(config) -> tuple of str``: imported modules and libraries that the work does not use with this
         configuration. They do not count, so that installing an extra makes nothing stale.
@@ -233,7 +226,6 @@ class Stage:
     parts: Callable[[DataRoot, str, Any], int] = _one_part
     sources: Callable[[ProjectPaths, str], list[Path]] = _no_sources
     missing_input: Callable[[ProjectPaths, str], str] = _no_missing_input
-    imports: Callable[[ProjectPaths, str], tuple[str, ...] | None] = _no_module_choice
     idle: Callable[[Any], tuple[str, ...]] = _no_idle_modules
     check: Callable[[DataRoot, Sequence[str], Any], None] = _no_check
     resolve_config: Callable[[Any, Callable[[str], None]], Any] = _unchanged

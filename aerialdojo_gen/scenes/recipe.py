@@ -1,4 +1,4 @@
-"""A scene's recipe: `scene_assets/scenes/<scene>.toml`."""
+"""A scene's file, `scene_assets/scenes/<scene>.toml`: what plans and imported scenes have in common."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 import pydantic_core
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from aerialdojo_gen.base.errors import AssetError, brief
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
-# Of a layout's parameters: metres, degrees and counts all stay far below.
-_MAX_VALUE, _MAX_ENTRIES, _MAX_TEXT = 2000.0, 1000, 200
+_MAX_TEXT = 200
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 # Ground is cut into cells of a metre or so: larger sites than this take gigabytes, and more than a drone can fly.
 Extent = Annotated[float, Field(ge=2, le=1000)]
@@ -48,7 +47,7 @@ class Level(BaseModel):
 
 
 class Move(BaseModel):
-    """Displacement of one node from where its layout places it."""
+    """Displacement of one node from where its plan places it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -70,20 +69,18 @@ class Origin(BaseModel):
     z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0  # The height that is z = 0, metres
 
 
-class Recipe(BaseModel):
-    """Recipe of a scene."""
+class SceneHead(BaseModel):
+    """What a scene's file says of the scene as a whole."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    layout: str  # Type of `aerialdojo_gen.scenes.layouts`
     seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
-    size_m: tuple[Extent, Extent]  # (float, float); extent along x and y, metres; the origin lies in the middle
+    size_m: tuple[Extent, Extent]  # Extent along x and y, metres; the origin lies in the middle
     ceiling_m: Height  # Highest z that a drone may fly at, metres
     sky: Colour = "#96bee6"
-    sun: Sun = (0.45, -0.35, 0.82)  # (float, float, float); direction towards the sun, of any length
-    palette: dict[str, str] = {}  # Materials by the layout's names for them
-    parameters: dict[str, Any] = {}  # The layout's own
-    inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}
+    sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
+    palette: dict[str, str] = {}  # Materials by the file's names for them
+    inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}  # Least number of instances by category
     attribution: Annotated[str, Field(max_length=500)] = ""
     origin: Origin | None = None  # Where on earth that is
     level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
@@ -126,35 +123,13 @@ class Imported(BaseModel):
 
 
 def load_imported(path: Path) -> Imported | None:
-    """Read the table ``[imported]`` of a recipe; None where it is a recipe with a layout."""
+    """Read the table ``[imported]`` of a scene's file; None where it is a plan."""
     body = read_toml(path)
     if "imported" not in body:
         return None
     if set(body) != {"imported"} or not isinstance(body["imported"], dict):
-        raise AssetError(f"{path}: a scene is imported or has a layout: remove all other keys than [imported]")
+        raise AssetError(f"{path}: a scene is imported or a plan: remove all other keys than [imported]")
     return validated(Imported, body["imported"], f"{path}: imported")
-
-
-def load_recipe(path: Path) -> Recipe:
-    """Read a recipe; an `AssetError` names the file, the key, and the nearest known key."""
-    body = read_toml(path)
-    recipe = validated(Recipe, body, str(path))
-    _check_parameters(recipe.parameters, (), path)
-    return recipe
-
-
-def _check_parameters(value: Any, keys: tuple[str, ...], path: Path) -> None:
-    """Check a layout's parameters against general bounds, before they become counts, lengths or arrays."""
-    where = f"{path}: parameters: {brief('.'.join(keys))}"
-    if isinstance(value, dict | list):
-        if len(value) > _MAX_ENTRIES:
-            raise AssetError(f"{where} has {len(value):,} entries, the maximum is {_MAX_ENTRIES:,}")
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            _check_parameters(inner, (*keys, str(key)), path)
-    elif isinstance(value, int | float) and abs(value) > _MAX_VALUE:
-        raise AssetError(f"{where} must lie within {_MAX_VALUE:,.0f}, got {value:g}")
-    elif isinstance(value, str) and len(value) > _MAX_TEXT:
-        raise AssetError(f"{where} has {len(value):,} characters, the maximum is {_MAX_TEXT}")
 
 
 def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:

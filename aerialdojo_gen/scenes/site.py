@@ -1,4 +1,4 @@
-"""A scene under construction, on which layouts place things, and the footprints of what was placed."""
+"""A scene under construction, on which builders place things, and the footprints of what was placed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.placement import DRAWN, Fit, Placement, Room
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
 # The largest scene of the dataset has 479.
@@ -32,18 +32,15 @@ _BELOW_M = 100.0
 
 
 class Site:
-    """What a layout builds on; the origin lies in the middle, x east, y north, z up, metres."""
+    """What builders build on; the origin lies in the middle, x east, y north, z up, metres."""
 
-    def __init__(
-        self, name: str, recipe: Recipe, catalogue: Catalogue, parameters: Any = None, folder: Path | None = None
-    ) -> None:
+    def __init__(self, name: str, head: SceneHead, catalogue: Catalogue, folder: Path | None = None) -> None:
         self.name = name
         self.folder = folder  # Of the scene's file, and of a table of heights beside it
-        self.recipe = recipe
+        self.head = head
         self.catalogue = catalogue
-        self.parameters = parameters
         self.rng = self.rng_for("layout")
-        x, y = recipe.size_m
+        x, y = head.size_m
         self.extent = rectangle(-x / 2, -y / 2, x / 2, y / 2)
         self.instances: list[Instance] = []
         # Outlines and middles of things that the ground is to be levelled under.
@@ -52,17 +49,17 @@ class Site:
         self._nodes: set[str] = set()
         self._moved_nodes: set[str] = set()
         self._footprints = Footprints()
-        self._terrain = flat_terrain(recipe.size_m)
+        self._terrain = flat_terrain(head.size_m)
         self._base = "grass"
         self._surfaces: list[Surface] = []
 
     def rng_for(self, *key: object) -> np.random.Generator:
         """Make the generator of one thing in this scene: adding another thing does not change its draws."""
-        return generator(self.recipe.seed, "build-scenes", self.name, *key)
+        return generator(self.head.seed, "build-scenes", self.name, *key)
 
     def material(self, role: str, default: str) -> str:
         """Material of a role in the recipe's palette, or the default."""
-        spec = self.recipe.palette.get(role, default)
+        spec = self.head.palette.get(role, default)
         self.catalogue.materials.check(spec, f"{self.name}: palette {role}")
         return spec
 
@@ -79,8 +76,8 @@ class Site:
 
     def set_ground(self, terrain: Terrain | None = None, material: str = "grass") -> None:
         """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
-        self._terrain = flat_terrain(self.recipe.size_m) if terrain is None else terrain
-        for level in self.recipe.level:
+        self._terrain = flat_terrain(self.head.size_m) if terrain is None else terrain
+        for level in self.head.level:
             spot = Point(level.at)
             area = spot.buffer(level.radius_m) if level.radius_m else spot
             self._terrain = self._terrain.flattened(area, level.z_m, level.blend_m)
@@ -137,7 +134,7 @@ class Site:
         name = thing.node or self.node(thing.category)
         variant = self.next_variant(thing.category) if thing.variant is None else thing.variant
         attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
-        options = {
+        options: dict[str, Any] = {
             "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
             "roles": thing.roles, "attributes": attributes or None,
         }  # fmt: skip
@@ -202,7 +199,7 @@ class Site:
 
         Its original footprint stays occupied, so that everything placed later keeps its place.
         """
-        move = self.recipe.moves.get(node)
+        move = self.head.moves.get(node)
         if move is None:
             return None
         x, y, z = at
@@ -262,18 +259,18 @@ class Site:
 
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
-        missing = next((node for node in self.recipe.moves if node not in self._moved_nodes), None)
+        missing = next((node for node in self.head.moves if node not in self._moved_nodes), None)
         if missing is not None:
             raise AssetError(f"{self.name}: moves: no prop {missing!r} is placed{nearest(missing, self._nodes)}")
         ground = self._ground()
         instances = (ground, *self.instances)
         specs = sorted({p.material for i in instances for p in i.parts})
         materials = {s: self.catalogue.materials[s] for s in specs}
-        x, y = self.recipe.size_m
+        x, y = self.head.size_m
         floor = float(ground.bounds[0, 2])
-        bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.recipe.ceiling_m]])
-        sky, sun = parse_colour(self.recipe.sky), self.recipe.sun_direction
-        return Scene(self.name, instances, materials, bounds, sky, sun, attribution=self.recipe.attribution)
+        bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.head.ceiling_m]])
+        sky, sun = parse_colour(self.head.sky), self.head.sun_direction
+        return Scene(self.name, instances, materials, bounds, sky, sun, attribution=self.head.attribution)
 
     def _ground(self) -> Instance:
         meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)

@@ -9,8 +9,8 @@ import pytest
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.annotations.head_noun import NounChecker
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Instance, Part
 
 NAMES = {

@@ -18,8 +18,8 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import segment_free
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 
 RADIUS = 0.25
 BATCH = 100_000

@@ -20,22 +20,21 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter
 from aerialdojo_gen.rendering.reader import read_recording
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Material, Scene
-from aerialdojo_gen.scenes.plans.build import is_plan
 from aerialdojo_gen.scenes.plans.model import PlanHead
-from aerialdojo_gen.scenes.recipe import load_imported, load_recipe, validated
+from aerialdojo_gen.scenes.recipe import load_imported, validated
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.studio.annotate.server import make_app
 from aerialdojo_gen.studio.annotate.session import open_session
 
 SITE = {"size_m": [30, 30], "ceiling_m": 12}
-COURT = {"layout": "none", **SITE, "parameters": {"things": []}}
+COURT = {"plan": 1, **SITE}
 WALLS = {"make": "walls", "lines": [[[0, 0], [9, 0]]], "height_m": 3, "material": "brick"}
 ROOF = {"shape": "block", "role": "roof_tiles", "corners": [-6, -6, 0, 0], "z": [3, 3.2]}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
@@ -83,15 +82,15 @@ def recipe(tmp_path, body):
         ({"size_m": [1e9, 30]}, "size_m.0 = 1000000000.0: Input should be less than or equal to 1000"),
         ({"seed": 10**30}, "seed: is an integer beyond 64 bits"),
         ({"seed": Raw("[" * 40_000)}, "nested more than 64 deep"),
-        ({"parameters": {"things": [], "walls": [[0, 0, 1e7, 0, 3]]}}, "parameters: walls.0.2 must lie within 2,000"),
-        ({"parameters": {"things": [0] * 1001}}, "parameters: things has 1,001 entries"),
-        ({"parameters": {"sign": "A" * 201}}, "parameters: sign has 201 characters"),
+        ({"site": [{"entries": [{}] * 1500}, {"entries": [{}] * 501}]}, "more than 2,000 entries"),
+        ({"site": [{"entries": 3}]}, "site[0]: entries is a list of entries"),
+        ({"attribution": "A" * 501}, "attribution = "),
     ],
 )
-def test_a_recipe_s_numbers_are_bounded_before_anything_is_made_of_them(tmp_path, change, place):
+def test_a_plan_s_numbers_are_bounded_before_anything_is_made_of_them(project, tmp_path, change, place):
     path = recipe(tmp_path, COURT | change)
     with pytest.raises(AssetError) as refused:
-        load_recipe(path)
+        build_scene(path, load_catalogue(project / "scene_assets"))
     assert str(refused.value).startswith(str(path))
     assert place in str(refused.value)
 
@@ -214,10 +213,7 @@ def test_a_prop_s_counts_are_bounded_before_anything_is_made_of_them(tmp_path, p
 
 def test_every_recipe_and_prop_of_ours_lies_within_the_bounds(project):
     for path in sorted((project / "scene_assets" / "scenes").glob("*.toml")):
-        if is_plan(path):
-            validated(PlanHead, tomllib.loads(path.read_text()), str(path))
-        else:
-            load_recipe(path)
+        validated(PlanHead, tomllib.loads(path.read_text()), str(path))
     assert load_catalogue(project / "scene_assets").targets
     Pipeline()
 

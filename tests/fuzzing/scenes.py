@@ -21,10 +21,10 @@ from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.catalogue_files import FOLDERS, catalogue_files
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.studio.annotate.storage import parse_whole
 
 

@@ -17,8 +17,8 @@ from aerialdojo_gen.imports.map_plan import TownOptions
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.plans.schema import plan_schema
 
 

@@ -17,8 +17,8 @@ from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
 from aerialdojo_gen.imports.relief import ReliefOptions
 from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 
 UTM = "EPSG:32635"
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from support.layout_checks import catalogue, recipe_of
 
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 
 

@@ -68,7 +68,7 @@ SHARE = {"D_Flood": 0.2, "I_Bridge": 0.05, "I_RailCorridor": 0.05, "U_Alley": 0.
 BUILD = """
 import sys
 from pathlib import Path
-from aerialdojo_gen.scenes.layouts.build import build_scene
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import write_glb
 recipe, assets, out = map(Path, sys.argv[1:])

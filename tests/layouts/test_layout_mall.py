@@ -12,8 +12,8 @@ import pytest
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.planning.collision import CollisionWorld
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"

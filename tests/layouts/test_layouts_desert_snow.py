@@ -9,7 +9,7 @@ from aerialdojo_gen.scenes.kit.layered_rocks import Rock, layered_rocks
 from aerialdojo_gen.scenes.kit.mudbrick import MudbrickHouse, mudbrick_houses
 from aerialdojo_gen.scenes.kit.sands import dunes, stepped_valley
 from aerialdojo_gen.scenes.kit.snow import banks_beside, moguls, profile_slope
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
@@ -19,7 +19,7 @@ FLAT = rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0)
 
 
 def blank(size: float = 60.0) -> Site:
-    return Site("N_T_0", Recipe(layout="none", seed=3, size_m=(size, size), ceiling_m=20), catalogue())
+    return Site("N_T_0", SceneHead(seed=3, size_m=(size, size), ceiling_m=20), catalogue())
 
 
 @of_each_scene

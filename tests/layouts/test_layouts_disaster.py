@@ -14,7 +14,8 @@ from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pi
 from aerialdojo_gen.scenes.kit.ruins import Shored, broken_arcade, damaged_building, put_up, raking_shores
 from aerialdojo_gen.scenes.kit.wreckage import Bite, broken_edge, torn_floor, torn_wall
 from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.placement import Placement
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
@@ -23,7 +24,7 @@ BITE = Bite(0.0, -4.0, 2.0, 4.0, seed=3)
 
 
 def blank() -> Site:
-    return Site("D_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    return Site("D_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
 
 
 @pytest.mark.nightly
@@ -118,7 +119,7 @@ def test_a_terrace_is_levelled_above_a_point_of_the_old_ground():
 
 def test_things_are_strewn_where_there_is_room():
     site = blank()
-    site.place("bench", 0.0, 0.0)
+    site.place(Placement("bench", 0.0, 0.0))
     placed = strew_things(site, "on the square", rectangle(-8, -8, 8, 8), ["bench", "stretcher", "bench"], "t")
     assert [i.category for i in placed] == ["bench", "stretcher", "bench"]
     assert not clashes(site.scene())
@@ -129,7 +130,7 @@ def test_the_top_of_a_pile_is_level_and_free():
     z = slab_pile(site, (0.0, 0.0), 30.0, (14.0, 9.0), 4, "t")
     assert site.is_free(1.0, 0.0, 0.5, z=z)
     assert not site.is_free(1.0, 0.0, 0.5, z=z - 1.0)
-    site.place("bench", 1.0, 0.0, z=z)
+    site.place(Placement("bench", 1.0, 0.0, z=z))
     assert not floating(site.scene())
 
 

@@ -11,7 +11,7 @@ from aerialdojo_gen.scenes.kit.houses import house_row
 from aerialdojo_gen.scenes.kit.quays import quay
 from aerialdojo_gen.scenes.kit.yards import HIGH_M, LONG_M, Stack, container_stacks
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site, footprint
 
 SCENES = ["I_Harbor_0", "I_Harbor_1"]
@@ -54,7 +54,7 @@ def test_the_port_has_every_category_of_harbours_and_vehicles(scene_of):
 
 
 def test_containers_are_stacked_in_tiers():
-    site = Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    site = Site("I_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
     quay(site, area=rectangle(-30, -30, 30, 30), height_m=2.0)
     container_stacks(site, stacks=[Stack((-20.0, -5.0), [[3, 1], [0, 2]])], on=2.0)
     stack = site.instances[-1]
@@ -65,7 +65,7 @@ def test_containers_are_stacked_in_tiers():
 
 
 def test_houses_of_a_row_take_turns():
-    site = Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    site = Site("I_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
     row = [(-20.0, 0.0), (0.0, 0.0), (20.0, 0.0)]
     house_row(site, at=row, yaw_deg=0.0, style=HouseStyle(), on=2.0, walls=("brick", "planks"), storeys=(1, 2, 3))
     assert [{"brick", "planks"} & {part.material for part in i.parts} for i in site.instances] == [

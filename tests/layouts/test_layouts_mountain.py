@@ -8,7 +8,7 @@ from support.layout_checks import catalogue, each_scene
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 
@@ -37,7 +37,7 @@ def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
 
 
 def test_mountains_rise_to_their_crests_and_show_rock_where_they_are_steep():
-    site = Site("N_T_0", Recipe(layout="none", seed=3, size_m=(60, 60), ceiling_m=20), catalogue())
+    site = Site("N_T_0", SceneHead(seed=3, size_m=(60, 60), ceiling_m=20), catalogue())
     ridge = Ridge([(0.0, 10.0, 20.0)], 25.0, hollow=1.0)
     flat = flat_terrain((60, 60))
     plain = massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=0.0, rough_m=0.0)

@@ -11,14 +11,14 @@ from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
 from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
 from aerialdojo_gen.scenes.kit.viaducts import arcade, upright
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
 ROLLING = ("locomotive", "steam_locomotive", "passenger_carriage", "freight_wagon", "tank_wagon", "handcar")
 
 
 def blank() -> Site:
-    return Site("I_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    return Site("I_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
 
 
 @each_scene(["I_RailCorridor_0", "I_RailCorridor_1"])

@@ -12,7 +12,7 @@ from aerialdojo_gen.scenes.kit.natural_ground import ragged_outline
 from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
 from aerialdojo_gen.scenes.kit.shores import steep_area
 from aerialdojo_gen.scenes.kit.structures import flights
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
 SCENES = [f"N_{kind}_{k}" for kind in ("Island", "Coast") for k in (0, 1)]
@@ -35,7 +35,7 @@ def test_boats_lie_on_the_level_sea(scene_of, name):
 
 
 def blank() -> Site:
-    return Site("N_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), look.catalogue())
+    return Site("N_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), look.catalogue())
 
 
 def test_coastlines_are_natural_and_always_the_same():

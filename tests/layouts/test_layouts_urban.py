@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 from support.layout_checks import catalogue
 
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.grammar_fences import fence
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
-from aerialdojo_gen.scenes.grammar_props import deal, next_variant
 from aerialdojo_gen.scenes.grammar_scatter import Pose
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.placement import Placement
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
 
 def blank() -> Site:
-    return Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=20), catalogue())
+    return Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
 
 
 def test_frames_agree_with_turned_coordinates():
@@ -62,14 +63,16 @@ def test_fences_bar_the_way_along_their_whole_path(kind):
         assert (distance < 2.0).mean() > 0.95
 
 
-def test_dealing_takes_categories_in_turn_and_rare_variants_first():
+def test_things_have_rare_variants_first_and_no_room_twice():
     site = blank()
     poses = [Pose(-20.0 + 5.0 * k, 0.0, 0.0) for k in range(8)]
-    out = deal(site, ["bench", "litter_bin"], poses, "in the yard")
-    assert [i.category for i in out] == ["bench", "litter_bin"] * 4
+    things = [Placement(("bench", "litter_bin")[k % 2], *pose, place="in the yard") for k, pose in enumerate(poses)]
+    out = [site.place(thing, "skip") for thing in things]
     variants = [i.variant for i in out if i.category == "bench"]
     assert len(set(variants)) == min(4, len(catalogue()["bench"].variants))
     assert all(i.attributes["place"] == "in the yard" for i in out)
-    assert deal(site, ["bench"], poses) == []
+    assert [site.place(thing, "skip") for thing in things] == [None] * 8
+    with pytest.raises(AssetError, match=r"no room for bench at \(-20, 0\)"):
+        site.place(things[0], "must")
     used = Counter(variants)
-    assert used[next_variant(site, "bench")] == min(used[v.name] for v in catalogue()["bench"].variants)
+    assert used[site.next_variant("bench")] == min(used[v.name] for v in catalogue()["bench"].variants)

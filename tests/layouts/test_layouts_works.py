@@ -11,7 +11,7 @@ from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
 from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
 SCENES = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
@@ -19,7 +19,7 @@ of_each_scene = each_scene(SCENES)
 
 
 def blank(size: float = 60.0) -> Site:
-    return Site("U_T_0", Recipe(layout="none", size_m=(size, size), ceiling_m=20), catalogue())
+    return Site("U_T_0", SceneHead(size_m=(size, size), ceiling_m=20), catalogue())
 
 
 @of_each_scene

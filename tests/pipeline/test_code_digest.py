@@ -102,7 +102,7 @@ def test_what_is_imported_by_a_name_is_listed():
             calls.add(name.removesuffix(".__init__"))
     assert calls == set(code_digest.BY_NAME)
     parts = stage_code("build-scenes").parts
-    for folder in ("scenes/layouts", "scenes/builders"):
+    for folder in ("scenes/kit", "scenes/builders"):
         for path in (SOURCES / folder).rglob("*.py"):
             if path.stem != "__init__":
                 assert ".".join(("aerialdojo_gen", *path.relative_to(SOURCES).with_suffix("").parts)) in parts
@@ -169,7 +169,7 @@ EXTRAS = {"av", "moderngl", "onnxruntime", "pybullet", "tenacity", "tokenizers"}
 )
 def test_an_extra_that_the_configuration_does_not_use_makes_nothing_stale(stage, section, extras):
     idle = BY_NAME[stage].idle(SECTIONS[stage](**section))
-    assert set(stage_code(stage, None, idle).libraries) & EXTRAS == extras
+    assert set(stage_code(stage, idle).libraries) & EXTRAS == extras
 
 
 def test_what_is_idle_is_not_imported(project, smoke, tmp_path):

@@ -20,42 +20,19 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import build_scenes
-from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.grammar_scatter import along, grid, poisson_disc, smooth_path
 from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
 from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
-from aerialdojo_gen.scenes.layouts.build import build_scene
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
-LAYOUT = """
-from pydantic import BaseModel, ConfigDict
-from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
-from aerialdojo_gen.scenes.grammar_streets import streets
-from aerialdojo_gen.scenes.ground import disc, rectangle
-from aerialdojo_gen.scenes.terrain import rolling_terrain
-
-
-class Parameters(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    posts: int = 5
-
-
-def build(site):
-    site.set_ground(rolling_terrain((40, 30), 1.0, site.recipe.seed, 2.0, 20.0), "grass")
-    streets(site, [[(-20, 0), (20, 0)]])
-    site.add(None, "hall", [(site.material("wall", "brick"), slab(rectangle(5, 5, 12, 10), -3, 6))],
-             footprint=rectangle(5, 5, 12, 10))
-    done = 0
-    for p in poisson_disc(disc(-8, 8, 6), 1.5, site.rng_for("posts")):
-        if done < site.parameters.posts and site.try_place("post", p.x, p.y, p.yaw_deg) is not None:
-            done += 1
-"""
 POST = """
 [post]
 name = "post"
@@ -71,35 +48,38 @@ radius = 0.3
 at = [0, 0, "h"]
 role = "foliage"
 """
-RECIPE = """
-layout = "testplace"
+PLAN = """
+plan = 1
 seed = 3
 size_m = [40, 30]
 ceiling_m = 12
 sky = "#a9c6e8"
 sun = [3, 0, 4]
 palette = { wall = "brick:#804020" }
-[parameters]
-posts = 4
 [inventory]
 post = 4
+[ground]
+steps = [{ make = "rolling_ground", cell_m = 1, height_m = 2, wavelength_m = 20 }]
+[[site]]
+make = "streets"
+paths = [[[-20, 0], [20, 0]]]
+[[site]]
+category = "hall"
+footprint = [5, 5, 12, 10]
+parts = [{ shape = "block", role = "wall", corners = [5, 5, 12, 10], z = [-3, 6] }]
+[[site]]
+pattern = { of = ["post"], scatter = { disc = [-8, 8, 6] }, spacing_m = 1.5, limit = 4 }
 """
 
 
 @pytest.fixture
-def assets(tmp_path, monkeypatch):
+def assets(tmp_path):
     folder = tmp_path / "assets"
     (folder / "props").mkdir(parents=True)
     (folder / "scenes").mkdir()
     (folder / "materials.toml").write_bytes((ASSETS / "materials.toml").read_bytes())
     (folder / "props" / "post.toml").write_text(POST)
-    (folder / "scenes" / "U_Test_0.toml").write_text(RECIPE)
-    code = tmp_path / "code" / "test_family" / "testplace" / "layout.py"
-    code.parent.mkdir(parents=True)
-    code.write_text(LAYOUT)
-    monkeypatch.setattr(layouts, "__path__", [*layouts.__path__, str(tmp_path / "code")])
-    for name in ("test_family", "test_family.testplace", "test_family.testplace.layout"):
-        monkeypatch.delitem(sys.modules, f"aerialdojo_gen.scenes.layouts.{name}", raising=False)
+    (folder / "scenes" / "U_Test_0.toml").write_text(PLAN)
     return folder
 
 
@@ -141,19 +121,17 @@ def test_file_holds_the_built_scene_exactly(assets, tmp_path):
 def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
     script = (
         "import sys, hashlib, pathlib\n"
-        "from aerialdojo_gen.scenes import layouts\n"
-        "layouts.__path__.append(sys.argv[2])\n"
-        "from aerialdojo_gen.scenes.layouts.build import build_scene\n"
+        "from aerialdojo_gen.scenes.build import build_scene\n"
         "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"
         "from aerialdojo_gen.scenes.glb import write_glb\n"
         "a = pathlib.Path(sys.argv[1])\n"
-        "write_glb(build_scene(a / 'scenes' / 'U_Test_0.toml', load_catalogue(a)), pathlib.Path(sys.argv[3]))\n"
+        "write_glb(build_scene(a / 'scenes' / 'U_Test_0.toml', load_catalogue(a)), pathlib.Path(sys.argv[2]))\n"
     )
     digests = set()
     for seed in ("0", "1", "4242"):
         out = tmp_path / f"{seed}.glb"
         environment = {**os.environ, "PYTHONHASHSEED": seed}
-        command = [sys.executable, "-c", script, str(assets), str(tmp_path / "code"), str(out)]
+        command = [sys.executable, "-c", script, str(assets), str(out)]
         subprocess.run(command, check=True, env=environment)
         digests.add(hashlib.sha256(out.read_bytes()).hexdigest())
     assert len(digests) == 1
@@ -162,7 +140,7 @@ def test_same_bytes_in_processes_that_hash_differently(assets, tmp_path):
 def test_another_seed_makes_another_scene(assets):
     first = build(assets)
     path = assets / "scenes" / "U_Test_0.toml"
-    path.write_text(RECIPE.replace("seed = 3", "seed = 4"))
+    path.write_text(PLAN.replace("seed = 3", "seed = 4"))
     assert not np.array_equal(build(assets)["ground"].vertices[:, 2], first["ground"].vertices[:, 2])
 
 
@@ -170,10 +148,11 @@ def test_another_seed_makes_another_scene(assets):
     ("old", "new", "says"),
     [
         ("seed = 3", "sead = 3", "unknown key 'sead': did you mean 'seed'?"),
-        ('layout = "testplace"\n', "", "key 'layout' is missing"),
-        ('"testplace"', '"testplaces"', "unknown layout 'testplaces': did you mean 'testplace'?"),
-        ("posts = 4", "post = 4", "parameters: unknown key 'post': did you mean 'posts'?"),
-        ("posts = 4", 'posts = "many"', "parameters: posts = "),
+        ("plan = 1\n", "", "key 'plan' is missing"),
+        ("plan = 1", "plan = 2", "plan = 2"),
+        ("plan = 1", 'layout = "mall"', "scenes are plans since version 0.2.0, without 'layout': docs/plans.md has"),
+        ("plan = 1", 'layout = "town"', "scenes are plans since version 0.2.0, without 'layout': run add-map again"),
+        ("limit = 4", 'limit = "many"', "site[2] (pattern): pattern.limit = "),
         ("[40, 30]", "[40, -30]", "size_m.1 = "),
         ('"#a9c6e8"', '"blue"', "sky = "),
         ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik': did you mean 'brick'?"),
@@ -186,10 +165,10 @@ def test_another_seed_makes_another_scene(assets):
         ("seed = 3", "seed = ", "Invalid value"),
     ],
 )
-def test_recipe_errors_name_file_and_key(assets, old, new, says):
+def test_errors_name_file_and_key(assets, old, new, says):
     path = assets / "scenes" / "U_Test_0.toml"
-    assert old in RECIPE
-    path.write_text(new.join(RECIPE.rsplit(old, 1)))
+    assert old in PLAN
+    path.write_text(new.join(PLAN.rsplit(old, 1)))
     with pytest.raises(AssetError) as caught:
         build(assets)
     assert says in str(caught.value)
@@ -212,7 +191,7 @@ def test_scene_names_tell_family_type_and_partition(name, parsed):
 
 
 def site(width: float = 60.0, height: float = 40.0) -> Site:
-    return Site("U_Test_0", Recipe(layout="none", size_m=(width, height), ceiling_m=20), load_catalogue(ASSETS))
+    return Site("U_Test_0", SceneHead(size_m=(width, height), ceiling_m=20), load_catalogue(ASSETS))
 
 
 def test_ground_covers_the_site_once_and_ground_z_tells_its_height():
@@ -304,27 +283,27 @@ def test_lowered_ground_is_deep_inside_and_unchanged_outside():
 def test_footprints_know_height_and_ground():
     place = site()
     category = next(iter(place.catalogue))
-    post = place.place(category, 0, 0)
+    post = place.place(Placement(category, 0, 0))
     assert post.node == f"{category}_000"
     assert not place.is_free(0, 0, 0.3)
     assert place.is_free(0, 0, 0.3, z=float(post.bounds[1, 2]) + 0.1)
-    assert place.try_place(category, 0, 0) is None
+    assert place.place(Placement(category, 0, 0), "skip") is None
     assert place.is_free(20, 10, 1.0)
     assert not place.is_free(29.5, 0, 1.0), "partly outside the site"
     place.occupy(rectangle(15, 5, 25, 15))
     assert not place.is_free(20, 10, 1.0)
-    assert place.place(category, -20, 0).node == f"{category}_001"
+    assert place.place(Placement(category, -20, 0)).node == f"{category}_001"
     with pytest.raises(AssetError, match="exists already"):
-        place.place(category, 5, 5, node=f"{category}_000")
+        place.place(Placement(category, 5, 5, node=f"{category}_000"))
 
 
 def test_adding_one_thing_does_not_change_another():
-    """A prop draws from its own name: what stands before it in the layout leaves it as it is."""
+    """A prop draws from its own name: what stands before it in the plan leaves it as it is."""
     one, two = site(), site()
     categories = sorted(one.catalogue)[:2]
     two.rng.random(100)
-    two.place(categories[1], 10, 10)
-    a, b = one.place(categories[0], 0, 0), two.place(categories[0], 0, 0)
+    two.place(Placement(categories[1], 10, 10, DRAWN))
+    a, b = (some.place(Placement(categories[0], 0, 0, DRAWN)) for some in (one, two))
     assert a.variant == b.variant
     assert np.array_equal(a.vertices, b.vertices)
 

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.grammar_buildings import before_walls, building, facade, pitched_roof, wall_with_openings
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
@@ -59,7 +59,7 @@ def test_pitched_roofs_are_closed_and_as_high_as_asked(length, width, turn, hip)
 @pytest.mark.parametrize("roof_kind", ["flat", "gable", "hip"])
 @pytest.mark.parametrize("parapet", [0.0, 0.6])
 def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
-    site = Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    site = Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
     plan = rotate(rectangle(-8, -5, 8, 5), 20)
     house = building(site, plan, wall="facade_brick", roof="roof_tiles", roof_kind=roof_kind, parapet_m=parapet)
     assert not site.is_free(0, 0, 0.5)
@@ -72,7 +72,7 @@ def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
 
 
 def test_openings_let_rays_through_and_walls_do_not():
-    site = Site("U_T_0", Recipe(layout="none", size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    site = Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
     openings = [(2.0, 4.0, 0.0, 2.5), (6.0, 7.0, 1.0, 2.0)]
     wall = wall_with_openings((0, 0), (6, 8), 0.0, 4.0, openings, 0.4)
     site.add(None, "wall", [("brick", wall)])

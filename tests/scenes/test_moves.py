@@ -1,4 +1,4 @@
-"""What a recipe may put right of a layout: levelled places and single props that stand elsewhere."""
+"""What a plan may change afterwards: levelled places and single props that stand elsewhere."""
 
 from pathlib import Path
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
-from aerialdojo_gen.scenes.recipe import Recipe
+from aerialdojo_gen.scenes.placement import DRAWN, Placement
+from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
@@ -44,18 +45,16 @@ def test_a_move_of_what_is_not_placed_names_the_nearest_node(tmp_path):
 def test_a_moved_prop_stays_on_the_ground():
     site = Site(
         "N_T_0",
-        Recipe.model_validate(
-            {"layout": "none", "size_m": (60, 60), "ceiling_m": 20, "moves": {"bench_000": {"by_m": (6.0, 3.0)}}}
-        ),
+        SceneHead.model_validate({"size_m": (60, 60), "ceiling_m": 20, "moves": {"bench_000": {"by_m": (6.0, 3.0)}}}),
         load_catalogue(ASSETS),
     )
     site.set_ground(rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0))
-    layouts_own = site.place("bench", 1.0, 2.0)
+    unmoved = site.place(Placement("bench", 1.0, 2.0, DRAWN))
     moved = site.instances[-1]
     fall = site.ground_z(7.0, 5.0) - site.ground_z(1.0, 2.0)
     assert abs(fall) > 0.1
-    np.testing.assert_allclose(moved.centroid - layouts_own.centroid, (6.0, 3.0, fall), atol=1e-4)
-    # All that is placed later finds the room that the layout left it.
+    np.testing.assert_allclose(moved.centroid - unmoved.centroid, (6.0, 3.0, fall), atol=1e-4)
+    # All that is placed later finds the room that it would have had.
     assert site.is_free(7.0, 5.0, 1.0)
     assert not site.is_free(1.0, 2.0, 0.5)
 
@@ -63,7 +62,7 @@ def test_a_moved_prop_stays_on_the_ground():
 def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
     own = rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0)
     levels = {"level": [{"at": (5.0, -4.0), "radius_m": 2.0}]}
-    recipe = Recipe.model_validate({"layout": "none", "size_m": (60, 60), "ceiling_m": 20} | levels)
+    recipe = SceneHead.model_validate({"size_m": (60, 60), "ceiling_m": 20} | levels)
     site = Site("N_T_0", recipe, load_catalogue(ASSETS))
     site.set_ground(own)
     turns = np.linspace(0.0, 2.0 * np.pi, 24)

@@ -1,6 +1,7 @@
 """Plans: what a scene's TOML says is built in its order, or named in one line."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -15,13 +16,13 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import kit
-from aerialdojo_gen.scenes.plans.build import build_plan, is_plan
+from aerialdojo_gen.scenes.plans.build import build_plan
 from aerialdojo_gen.scenes.plans.schema import schema_text
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.plans.values import PlanNames
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
-PLANS = [path for path in sorted(ASSETS.glob("s[cm]*/*_[01].toml")) if is_plan(path)]
+PLANS = sorted(ASSETS.glob("s[cm]*/*_[01].toml"))
 HEAD = {"plan": 1, "size_m": [40, 40], "ceiling_m": 12}
 YARD = {
     **HEAD, "palette": {"wall": "brick:#8a4638"}, "floor_m": {"loft": 2.5},
@@ -358,3 +359,17 @@ def test_a_stand_without_one_front_edge_is_refused(tmp_path, catalogue, core):
     tier = {"core": core, "front_m": -0.5, "rows": 3, "z_m": 1}
     with pytest.raises(AssetError, match=r"site\[0\] \(make\) 'stand': tier .*must enclose one area"):
         build(tmp_path, catalogue, {**HEAD, "site": [{"make": "stand", "tier": tier, "seats": ["#ffffff"]}]})
+
+
+def test_there_is_one_way_to_place_a_thing():
+    """Of the placers that there were, none is to come back: what stands somewhere is a `Placement`."""
+    retired = (
+        r"\b(try_place|place_along|place_near|place_wild|furnish|set_out|settle_on|deal|put)\(\s*site\b|\.try_place\("
+    )
+    found = {}
+    for path in sorted((ASSETS.parent / "aerialdojo_gen").rglob("*.py")):
+        text = path.read_text()
+        if re.search(retired, text):
+            found[path.name] = re.findall(retired, text)
+    assert found == {}
+    assert not (ASSETS.parent / "aerialdojo_gen/scenes/layouts").exists()

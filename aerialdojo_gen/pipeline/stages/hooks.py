@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import AssetError, Malformed
-from aerialdojo_gen.base.safe_parse import loads_toml, read_toml
-from aerialdojo_gen.scenes import layouts
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue_files import catalogue_files
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 
@@ -21,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
-    """List a scene's recipe, the mesh or the heights next to it, materials and catalogue."""
+    """List a scene's plan, the mesh or the heights next to it, materials and catalogue."""
     beside = (roots.recipes / f"{scene}{suffix}" for suffix in (".glb", HEIGHTS_SUFFIX))
     return [
         roots.recipes / f"{scene}.toml",
@@ -29,28 +26,6 @@ def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
         roots.scene_assets / "materials.toml",
         *catalogue_files(roots.scene_assets),
     ]
-
-
-def layout_of(roots: ProjectPaths, scene: str) -> tuple[str, ...] | None:
-    """Return the layout's module that a recipe names; None for a malformed recipe, which the stage reports itself."""
-    try:
-        recipe = _recipe_header(roots.recipes / f"{scene}.toml")
-    except (AssetError, OSError, UnicodeDecodeError):
-        return None
-    if "imported" in recipe or "plan" in recipe:
-        return ()
-    module = layouts.layout_modules().get(str(recipe.get("layout")))
-    return (f"{layouts.__name__}.{module}",) if module else None
-
-
-def _recipe_header(path: Path) -> dict[str, Any]:
-    """Parse a recipe up to its first table where that suffices: its lists of things are slow to parse."""
-    text = path.read_text(encoding="utf-8")
-    if "imported" not in text:
-        # No table begins inside a string or a list: text cut there is not valid TOML.
-        with contextlib.suppress(Malformed):
-            return loads_toml(text.partition("\n[")[0])
-    return read_toml(path, AssetError)
 
 
 def annotation_sources(roots: ProjectPaths, scene: str) -> list[Path]:

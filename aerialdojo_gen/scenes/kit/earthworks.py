@@ -23,7 +23,7 @@ _Steps = Annotated[list[tuple[Number, Number]], Field(min_length=2, max_length=1
 @ground_builder
 def level_grid(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
     """Make level ground at z = 0 that is fine enough to be dug in, in place of what was there."""
-    size_m = site.recipe.size_m
+    size_m = site.head.size_m
     columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
     cell = max(size_m[0] / columns, size_m[1] / rows)
     return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, np.zeros((rows + 1, columns + 1)))

@@ -40,7 +40,7 @@ def gorge(
     site: Site, terrain: Terrain, *, depth_m: Number, half_m: Number, ledge_m: Number, stream: Stream = _STREAM
 ) -> Terrain:
     """Cut a gorge with a ledge in both its faces, which are straight about y = 0, where a bridge may stand."""
-    t, (x, y), seed = terrain, grid(terrain), site.recipe.seed
+    t, (x, y), seed = terrain, grid(terrain), site.head.seed
     rough = OpenSimplex(seed=seed + 5).noise2array(x[0] / 7.0, y[:, 0] / 7.0)
     ledge = OpenSimplex(seed=seed + 6).noise2array(x[0] / 15.0, y[:, 0] / 12.0)
     beyond = np.clip((np.abs(y) - 5.0) / 6.0, 0.0, 1.0)
@@ -58,7 +58,7 @@ def paint_gorge(
     site: Site, *, half_m: Number, rock: Material, bank: Material, water: Material, stream: Stream = _STREAM
 ) -> None:
     """Paint the rock of a gorge up to a wavy rim, gravel banks, and the stream, whose bed stays free."""
-    half = site.recipe.size_m[1] / 2
+    half = site.head.size_m[1] / 2
     ys = [float(y) for y in np.arange(-half, half + 1.0, 2.5)]
     edge = [half_m + 1.2 + 1.3 * float(np.sin(y * 0.9) + np.sin(y * 0.37 + 1.0)) for y in ys]
     rims = [
@@ -107,7 +107,7 @@ def paint_brook(
     width_m: Number = 4.6, free_z: tuple[Number, Number] = (-100.0, 1000.0),
 ) -> None:  # fmt: skip
     """Paint a brook with gravel banks and a path beside it; nothing grows in it between two heights."""
-    half = site.recipe.size_m[1] / 2
+    half = site.head.size_m[1] / 2
     line = [(stream.x(float(y)), float(y)) for y in np.arange(-half, half + 1.0, 3.0)]
     site.paint(ribbon(line, width_m + 2.0), bank)
     site.paint(ribbon(line, width_m), water)

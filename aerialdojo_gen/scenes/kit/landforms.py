@@ -30,8 +30,8 @@ def rolling_ground(
     seed: int | None = None, over: bool = False,
 ) -> Terrain:  # fmt: skip
     """Make rolling ground by noise of a seed, the plan's by default, in place of what was there or `over` it."""
-    seed = site.recipe.seed if seed is None else seed
-    rolling = rolling_terrain(site.recipe.size_m, cell_m, seed, height_m, wavelength_m, octaves)
+    seed = site.head.seed if seed is None else seed
+    rolling = rolling_terrain(site.head.size_m, cell_m, seed, height_m, wavelength_m, octaves)
     return replace(rolling, heights_m=terrain.heights_m + rolling.heights_m) if over else rolling
 
 
@@ -97,7 +97,7 @@ def ground_by_formula(
     `cell_m` the ground begins anew, level, with cells of that size.
     """
     cell_m = terrain.cell_m if cell_m is None else cell_m
-    waves = rolling_terrain(site.recipe.size_m, cell_m, site.recipe.seed, 1.0, noise_m, octaves=3)
+    waves = rolling_terrain(site.head.size_m, cell_m, site.head.seed, 1.0, noise_m, octaves=3)
     x, y, noise = waves.corners().T
     arrays = {"x": x, "y": y, "noise": noise, "z": np.asarray(terrain.z(x, y))}
     arrays |= {name: inland_m(area, x, y) for name, area in inland.items()}

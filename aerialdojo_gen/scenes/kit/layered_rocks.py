@@ -53,7 +53,7 @@ def _layered_rock(site: Site, rock: Rock, bands: Sequence[str], cap: str | None)
     count = max(round((top - low) / 1.3), 2)
     cuts = np.linspace(low, top, count + 1)
     cuts[1:-1] += rng.uniform(-0.35, 0.35, size=count - 1)
-    noise = OpenSimplex(seed=site.recipe.seed * 13 + _number(rock.name))
+    noise = OpenSimplex(seed=site.head.seed * 13 + _number(rock.name))
     parts: Parts = []
     for k in range(count):
         # Hard layers jut out over soft ones; the topmost is hard, and caps the rest.

@@ -49,7 +49,7 @@ def massif(
 
     The flanks fall in steps of `bench_m`, if any; gullies and spurs on the steepest ground are `rough_m` high.
     """
-    size_m, seed = site.recipe.size_m, site.recipe.seed
+    size_m, seed = site.head.size_m, site.head.seed
     columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
     cell = max(size_m[0] / columns, size_m[1] / rows)
     ground = replace(flat_terrain(size_m), cell_m=cell, heights_m=np.zeros((rows + 1, columns + 1)))

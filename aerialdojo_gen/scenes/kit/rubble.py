@@ -57,7 +57,7 @@ def rises(
 def crater(site: Site, terrain: Terrain, at: At, radius_m: Breadth, depth_m: Number, rim_m: Number) -> Terrain:
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
     corners = terrain.corners()[:, :2] - at
-    noise = OpenSimplex(seed=site.recipe.seed)
+    noise = OpenSimplex(seed=site.head.seed)
     angle = np.arctan2(corners[:, 1], corners[:, 0])
     wave = np.array([noise.noise2(1.5 * float(np.cos(a)), 1.5 * float(np.sin(a))) for a in angle])
     r = np.hypot(corners[:, 0], corners[:, 1]) / (radius_m * (1.0 + 0.14 * wave))

@@ -30,8 +30,8 @@ def dunes(
     wind_deg: Number,
 ) -> Terrain:  # fmt: skip
     """Make a sand sea: wavy crests across the wind, gentle windward slopes and steep slip faces."""
-    seed = site.recipe.seed
-    ground = rolling_terrain(site.recipe.size_m, cell_m, seed, 0.25 * height_m, 2.6 * wavelength_m, octaves=2)
+    seed = site.head.seed
+    ground = rolling_terrain(site.head.size_m, cell_m, seed, 0.25 * height_m, 2.6 * wavelength_m, octaves=2)
     x, y = ground.corners()[:, :2].T
     c, s = np.cos(np.radians(wind_deg)), np.sin(np.radians(wind_deg))
     along, across = c * x + s * y, -s * x + c * y
@@ -54,8 +54,8 @@ def stepped_valley(
     """Make a valley along the middle line of its bed, from which the ground climbs in steps (from, to, rise)."""
     if any(far - near < 0.05 for near, far, _ in steps):
         raise AssetError("steps: a step ends 0.05 m or more beyond where it begins")
-    seed = site.recipe.seed
-    ground = rolling_terrain(site.recipe.size_m, cell_m, seed, roughness_m, 16.0, octaves=3)
+    seed = site.head.seed
+    ground = rolling_terrain(site.head.size_m, cell_m, seed, roughness_m, 16.0, octaves=3)
     xy = ground.corners()[:, :2]
     d = shapely.distance(shapely.LineString(bed), shapely.points(xy))
     d = d + 2.2 * _noise(seed + 5, xy[:, 0] / 9.0, xy[:, 1] / 9.0)

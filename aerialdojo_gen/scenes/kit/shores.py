@@ -29,7 +29,7 @@ def paint_sea(
     wet: Material = "sand:#b99c6c",
 ) -> None:  # fmt: skip
     """Paint the sea about a land: deep water, ragged belts of shallows and lagoon, foam, and wet sand on the land."""
-    seed = site.recipe.seed
+    seed = site.head.seed
     sea = site.extent.difference(land)
     site.paint(sea, deep)
     shore = land.boundary.intersection(site.extent)

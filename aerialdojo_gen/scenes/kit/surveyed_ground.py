@@ -43,7 +43,7 @@ def surveyed_heights(site: Site, _terrain: Terrain) -> Terrain:
     path = site.folder / f"{site.name}{HEIGHTS_SUFFIX}"
     terrain = read_heights(path)
     (x0, y0), (x1, y1) = terrain.corners()[[0, -1], :2]
-    x, y = (side / 2 - 1e-6 for side in site.recipe.size_m)
+    x, y = (side / 2 - 1e-6 for side in site.head.size_m)
     if x0 > -x or y0 > -y or x1 < x or y1 < y:
         raise AssetError(
             f"{path.name} covers x {x0:g} to {x1:g}, y {y0:g} to {y1:g} m, the site has {2 * x:g} by {2 * y:g} m"
@@ -83,7 +83,7 @@ def surface_areas(
     water_to_m: float | None = None,
 ) -> dict[str, BaseGeometry]:  # fmt: skip
     """Find what shows where, in the order of painting, and what is wet."""
-    ground, seed = site.terrain, site.recipe.seed
+    ground, seed = site.terrain, site.head.seed
     dy, dx = np.gradient(ground.heights_m, ground.cell_m)
     slope, z = np.hypot(dx, dy), ground.heights_m
     waver = _waver(seed, ground)

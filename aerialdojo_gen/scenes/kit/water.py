@@ -36,7 +36,7 @@ _SLOPE_M = 6.0
 @ground_builder
 def water_level(site: Site, _terrain: Terrain | None = None) -> Terrain:
     """Make the level water that everything else rises from."""
-    return rolling_terrain(site.recipe.size_m, CELL_M, 1, 0.0, 50.0, 1)
+    return rolling_terrain(site.head.size_m, CELL_M, 1, 0.0, 50.0, 1)
 
 
 @ground_builder
@@ -55,7 +55,7 @@ def paint_bank(site: Site, crests: list[Area], way: Material, slope_m: Number = 
     """Paint banks: mud at the waterline, grass on the slopes, and a track on the crest."""
     area = shapely.union_all([dry(c, slope_m) for c in crests])
     rim = [area.boundary.interpolate(s) for s in np.arange(0.0, area.length, 3.4)]
-    lobes = [blob(p.x, p.y, 1.3, site.recipe.seed + k, 0.5, 14) for k, p in enumerate(rim)]
+    lobes = [blob(p.x, p.y, 1.3, site.head.seed + k, 0.5, 14) for k, p in enumerate(rim)]
     site.paint(shapely.union_all([area.buffer(0.7), *lobes]), site.material("mud", "mud"))
     site.paint(area.buffer(-0.5), site.material("bank", "grass"))
     site.paint(shapely.union_all([c.buffer(0.9) for c in crests]), way)

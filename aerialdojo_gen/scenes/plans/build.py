@@ -25,25 +25,12 @@ from aerialdojo_gen.scenes.placement import Placement, Room
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
 from aerialdojo_gen.scenes.plans.placing import poses_of, prop_height
 from aerialdojo_gen.scenes.plans.values import PlanNames
-from aerialdojo_gen.scenes.recipe import Recipe, validated
+from aerialdojo_gen.scenes.recipe import validated
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
 
 Model = TypeVar("Model", bound=BaseModel)
-_HEAD_KEYS = (
-    "seed",
-    "size_m",
-    "ceiling_m",
-    "sky",
-    "sun",
-    "palette",
-    "inventory",
-    "attribution",
-    "origin",
-    "level",
-    "moves",
-)
 
 
 def build_plan(path: Path, catalogue: Catalogue, entries: dict[str, str] | None = None) -> Scene:
@@ -60,7 +47,7 @@ def build_tables(
     if entries is not None:
         entries.update(made)
     scene = site.scene()
-    check_inventory(scene, site.recipe, where or name)
+    _check_inventory(scene, site, where or name)
     return scene
 
 
@@ -69,20 +56,17 @@ def build_site(
 ) -> tuple[Site, dict[str, str]]:
     """Build all that a plan says on a site, where more may be placed, and list the entry of each node."""
     head = validated(PlanHead, dict(tables), where)
-    recipe = Recipe(layout="plan", **{key: getattr(head, key) for key in _HEAD_KEYS})
-    site = Site(name, recipe, catalogue, folder=folder)
+    site = Site(name, head, catalogue, folder)
     return site, _Building(site, _names(head, catalogue, where), where).build(head)
 
 
-def is_plan(path: Path) -> bool:
-    """Whether a scene's file is a plan."""
-    return "plan" in read_toml(path, AssetError)
-
-
-def check_inventory(scene: Scene, recipe: Recipe, where: object) -> None:
-    """Raise an `AssetError` if a scene has fewer instances of a category than its file asks for."""
-    found = Counter(instance.category for instance in scene.instances)
-    short = [f"{c} (needs {n}, has {found[c]})" for c, n in recipe.inventory.items() if found[c] < n]
+def _check_inventory(scene: Scene, site: Site, where: str) -> None:
+    """Raise an `AssetError` if a scene has fewer instances of a category than its plan asks for."""
+    found, inventory = Counter(instance.category for instance in scene.instances), site.head.inventory
+    for category in inventory:
+        if category not in site.catalogue and not found[category]:
+            raise AssetError(f"{where}: inventory: unknown category {category!r}{nearest(category, site.catalogue)}")
+    short = [f"{c} (needs {n}, has {found[c]})" for c, n in inventory.items() if found[c] < n]
     if short:
         raise AssetError(f"{where}: inventory: the scene has too few of {', '.join(short)}")
 
@@ -182,7 +166,7 @@ class _Building:
 
     def _ground(self, body: Mapping[str, Any]) -> None:
         ground = self._read(Ground, body, f"{self._where}: [ground]")
-        terrain = flat_terrain(self._site.recipe.size_m)
+        terrain = flat_terrain(self._site.head.size_m)
         for number, step in enumerate(ground.steps):
             where = f"{self._where}: [ground] steps[{number}]"
             if "make" not in step:

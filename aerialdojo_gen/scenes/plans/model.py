@@ -7,38 +7,26 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
-from aerialdojo_gen.scenes.recipe import Colour, Extent, Height, Level, Move, Origin, Sun
+from aerialdojo_gen.scenes.recipe import SceneHead
 
 VERSION = 1
 MAX_ENTRIES = 2000
 _Text = Annotated[str, Field(min_length=1, max_length=200)]
+_Table = Annotated[dict[str, Any], Field(default_factory=dict)]
 _STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
-class PlanHead(BaseModel):
-    """Everything of a plan but its ground and its entries."""
-
-    model_config = _STRICT
+class PlanHead(SceneHead):
+    """Everything of a plan; its ground and its entries are read when their turn comes."""
 
     plan: Literal[1]  # Version of the format
-    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
-    size_m: tuple[Extent, Extent]  # Extent along x and y, metres; the origin lies in the middle
-    ceiling_m: Height  # Highest z that a drone may fly at, metres
-    sky: Colour = "#96bee6"
-    sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
-    palette: dict[str, str] = {}  # Materials by the plan's names for them
-    inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}  # Least number of instances by category
-    attribution: Annotated[str, Field(max_length=500)] = ""
-    origin: Origin | None = None  # Where on earth that is
-    level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
-    moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
-    floor_m: dict[str, Any] = {}  # Named heights, metres; also in expressions
-    lines: dict[str, Any] = {}
-    areas: dict[str, Any] = {}
-    fields: dict[str, Any] = {}  # Named numbers that vary over the site; each may be made of those before it
-    placing: dict[str, Any] = {}  # What every `place` entry has that does not say otherwise, e.g. ``margin_m``
-    ground: dict[str, Any] = {}
-    site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES)] = []
+    floor_m: _Table  # Named heights, metres; also in expressions
+    lines: _Table
+    areas: _Table
+    fields: _Table  # Named numbers that vary over the site; each may be made of those before it
+    placing: _Table  # What every `place` entry has that does not say otherwise, e.g. ``margin_m``
+    ground: _Table
+    site: Annotated[list[dict[str, Any]], Field(max_length=MAX_ENTRIES, default_factory=list)]
 
     @field_validator("site")
     @classmethod

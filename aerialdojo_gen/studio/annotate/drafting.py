@@ -28,8 +28,8 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 
 log = logging.getLogger(__name__)

@@ -9,10 +9,10 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.config.sections import BuildScenesConfig
 from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.context import keep_scene
 from aerialdojo_gen.scenes.glb import write_glb
-from aerialdojo_gen.scenes.layouts.build import build_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.store.layout import partition as store_partition
