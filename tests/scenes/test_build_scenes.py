@@ -152,7 +152,7 @@ def test_another_seed_makes_another_scene(assets):
         ("plan = 1", "plan = 2", "plan = 2"),
         ("plan = 1", 'layout = "mall"', "scenes are plans since version 0.2.0, without 'layout': docs/plans.md has"),
         ("plan = 1", 'layout = "town"', "scenes are plans since version 0.2.0, without 'layout': run add-map again"),
-        ("limit = 4", 'limit = "many"', "site[2] (pattern): pattern.limit = "),
+        ("limit = 4", 'limit = "many"', "site[2] (pattern): [pattern] limit = "),
         ("[40, 30]", "[40, -30]", "size_m.1 = "),
         ('"#a9c6e8"', '"blue"', "sky = "),
         ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik': did you mean 'brick'?"),
@@ -302,8 +302,8 @@ def test_adding_one_thing_does_not_change_another():
     one, two = site(), site()
     categories = sorted(one.catalogue)[:2]
     two.rng.random(100)
-    two.place(Placement(categories[1], 10, 10, DRAWN))
-    a, b = (some.place(Placement(categories[0], 0, 0, DRAWN)) for some in (one, two))
+    two.place(Placement(categories[1], 10, 10, variant=DRAWN))
+    a, b = (some.place(Placement(categories[0], 0, 0, variant=DRAWN)) for some in (one, two))
     assert a.variant == b.variant
     assert np.array_equal(a.vertices, b.vertices)
 

@@ -49,7 +49,7 @@ def test_a_moved_prop_stays_on_the_ground():
         load_catalogue(ASSETS),
     )
     site.set_ground(rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0))
-    unmoved = site.place(Placement("bench", 1.0, 2.0, DRAWN))
+    unmoved = site.place(Placement("bench", 1.0, 2.0, variant=DRAWN))
     moved = site.instances[-1]
     fall = site.ground_z(7.0, 5.0) - site.ground_z(1.0, 2.0)
     assert abs(fall) > 0.1
