@@ -265,8 +265,8 @@ def test_git_ignores_what_readme_and_docs_suggest_to_write(tmp_path):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_toml_block_is_what_a_pipeline_may_say(page):
     for block in blocks(page):
-        # Plans of scenes are built by tests/scenes/test_plans.py.
-        if block.language == "toml" and "plan = 1" not in block.text:
+        # Plans of scenes, and the parts of one in docs/plans.md, are built by tests/scenes/test_plans.py.
+        if block.language == "toml" and "plan = 1" not in block.text and page.name != "plans.md":
             Pipeline.model_validate(tomllib.loads(block.text))
 
 
