@@ -67,6 +67,9 @@ def export(
         "--renderer", help="auto, gl or pybullet.  (default: auto)")] = None,
     jpeg_quality: Annotated[int | None, typer.Option(
         "--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG.")] = None,
+    run: Annotated[list[str] | None, typer.Option(
+        "--run", help="Export the successful flights of this run of evaluate or fly in place of the references; "
+        "repeatable.")] = None,
     workers: Workers = None,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing.")] = False,
@@ -87,7 +90,8 @@ def export(
 
     training = {
         "split": split, "setting": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
-        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "depth": False if no_depth else None,
+        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "run": run,
+        "depth": False if no_depth else None,
         "size": (width or height or 128, height or width or 128) if width or height else None,
     }  # fmt: skip
     given = {name: value for name, value in training.items() if value}

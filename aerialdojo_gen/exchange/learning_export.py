@@ -83,6 +83,7 @@ def export_options(
     source: str = "render",
     renderer: str = "auto",
     jpeg_quality: int = 0,
+    run: Sequence[str] = (),
 ) -> ExportOptions:
     """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `ExportOptions`."""
     if limit < 0:
@@ -92,7 +93,7 @@ def export_options(
     name = "" if source == "recordings" else renderer_name(renderer)
     return ExportOptions(
         expand_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
-        jpeg_quality,
+        jpeg_quality, tuple(run),
     )  # fmt: skip
 
 

@@ -42,6 +42,7 @@ class ExportOptions:
     source: str  # As for `aerialdojo_gen.learning.trajectories.Trajectories`
     renderer: str  # Name of what draws; not ``"auto"``, which may be another one in another process
     jpeg_quality: int = 0  # Of the pictures in shards, 1 to 100; 0 for PNG
+    runs: tuple[str, ...] = ()  # Whose successful flights are exported in place of the references
 
     def __post_init__(self) -> None:
         """Refuse what there is not."""
@@ -54,6 +55,8 @@ class ExportOptions:
             raise UsageError(f"a goal is told by {' or '.join(GOALS)}: name one")
         if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
             raise UsageError("nothing is seen without a view: name one of front, left, right, down")
+        if self.runs and self.source != "render":
+            raise UsageError(f"recordings are of the references: --run goes with --source render, not {self.source}")
         if not 0 <= self.jpeg_quality <= 100:
             raise UsageError(f"a JPEG's quality is from 1 to 100, or 0 for PNG, not {self.jpeg_quality}")
 
@@ -98,7 +101,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     """Choose the trajectories, and cut them into parts."""
     modalities = ("image",) if options.goal == ("image",) else ()
     selection = Selection(options.splits, options.settings, modalities, options.scenes)
-    index = read_index(root, selection)
+    index = read_index(root, selection, runs=options.runs)
     facts = select(root, selection).select(["nav_id", "scene", "setting", "partition", "subset"]).to_pylist()
     known = {row["nav_id"]: row for row in facts}
     chosen = index.take(_chosen(index, known, options))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.words import goal_text
@@ -93,22 +94,51 @@ class Index:
         )  # fmt: skip
 
 
-def read_index(root: DataRoot, selection: Selection, target_split: str | None = None) -> Index:
-    """Read the trajectories of a selection."""
+def read_index(
+    root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = ()
+) -> Index:
+    """Read the trajectories of a selection: its references, or the successful flights of runs on its tasks."""
     if target_split is not None and target_split not in _SIDES:
         raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
     chosen = select(root, selection)
+    flown = _flown(root, runs) if runs else None
+    if flown is not None:
+        chosen = chosen.filter(pc.is_in(chosen["nav_id"], pa.array(flown, pa.string())))
+        if not chosen.num_rows:
+            raise UsageError(f"no task of the selection has a successful flight in {', '.join(runs)}")
     parts = []
     for scene in sorted(pc.unique(chosen["scene"]).to_pylist()):
         here = chosen.filter(pc.equal(chosen["scene"], scene))
-        parts.append(_scene(root, scene, here, target_split))
+        parts.append(_scene(root, scene, here, target_split, flown or {}))
     parts = [part for part in parts if len(part)]
     if not parts:
         raise UsageError(f"no task of the selection has the target split {target_split!r}")
     return _joined(parts)
 
 
-def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None) -> Index:
+def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
+    """Read the actions of the runs' successful flights, of each navigation task the shortest."""
+    found: dict[str, NDArray[np.int8]] = {}
+    for run in runs:
+        rows = read_run(root, run, columns=["task_id", "nav_id", "success"])
+        own = {row["task_id"]: row["nav_id"] for row in rows.to_pylist() if row["success"]}
+        steps = read_run(root, run, "steps", ["task_id", "step", "action", "refused"])
+        # What was refused, or named no action, moved nothing: the flight is the same without it.
+        moved = pc.and_(pc.invert(steps["refused"]), pc.is_valid(steps["action"]))
+        steps = steps.filter(pc.and_(moved, pc.is_in(steps["task_id"], pa.array(own, pa.string()))))
+        steps = steps.sort_by([("task_id", "ascending"), ("step", "ascending")])
+        task_ids, actions = steps["task_id"].to_pylist(), steps["action"].to_numpy()
+        begins = [k for k, task_id in enumerate(task_ids) if not k or task_id != task_ids[k - 1]]
+        for begin, end in zip(begins, [*begins[1:], len(task_ids)], strict=True):
+            nav_id = own[task_ids[begin]]
+            if nav_id not in found or end - begin < len(found[nav_id]):
+                found[nav_id] = actions[begin:end].astype(np.int8)
+    return found
+
+
+def _scene(
+    root: DataRoot, scene: str, rows: pa.Table, target_split: str | None, flown: dict[str, NDArray[np.int8]]
+) -> Index:
     wanted: dict[str, dict[str, object]] = {}
     allowed = None if target_split is None else _of_target_split(root, scene, target_split)
     for row in rows.to_pylist():
@@ -124,7 +154,7 @@ def _scene(root: DataRoot, scene: str, rows: pa.Table, target_split: str | None)
     for nav_id in ids:
         if nav_id not in routes:
             raise StoreError(f"task {nav_id} has no route in {root}/release: run {command('split', scene=scene)}")
-    pieces = [routes[nav_id][0] for nav_id in ids]
+    pieces = [flown.get(nav_id, routes[nav_id][0]) for nav_id in ids]
     return Index(
         (scene,),
         np.zeros(len(ids), np.int32),

@@ -63,6 +63,7 @@ class Part:
     folder: Path  # Where to; named by what is in it
     dagger_round: DaggerRound | None = None  # None for the references
     exploration: Exploration | None = None  # Extra views instead of trajectories
+    runs: tuple[str, ...] = ()  # Whose flights are followed in place of the references
 
     @property
     def label(self) -> str:
@@ -76,7 +77,7 @@ class Part:
 
     def index(self) -> Index:
         """Read the trajectories."""
-        found = read_index(self.data, Selection(self.splits, self.settings, (), (self.scene,)))
+        found = read_index(self.data, Selection(self.splits, self.settings, (), (self.scene,)), runs=self.runs)
         wanted = set(self.nav_ids)
         return found.take(np.array([k for k, nav_id in enumerate(found.nav_id) if nav_id in wanted], np.int64))
 

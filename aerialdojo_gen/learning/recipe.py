@@ -27,6 +27,10 @@ class DataConfig(Section):
     target_split: Literal["train", "test"] | None = Field(
         None, description="side of the split by objects, so that the other side's targets are held out"
     )
+    runs: tuple[str, ...] = Field(
+        (),
+        description="runs of evaluate or fly whose successful flights are learned from, in place of the references",
+    )
     limit: int | None = Field(None, ge=1, description="most trajectories, drawn evenly over the scenes")
     views: tuple[View, ...] = Field(("front",), description="cameras; none for a blind policy")
     size_px: int = Field(64, ge=32, le=256, description="edge of the pictures; a multiple of 16")

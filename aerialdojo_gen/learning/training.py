@@ -7,7 +7,7 @@ import importlib
 import json
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -200,7 +200,7 @@ class _Training:
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
         """Read the training trajectories, and the words that images will be searched for."""
         d = self._recipe.data
-        index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split)
+        index = read_index(self._root, Selection((d.split,), d.settings, (), d.scenes), d.target_split, d.runs)
         named: tuple[str, ...] = ()
         if d.looks and d.views and self._recipe.sight.epochs:
             # Of all targets, independent of the limit on trajectories.
@@ -224,10 +224,11 @@ class _Training:
         return DaggerRound(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
 
     def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
-        return parts_of(
+        parts = parts_of(
             self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
             self._recipe.seed, self._renderer, dagger_round,
         )  # fmt: skip
+        return [replace(part, runs=self._recipe.data.runs) for part in parts]
 
     def _collect(self, index: Index, dagger_round: DaggerRound | None, what: str) -> list[Steps]:
         parts = self._parts(index, dagger_round)

@@ -40,6 +40,9 @@ class SampleOptions:
     setting: str | Sequence[str] = ()  # All where absent
     scene: str | Sequence[str] = ()  # Names or globs; all where absent
     target_split: str | None = None  # "train" or "test" of the split by objects, where the release has it
+    run: (
+        str | Sequence[str]
+    ) = ()  # Successful flights of these runs of `evaluate` or `fly` in place of the references
     limit: int | None = None  # Draw so many trajectories by `seed`, spread over the scenes
     seed: int = 0
     views: str | Sequence[str] = ("front",)  # Of front, left, right, down
@@ -65,6 +68,10 @@ class SampleOptions:
         """Check what no list of names checks."""
         if self.source not in SOURCES:
             raise UsageError(unknown("no source", self.source, SOURCES))
+        if self.run and self.source != "render":
+            raise UsageError(
+                f"recordings are of the references: choose source='render' beside run, not {self.source!r}"
+            )
         if (self.past is not None and self.past < 0) or self.stride < 1 or self.cache_gb < 0:
             raise UsageError("past and cache_gb are at least 0, stride at least 1")
 
@@ -129,7 +136,7 @@ class Trajectories:
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(_names(split), _names(own.setting), modalities, _names(own.scene), None, own.seed)
-        self.index = read_index(self._root, chosen, own.target_split)
+        self.index = read_index(self._root, chosen, own.target_split, _names(own.run))
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)

@@ -11,12 +11,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from support.extended import set_columns
 from support.flying import town
 from support.trainings import assert_same_training, history, kill_at_first_checkpoint
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.episodes import run_scenes
+from aerialdojo_gen.benchmark.episodes import read_run, run_scenes
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
@@ -36,7 +37,8 @@ from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
-from aerialdojo_gen.store.schemas import STOP
+from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
+from aerialdojo_gen.store.schemas.columns import list_of
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
 
@@ -129,6 +131,24 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
     assert not (broken / "policy.safetensors").exists()
     train(smoke, recipe(), out=broken, cache=cache, device="cpu", workers=1)
     assert_same_training(learned.policy, broken / "policy.safetensors")
+
+
+def test_successful_flights_of_a_run_are_learned_from(planted, tmp_path):
+    known = {side: [row["agent_action"] for row in planted.rows(f"routes/{side}")] for side in ("train", "test")}
+    for side, rows in known.items():
+        turning = [[TURN_LEFT, TURN_RIGHT, *row] for row in rows]
+        set_columns(planted, f"routes/{side}", agent_action=pa.array(turning, list_of(pa.int8())))
+    three = Selection(("id_train",), modalities=("semantic",), limit=3)
+    evaluate(planted.data, Evaluation("turning", "oracle", {"actions": "agent_action"}, three))
+    for side, rows in known.items():
+        set_columns(planted, f"routes/{side}", agent_action=pa.array(rows, list_of(pa.int8())))
+    drawn, own = tmp_path / "drawn", recipe(data={"runs": ["turning"]}, train={"epochs": 1, "looks": 0})
+    train(planted.data, own, out=tmp_path / "out", cache=drawn, device="cpu", workers=1)
+    (steps,) = [read_steps(file.parent) for file in drawn.glob("*/steps.npz")]
+    assert set(steps.nav_id) == set(read_run(planted.data, "turning")["nav_id"].to_pylist())
+    assert len(steps) == 3
+    for begin in steps.first[:-1]:
+        assert steps.label[begin : begin + 2].tolist() == [TURN_LEFT, TURN_RIGHT]
 
 
 def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_path):

@@ -20,6 +20,8 @@ from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
 from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
+from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.studio.fly.server import fly_app
@@ -28,7 +30,7 @@ from aerialdojo_gen.studio.fly.session import Session, agent_name
 TWO = Selection(modalities=("semantic",), limit=2)
 TOLD = ("target_name", "landmark", "direction", "description")
 OWN = ["run_id", "agent", "agent_options"]
-STOP, FORWARD_5, UP_2, DOWN_1, TURN_LEFT = 0, 3, 11, 12, 14
+STOP, FORWARD_5, UP_2, DOWN_1, DOWN_2, TURN_LEFT = 0, 3, 11, 12, 13, 14
 
 
 def evaluation(selection=TWO, **changes):
@@ -186,6 +188,41 @@ def test_another_selection_or_a_second_pilot_of_a_run_is_refused(smoke, tmp_path
     for name in ("Ann", "a b", "../x", "", "ä", "a" * 41, "-a"):
         with pytest.raises(UsageError, match="small letters"):
             agent_name(name)
+
+
+def test_successful_flights_are_demonstrations(planted, tmp_path):
+    data, one = planted.data, Selection(scenes=("U_Courtyard_1",), modalities=("semantic",), limit=2)
+    rows = select(data, one).to_pylist()
+    with flying(data, data, one) as (client, state):
+        state = post(client, "agree", state)
+        shown, actions = reference(data, rows, state)
+        ups = 0
+        while not state["refused"]:
+            state = fly(client, state, [UP_2])
+            ups += not state["refused"]
+        way = [*[UP_2] * ups, *[DOWN_2] * ups, *actions]
+        state = fly(client, state, way[ups:])
+        assert state["result"]["success"]
+        state = fly(client, post(client, "next", state), [STOP])
+        assert not state["result"]["success"]
+    (row,) = [row for row in rows if row["task_id"] == shown]
+    own = Trajectories(
+        data, split=row["split"], run="human-ann", past=None, privileged="pose", views=("down",), size=16
+    )
+    (sample,) = own
+    assert sample["nav_id"] == row["nav_id"]
+    assert sample["action"].tolist() == way
+    steps = read_run(data, "human-ann", "steps").to_pandas()
+    steps = steps[(steps.task_id == shown) & ~steps.refused]
+    flown = steps[["x_m", "y_m", "z_m", "yaw_rad"]].to_numpy()
+    np.testing.assert_allclose(sample["pose"][1:], flown[:-1], atol=1e-9)
+    with pytest.raises(UsageError, match="recordings are of the references"):
+        Trajectories(data, split=row["split"], run="human-ann", source="recordings")
+    with pytest.raises(UsageError, match="no task of the selection has a successful flight in human-ann"):
+        Trajectories(data, split="id_train", run="human-ann")
+    options = export_options(split=[row["split"]], run=["human-ann"], size=16)
+    made = export_for_learning("webdataset", data, tmp_path / "out", options, workers=1)
+    assert (made.parts, made.counts["samples"]) == (1, len(way))
 
 
 @pytest.mark.browser
