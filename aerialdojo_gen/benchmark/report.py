@@ -66,16 +66,7 @@ def html(
     request: ReportRequest, replays: Sequence[Replay], figures: dict[str, bytes], tables: dict[str, list[TextTable]]
 ) -> str:
     """Write the page."""
-    folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
-    style, script = (folder.joinpath(name).read_text("utf-8") for name in ("report.css", "report.js"))
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"),
-        autoescape=True,
-        finalize=shown_in_page,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = page_environment()
     environment.filters["json_in_html"] = _json_in_html
     environment.globals |= {
         "points": _points, "cross": _cross, "arrow": _arrow, "starts": _starts, "heights": _heights, "span": _span_m
@@ -97,11 +88,28 @@ def html(
         figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
         replays=replays,
         missing_note=request.breakdowns.missing_note,
-        style=style,
-        script=script,
-        style_hash=_hash(style),
-        script_hash=_hash(script),
+        **page_parts(["report.css"], "report.js"),
     )
+
+
+def page_environment() -> jinja2.Environment:
+    """Return what renders the benchmark's pages: everything is escaped, and no name may be missing."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"),
+        autoescape=True,
+        finalize=shown_in_page,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def page_parts(styles: Sequence[str], script: str) -> dict[str, str]:
+    """Read a page's style and script, with their hashes for its content security policy."""
+    folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
+    style = "".join(folder.joinpath(name).read_text("utf-8") for name in styles)
+    code = folder.joinpath(script).read_text("utf-8")
+    return {"style": style, "script": code, "style_hash": _hash(style), "script_hash": _hash(code)}
 
 
 def _hash(text: str) -> str:

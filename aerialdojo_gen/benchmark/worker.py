@@ -17,6 +17,7 @@ from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.benchmark.agents.goal import Observation
 from aerialdojo_gen.benchmark.agents.load import error_location
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent
+from aerialdojo_gen.benchmark.agents.submitted import SubmittedAgent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.guarded_agent import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.journal import Journal
@@ -150,6 +151,8 @@ class Worker:
                     return
                 if isinstance(self._agent, OracleAgent):
                     self._agent.follow(actions[task.row["nav_id"]])
+                elif type(self._agent) is SubmittedAgent:
+                    self._agent.follow(task.row["task_id"])
                 done = self._finish(task, stopped)
                 if done is None:
                     return

@@ -19,6 +19,7 @@ from aerialdojo_gen.cli import (
     evaluate,
     exchange,
     fly,
+    leaderboard,
     places,
     release,
     render,
@@ -30,7 +31,7 @@ from aerialdojo_gen.cli import (
 
 _HEADINGS = {
     "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
-    "Evaluate and train agents": ("evaluate", "fly", "report", "train"),
+    "Evaluate and train agents": ("evaluate", "fly", "report", "train", "score", "leaderboard"),
     "Add your own scenes": ("add-scene", "add-map", "add-terrain", "annotate-draft", "annotate"),
     "Exchange and share": ("export", "import-benchmark", "push-to-hub", "pull"),
 }
@@ -92,7 +93,7 @@ def _program(
 
 
 _GROUPS = (
-    stages, render, sources, places, evaluate, fly, release, validate, exchange, report
+    stages, render, sources, places, evaluate, fly, release, validate, exchange, report, leaderboard
 )  # fmt: skip
 for _group in _GROUPS:
     app.add_typer(_group.app)

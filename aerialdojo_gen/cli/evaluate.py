@@ -92,6 +92,12 @@ def evaluate(
     renderer: RendererName = "auto",
     tell: Tell = None,
     out: Out = None,
+    submission: Annotated[
+        Path | None,
+        typer.Option(
+            "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
+        ),
+    ] = None,
     attempts: Annotated[
         int,
         typer.Option(
@@ -202,6 +208,11 @@ def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter
     if last:
         # Not the reporter's: a failure is told under --quiet too.
         print(last, file=sys.stderr)
+    if submission is not None:
+        from aerialdojo_gen.benchmark.submission import write_submission
+
+        size = write_submission(data, out or data, evaluation.run, submission)
+        reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes")
 
 
 @contextmanager

@@ -28,6 +28,7 @@ NEEDED = {
     "annotate": ["--scene", SCENE, "--pipeline", "{pipeline}", "--no-browser"],
     "evaluate": ["--agent", "stop"],
     "fly": ["--name", "pilot-1", "--no-browser"],
+    "score": ["file"],
     "show": [TASK],
     "train": ["{project}/pipelines/baselines/imitation.toml"],
     "view": ["--scene", SCENE, "--no-browser"],
@@ -61,6 +62,8 @@ WRONG = {
     "export": ["--picture-size", "many"],
     "import-benchmark": ["--format", "nothing"],
     "report": ["--profile", "nothing"],
+    "score": ["--split", "nowhere"],
+    "leaderboard": ["scored", "more"],
     "push-to-hub": ["--revision", "a..b"],
     "pull": ["--revision", "a..b"],
 }

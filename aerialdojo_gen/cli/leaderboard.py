@@ -1,0 +1,91 @@
+"""Commands that score submissions and show them side by side."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerialdojo_gen.cli.common import Data, PipelineFile, Quiet, Scene, Workers, open_pipeline
+
+app = typer.Typer()
+
+_FOLDER = Path("scored")
+
+
+@app.command("score")
+def score(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Submission, as evaluate --submission writes it.")],
+    data: Data = "data",
+    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder of scored runs.")] = _FOLDER,
+    name: Annotated[
+        str | None, typer.Option("--name", help="Name of the scored run.  (default: that of the submission)")
+    ] = None,
+    split: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--split", help="Splits that must have been flown, as for evaluate; repeatable.  (default: test)"
+        ),
+    ] = None,
+    setting: Annotated[
+        list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.  (default: all)")
+    ] = None,
+    modality: Annotated[
+        list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
+    ] = None,
+    scene: Scene = None,
+    limit: Annotated[
+        int | None, typer.Option("--limit", min=1, help="Number of tasks, drawn as by evaluate.  (default: all)")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")] = 0,
+    adapted: Annotated[
+        bool,
+        typer.Option("--adapted", help="The agent was trained on tasks of OOD scenes: list its OOD scores apart."),
+    ] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite a scored run of this name.")] = False,
+    workers: Workers = None,
+    pipeline: PipelineFile = None,
+    quiet: Quiet = False,
+) -> None:
+    """Replay a submission against the release, and add its scores to a folder; refuse it where it does not replay."""
+    from aerialdojo_gen.benchmark import scoring
+    from aerialdojo_gen.benchmark.metrics import MEASURES
+    from aerialdojo_gen.benchmark.tables import text
+    from aerialdojo_gen.benchmark.tasks import Selection
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    config, _ = open_pipeline(pipeline, data, reads=True)
+    settings, modalities, scenes = (tuple(names or ()) for names in (setting, modality, scene))
+    reporter = Reporter(quiet=quiet)
+    try:
+        selection = Selection(tuple(split or ("test",)), settings, modalities, scenes, limit, seed)
+        card = scoring.score(
+            data, file, into, selection=selection, embodiment=config.embodiment, name=name, adapted=adapted,
+            replace=replace, workers=workers, reporter=reporter,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        print(f"interrupted: {into} is as it was", file=sys.stderr)
+        raise SystemExit(130) from None
+    whole = card.rows[0]
+    known = {
+        MEASURES[metric].head[:-2]: text(metric, value) for metric, value in whole.mean.items() if value is not None
+    }
+    scores = ", ".join(f"{head} {value}" for head, value in known.items())
+    reporter.line(f"score {card.name}: {whole.episodes:,} episodes replay; {scores}; added to {into}")
+
+
+@app.command("leaderboard")
+def leaderboard(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of scored runs (score --into).")] = _FOLDER,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="The page.  (default: leaderboard.html in FOLDER)")
+    ] = None,
+) -> None:
+    """Write the scored runs of a folder as one page: sortable, with intervals, the paper's results beside them."""
+    from aerialdojo_gen.benchmark.leaderboard import write_leaderboard
+
+    page = out or folder / "leaderboard.html"
+    count = write_leaderboard(folder, page)
+    typer.echo(f"{page}: {count} scored run{'s' * (count != 1)}", err=True)
