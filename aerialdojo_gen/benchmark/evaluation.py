@@ -35,6 +35,7 @@ class Evaluation:
     requests_per_minute: float | None = None  # Of an agent that uses a service, over all workers
     used: Mapping[str, Any] | None = None  # The options that the agent reports, for the log
     tell: tuple[str, ...] = ()
+    withheld: bool = False  # Fly also where the release has no routes: for a submission, scored elsewhere
 
     def __post_init__(self) -> None:
         """Check the names of hints."""
@@ -78,7 +79,7 @@ class Outcome:
     stopped: str = ""  # Why it ended early; empty otherwise
     failures: tuple[str, ...] = ()
     finished_now: int = 0  # Of this call, without failed ones
-    successes: int = 0  # Of the finished
+    successes: int | None = 0  # Of the finished; None where goals are withheld
 
     @property
     def all_failed(self) -> bool:
@@ -91,7 +92,11 @@ class Outcome:
         cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
         tokens = f"; {self.tokens:,} tokens" if self.tokens else ""
         failed = f", {self.failed:,} failed" if self.failed else ""
-        success = f", success rate {self.successes / self.finished:.1%}" if self.finished else ""
+        success = (
+            f", success rate {self.successes / self.finished:.1%}"
+            if self.finished and self.successes is not None
+            else ""
+        )
         return (
             f"{self.finished:,} of {self.episodes:,} episodes finished{failed}{success}; "
             f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"

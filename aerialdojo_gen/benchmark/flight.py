@@ -14,7 +14,7 @@ from aerialdojo_gen.base.constants import SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.observations import render_views
-from aerialdojo_gen.benchmark.tasks import Task, check_tell, goal_of, mesh_of
+from aerialdojo_gen.benchmark.tasks import NO_TARGET, Task, check_tell, goal_of, mesh_of
 from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, view_of, viewpoints_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space, prefetch_flight_space
@@ -101,7 +101,7 @@ class Flight:
         """Return the body's distance to viewpoints and the target's visibility; None without viewpoints."""
         task, scene = self.task, self.task.row["scene"]
         viewpoints = viewpoints_of(self._data, scene)
-        if viewpoints is None:
+        if viewpoints is None or task.target_id == NO_TARGET:
             return None
         node = nodes_of(self._data, scene).get(task.target_id)
         if node is None:

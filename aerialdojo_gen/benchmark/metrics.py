@@ -136,6 +136,10 @@ def episodes_of(table: pa.Table) -> Episodes:
         kind = _KINDS.get(field.name, np.float64)
         columns[field.name] = np.asarray(table.column(field.name).to_pylist(), dtype=kind)
     episodes = Episodes(**columns, view_distance_m=_view_distance_m(table))
+    if np.isnan(episodes.euclidean_m).any():
+        raise StoreError(
+            "these episodes have no scores: the release withholds the goals; its owner scores a submission"
+        )
     for name in columns:
         if name not in _KINDS and not (np.isfinite(columns[name]) & (columns[name] >= 0.0)).all():
             raise StoreError(f"episodes: {name} has values that are no length: run the evaluation again")

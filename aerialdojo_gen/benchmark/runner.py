@@ -26,7 +26,7 @@ from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
 from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
 from aerialdojo_gen.benchmark.journal import Journals
-from aerialdojo_gen.benchmark.tasks import select
+from aerialdojo_gen.benchmark.tasks import goals_withheld, select
 from aerialdojo_gen.benchmark.viewpoints import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
@@ -81,7 +81,7 @@ def evaluate(
         todo = run.todo(rerun_failed)
         if todo.num_rows:
             evaluation = preflight(evaluation, limits, reporter)
-            if run.no_viewpoints_message:
+            if run.no_viewpoints_message and run.goals_known:
                 reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
         budget = BudgetTracker(limits, *run.spent())
         with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
@@ -112,7 +112,7 @@ def evaluate(
     flown, seconds = budget.episodes, time.monotonic() - started
     return Outcome(
         rows.num_rows, finished, failed, flown, budget.actions, budget.cost_usd, budget.tokens, seconds, why,
-        run.failures(), budget.finished, successes,
+        run.failures(), budget.finished, successes if run.goals_known else None,
     )  # fmt: skip
 
 
@@ -132,7 +132,9 @@ class RunLog:
             f"{table}/{scene}": store.content(data, table, scene)
             for scene in self._scenes
             for table in ("release/scenes", *(f"{kind}/{s}" for kind in ("tasks", "routes") for s in subsets))
+            if not (evaluation.withheld and table.startswith("routes/") and goals_withheld(data, scene, table[7:]))
         }
+        self.goals_known = len(content) == len(self._scenes) * (1 + 2 * len(subsets))
         seen_from = {scene: viewpoints_content(data, scene) for scene in self._scenes}
         self.no_viewpoints_message = [scene for scene, found in seen_from.items() if not found]
         content |= {f"release/viewpoints/{scene}": found for scene, found in seen_from.items() if found}

@@ -118,7 +118,7 @@ class Submission(Strict):
     version: Literal[1]
     run: RunFacts
     scenes: dict[Word, SceneFacts]
-    metrics: dict[Word, float | None]  # Overall, by the profile aerialdojo; None for unknown
+    metrics: dict[Word, float | None] | None  # Overall, by the profile aerialdojo; None where goals are withheld
     actions_sha256: Digest
     episodes: Flown
 
@@ -129,7 +129,7 @@ class Logged:
 
     table: pa.Table  # Its episodes, sorted by scene and task
     flown: Flown
-    metrics: dict[str, float | None]
+    metrics: dict[str, float | None] | None
 
 
 def logged(log: DataRoot, run: str) -> Logged:
@@ -151,6 +151,8 @@ def logged(log: DataRoot, run: str) -> Logged:
         path_length_m=np.round(table["path_length_m"].to_numpy(), _DIGITS).tolist(),
         **{name: np.round(last[name].to_numpy(), _DIGITS).tolist() for name in last.column_names},
     )
+    if pc.any(pc.is_nan(table["euclidean_m"])).as_py():
+        return Logged(table, flown, None)
     overall = summarize(episodes_of(table), PROFILES["aerialdojo"]).overall._asdict()
     known = {name: overall[name] for name in METRICS}
     return Logged(table, flown, {name: None if math.isnan(v) else round(v, 9) for name, v in known.items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -37,6 +38,7 @@ _COLUMNS = (
     "description", "reference_image_id", "image_distance_m",
 )  # fmt: skip
 _USUAL = {"train": ("id_train", "ood_train"), "test": ("id_test", "ood_test"), "all": tuple(SUBSETS)}
+NO_TARGET = -1  # Of a task whose goal is withheld
 _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m", "target_object_id")
 
 
@@ -98,7 +100,7 @@ class Task:
     euclidean_m, length_m : float
         Straight distance from start to goal, and length of the reference trajectory.
     target_id : int
-        ``object_id`` of the target.
+        ``object_id`` of the target; `NO_TARGET` where the release withholds the goals.
     """
 
     row: dict[str, Any]
@@ -173,7 +175,12 @@ def _sample(found: pa.Table, limit: int, seed: int) -> pa.Table:
     return found.take(pa.array(sorted(i for _, _, i in sorted(keys)[:limit])))
 
 
-def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
+def goals_withheld(root: DataRoot, scene: str, subset: str) -> bool:
+    """Whether a release has the tasks of a scene and not their routes, as who runs a contest may publish it."""
+    return bool(store.shards(root, f"tasks/{subset}", scene)) and not store.shards(root, f"routes/{subset}", scene)
+
+
+def read_tasks(data: Where, rows: pa.Table, *, withheld: bool = False) -> list[Task]:
     """Join tasks with their goals.
 
     Parameters
@@ -182,6 +189,8 @@ def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
         The data root.
     rows : pyarrow.Table
         Of `select`.
+    withheld : bool
+        Give tasks without goals, all NaN, where the release has no routes.
 
     Returns
     -------
@@ -196,6 +205,9 @@ def read_tasks(data: Where, rows: pa.Table) -> list[Task]:
     root = open_root(data)
     tasks = []
     for row in rows.to_pylist():
+        if withheld and goals_withheld(root, row["scene"], row["subset"]):
+            tasks.append(Task(row, (math.nan,) * 3, math.nan, math.nan, NO_TARGET))
+            continue
         fact = _facts(root, row["scene"], row["subset"]).get(row["nav_id"])
         if fact is None:
             raise StoreError(

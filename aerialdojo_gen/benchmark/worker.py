@@ -146,7 +146,8 @@ class Worker:
             actions = reference_actions(self._data, unit.scene, subsets, self._agent.column)
         with Journal(unit.journal) as journal:
             left = unit.rows.filter(pc.invert(pc.is_in(unit.rows["task_id"], pa.array(journal.done, pa.string()))))
-            for task in read_tasks(self._data, left):
+            # The runner has refused a release without routes where it is not for a submission.
+            for task in read_tasks(self._data, left, withheld=True):
                 if stopped():
                     return
                 if isinstance(self._agent, OracleAgent):

@@ -176,6 +176,7 @@ def evaluate(
             RetryPolicy(attempts, tolerate=tolerate),
             requests_per_minute,
             tell=tuple(tell or ()),
+            withheld=submission is not None,
         )
     if protocol and (less := sample_shortfall(data)):
         print(f"--protocol {protocol}: {less}", file=sys.stderr)
@@ -197,22 +198,25 @@ def evaluate(
         raise SystemExit(130) from None
     scores = command("report", evaluation.run, log=out, protocol=protocol)
     _tell(outcome, evaluation.run, scores, data, reporter)
+    if submission is not None:
+        from aerialdojo_gen.benchmark.submission import write_submission
+
+        size = write_submission(data, out or data, evaluation.run, submission)
+        known = outcome.successes is not None
+        withheld = "" if known else "; the goals are withheld: score it with the whole release"
+        reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes{withheld}")
 
 
 def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
     """Say what a run gave, the command for its scores, and how to fly again what failed."""
-    reporter.line(f"evaluate {run}: {outcome}{f'; for all scores: {scores}' if outcome.finished else ''}")
+    scored = outcome.finished and outcome.successes is not None
+    reporter.line(f"evaluate {run}: {outcome}{f'; for all scores: {scores}' if scored else ''}")
     last = outcome.failure_message(rerun_command(["--rerun-failed"], without=["--restart"], data=data))
     if outcome.stopped or outcome.all_failed:
         raise AerialDojoError(last)
     if last:
         # Not the reporter's: a failure is told under --quiet too.
         print(last, file=sys.stderr)
-    if submission is not None:
-        from aerialdojo_gen.benchmark.submission import write_submission
-
-        size = write_submission(data, out or data, evaluation.run, submission)
-        reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes")
 
 
 @contextmanager

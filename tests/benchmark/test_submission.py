@@ -11,7 +11,7 @@ import pytest
 from support.browser import chromium, errors
 from support.command_line import said
 
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark import score_rows
 from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import BLIND
@@ -302,6 +302,38 @@ def test_a_submission_on_another_mesh_is_refused(mine, planted, tmp_path):
     with pytest.raises(SubmissionRefused, match=rf"U_Courtyard_0 was flown on another mesh \(.* here {digest[:12]}"):
         score(planted.data, mine, tmp_path / "scored", selection=CHOSEN)
     assert not (tmp_path / "scored").exists()
+
+
+def test_a_run_without_goals_is_scored_by_who_has_them(smoke, log, mine, scored, planted, tmp_path, capsys):
+    """A published copy has neither routes nor viewpoints; only `score` knows how well the agent does."""
+    for folder in ("routes/id_test", "routes/ood_test", "anchors", "viewpoints"):
+        shutil.rmtree(planted.release / folder)
+    flown = (
+        "evaluate",
+        "--agent",
+        f"{__name__}:Wavering",
+        "--run",
+        "wavering",
+        "--data",
+        planted.data,
+        *OPTIONS[:-1],
+    )
+    code, _, err = said(capsys, *flown)
+    assert code == 1
+    assert "error: routes/test of U_Courtyard_0 is missing" in err
+    code, _, err = said(capsys, *flown, "--submission", tmp_path / "f")
+    assert code == 0
+    assert "24 of 24 episodes finished; 24 flown now" in err, "no success rate"
+    assert err.endswith("; the goals are withheld: score it with the whole release\n")
+    blind, seeing = read_submission(tmp_path / "f"), read_submission(mine)
+    assert (blind.metrics, blind.episodes) == (None, seeing.episodes)
+    code, _, err = said(capsys, "report", "wavering", "--data", planted.data)
+    assert (code, err.count("\n")) == (1, 1)
+    assert "the release withholds the goals" in err
+    rows = {card.name: card.rows for card in scored_runs(scored)}
+    assert score(smoke, tmp_path / "f", tmp_path / "scored", selection=CHOSEN).rows == rows["wavering"]
+    with pytest.raises(StoreError, match="routes/test of U_Courtyard_0 is missing"):
+        score(planted.data, mine, tmp_path / "elsewhere", selection=CHOSEN)
 
 
 @pytest.mark.browser
