@@ -78,8 +78,7 @@ class ScoreCard(Strict):
     agent: Word
     told: Word
     adapted: bool
-    scored: Word  # Date
-    scored_with: Word  # Version of this package
+    scored: Word  # Date, and version of this package
     code: Digest  # That the submission names
     tasks: dict[Word, Digest]  # Of the ids of the tasks, by setting
     rows: list[ScoreRow] = Field(max_length=100)
@@ -137,7 +136,7 @@ def score(
         _check_replay(file, submission, found)
         card = ScoreCard(
             name=name, agent=submission.run.agent, told=submission.run.told, adapted=adapted,
-            scored=datetime.datetime.now(datetime.UTC).date().isoformat(), scored_with=__version__,
+            scored=f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d}, by {__version__}",
             code=submission.run.code, tasks=tasks, rows=list(_score_rows(found.table)),
         )  # fmt: skip
         # What the runner keeps for going on names the staging folder.
