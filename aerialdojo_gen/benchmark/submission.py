@@ -66,6 +66,7 @@ class RunFacts(Strict):
     scenes: list[Word]
     limit: int | None
     seed: int
+    protocol: Word
     embodiment: dict[Word, float]
     requests: int | None  # To a service; None for an agent without one
     tokens: int | None
@@ -74,7 +75,7 @@ class RunFacts(Strict):
     def selection(self) -> Selection:
         """The tasks that it says it was on."""
         splits, settings, modalities, scenes = map(tuple, (self.splits, self.settings, self.modalities, self.scenes))
-        return Selection(splits, settings, modalities, scenes, self.limit, self.seed)
+        return Selection(splits, settings, modalities, scenes, self.limit, self.seed, self.protocol)
 
 
 class SceneFacts(Strict):
@@ -251,5 +252,6 @@ def described(selection: Selection) -> str:
     names = {"splits": "split", "settings": "setting", "modalities": "modality", "scenes": "scene"}
     given = asdict(selection)
     words = [f"--{option} {value}" for name, option in names.items() for value in given[name]]
+    words += [f"--protocol {selection.protocol}"] if selection.protocol else []
     words += [f"--limit {selection.limit} --seed {selection.seed}"] if selection.limit is not None else []
     return " ".join(words) or "all tasks"

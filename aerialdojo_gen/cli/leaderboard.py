@@ -8,7 +8,19 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.cli.common import Data, PipelineFile, Quiet, Scene, Workers, open_pipeline
+from aerialdojo_gen.cli.common import (
+    Data,
+    Modality,
+    PipelineFile,
+    Protocol,
+    Quiet,
+    Scene,
+    SelectionSeed,
+    Setting,
+    TaskLimit,
+    Workers,
+    open_pipeline,
+)
 
 app = typer.Typer()
 
@@ -29,17 +41,12 @@ def score(
             "--split", help="Splits that must have been flown, as for evaluate; repeatable.  (default: test)"
         ),
     ] = None,
-    setting: Annotated[
-        list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.  (default: all)")
-    ] = None,
-    modality: Annotated[
-        list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")
-    ] = None,
+    setting: Setting = None,
+    modality: Modality = None,
+    protocol: Protocol = None,
     scene: Scene = None,
-    limit: Annotated[
-        int | None, typer.Option("--limit", min=1, help="Number of tasks, drawn as by evaluate.  (default: all)")
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")] = 0,
+    limit: TaskLimit = None,
+    seed: SelectionSeed = 0,
     adapted: Annotated[
         bool,
         typer.Option("--adapted", help="The agent was trained on tasks of OOD scenes: list its OOD scores apart."),
@@ -60,7 +67,7 @@ def score(
     settings, modalities, scenes = (tuple(names or ()) for names in (setting, modality, scene))
     reporter = Reporter(quiet=quiet)
     try:
-        selection = Selection(tuple(split or ("test",)), settings, modalities, scenes, limit, seed)
+        selection = Selection(tuple(split or ("test",)), settings, modalities, scenes, limit, seed, protocol or "")
         card = scoring.score(
             data, file, into, selection=selection, embodiment=config.embodiment, name=name, adapted=adapted,
             replace=replace, workers=workers, reporter=reporter,
