@@ -30,10 +30,21 @@ def plan_text(plan: Mapping[str, Any], comment: str = "", sections: Mapping[int,
 
 
 def entry_lines(entry: Mapping[str, Any]) -> list[str]:
-    """Write an entry; of a list of short ones, each on a line."""
+    """Write an entry; of a list of entries, each on a line, or on several with its longest list last."""
     if "entries" in entry:
-        return ["[[site]]", "entries = [", *(f"  {_inline(one)}," for one in entry["entries"]), "]"]
+        lines = [line for one in entry["entries"] for line in _listed(one)]
+        return ["[[site]]", "entries = [", *lines, "]"]
     return ["[[site]]", *(line for key, value in entry.items() for line in _pair(key, value))]
+
+
+def _listed(entry: Mapping[str, Any]) -> list[str]:
+    if len(_inline(entry)) + 3 > _WIDTH:
+        lists = {key: len(_inline(value)) for key, value in entry.items() if isinstance(value, list | tuple)}
+        last = max(lists, key=lambda key: lists[key], default=None)
+        order = sorted(entry, key=lambda key: key == last)
+        entry = {key: entry[key] for key in order}
+    *lines, end = _wrapped("", entry, "  ")
+    return [*lines, f"{end},"]
 
 
 _TABLES = ("palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "placing", "ground")
