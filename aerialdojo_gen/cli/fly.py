@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import typer
@@ -46,6 +47,7 @@ def fly(
     renderer: RendererName = "auto",
     tell: Tell = None,
     out: Out = None,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete the run's earlier flights.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     pipeline: PipelineFile = None,
@@ -70,6 +72,5 @@ def fly(
         renderer=renderer,
         tell=tuple(tell or ()),
     )
-    serve_session(
-        data, evaluation, out=out, port=port, browser=browser, say=lambda line: print(line, flush=True)
-    )  # fmt: skip
+    say = partial(print, flush=True)
+    serve_session(data, evaluation, out=out, restart=restart, port=port, browser=browser, say=say)

@@ -16,7 +16,7 @@ from support.browser import chromium, errors, until
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import Sensors
-from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
 from aerialdojo_gen.dataset.episode import Episode
@@ -137,6 +137,10 @@ def test_what_is_refused_what_collides_and_how_deep_it_is(smoke, tmp_path):
             state = fly(client, state, [UP_2])
             n -= 1
             assert (state["remaining_actions"], state["last"]) == (n, UP_2)
+        # The sky is out of range, the ground is not: x runs along the picture's width.
+        above, below = (client.get(f"/api/depth/front/at?x=0.99&y={y}").json()["depth_m"] for y in (0.01, 0.99))
+        assert above is None
+        assert 0 < below < 40
         state = fly(client, state, [STOP])
         assert (state["result"]["termination"], state["result"]["success"]) == ("stop", False)
     with flying(smoke, tmp_path / "wall", one) as (client, state):
@@ -185,6 +189,8 @@ def test_another_selection_or_a_second_pilot_of_a_run_is_refused(smoke, tmp_path
         fly(client, post(client, "agree", state), [0])
     with pytest.raises(UsageError, match="was begun with limit = 2, not 3"):
         flying(smoke, tmp_path, Selection(modalities=("semantic",), limit=3)).__enter__()
+    with Session(smoke, evaluation(), tmp_path).running(restart=True):
+        assert runs(tmp_path) == []
     for name in ("Ann", "a b", "../x", "", "ä", "a" * 41, "-a"):
         with pytest.raises(UsageError, match="small letters"):
             agent_name(name)

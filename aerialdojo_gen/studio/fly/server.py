@@ -41,6 +41,7 @@ def serve_session(
     evaluation: Evaluation,
     *,
     out: Where | None,
+    restart: bool,
     port: int,
     browser: bool,
     say: Callable[[str], None],
@@ -48,7 +49,7 @@ def serve_session(
     """Serve the page until Ctrl-C, and say what is in the tables then."""
     session = Session(data, evaluation, out)
     listener = open_socket(port)
-    with session.running():
+    with session.running(restart):
         say(f"flying as {evaluation.agent}: {url_of(listener)}  (Ctrl-C ends it; finished flights are kept)")
         serve(fly_app(session), listener, browser)
     finished, successes = session.counts()

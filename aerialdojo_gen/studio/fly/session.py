@@ -127,9 +127,11 @@ class Session(AgentBase):
         return chosen
 
     @contextmanager
-    def running(self) -> Iterator[None]:
+    def running(self, restart: bool = False) -> Iterator[None]:
         """Hold the run, and fly in a thread of its own until the block ends: a renderer belongs to its thread."""
         with self._folder.lock():
+            if restart:
+                self._run.drop()
             self._run.check_settings()
             self._run.flush_journals()
             thread = threading.Thread(target=self._loop, name="flight")
@@ -150,7 +152,10 @@ class Session(AgentBase):
         except Exception as error:
             self.error = error
             known = isinstance(error, AerialDojoError)
-            self._show("failed", error=str(error) if known else "an unexpected error; the terminal shows it")
+            self._show(
+                "failed",
+                error=str(error) if known else "an unexpected error: end the command, and the terminal shows it",
+            )
         finally:
             self._flight.close()
 

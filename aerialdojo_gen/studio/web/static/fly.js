@@ -35,11 +35,13 @@ async function send(url, more = {}) {
   if (sending) return;
   sending = true;
   enable();
+  const slow = setTimeout(() => busy.show("Getting ready …"), POLL_MS);
   try {
     await show(await ask(url, { version: state.version, ...more }));
   } catch (error) {
     ended(error);
   }
+  clearTimeout(slow);
   sending = false;
   enable();
 }
@@ -53,6 +55,7 @@ function act(action) {
 
 function ended(error) {
   const gone = error instanceof TypeError;
+  busy.hide();
   cover(gone ? "The command has ended" : "The flight cannot go on", [gone ? "Start it again; finished flights are kept." : String(error.message)], "", "bad");
 }
 
@@ -90,7 +93,7 @@ function goal() {
   if (g.has_image) {
     $("goal-image").src = `api/pictures/goal?task=${state.flown}`;
     $("goal-image").alt = `The goal: ${g.target_name}`;
-    $("goal-from").textContent = g.image_distance_m ? `Taken from ${g.image_distance_m} m behind the goal viewpoint.`
+    $("goal-from").textContent = g.image_distance_m ? `Taken from ${number(g.image_distance_m, 2)} m behind the goal viewpoint.`
       : g.image_distance_m === 0 ? "Taken from the goal viewpoint." : "";
   }
   $("rule").textContent = `Stop within ${g.success_radius_m} m of the goal viewpoint, about 1 m in front of the target. A collision ends the flight.`;
