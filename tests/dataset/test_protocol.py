@@ -7,8 +7,10 @@ import pyarrow as pa
 import pytest
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.dataset.protocol import SAMPLE, draw_sample, read_sample, sample_shortfall
+from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import FAMILIES, TASKS
 
@@ -79,11 +81,16 @@ def test_two_maps_a_family_that_have_enough_test_tasks_and_fifty_tasks_of_each(t
     assert {scene: own for scene, own in again.items() if scene != "D_Flood_0"} == sample.tasks
 
 
-def test_eight_full_maps_lack_nothing(tmp_path):
-    for scene in ("U_A_0", "U_A_1", "N_A_0", "N_A_1", "I_A_0", "I_A_1", "D_A_0", "D_A_1"):
-        write_tasks(tmp_path, scene, {"base": 25, "standard": 25})
+def test_the_papers_scenes_have_the_whole_sample(project, tmp_path):
+    for scene, paper in inventory().items():
+        trains = train_quotas(scene, inventory(), splits())
+        # More than are drawn change nothing.
+        write_tasks(tmp_path, scene, {s: min(26, paper.tasks[s] - trains[s]) for s in ("base", "standard")})
     assert sample_shortfall(tmp_path) == ""
-    assert len(read_sample(tmp_path).ids()) == 800
+    sample = read_sample(tmp_path)
+    assert len(sample.ids()) == 800
+    page = (project / "docs" / "evaluate.md").read_text()
+    assert all(scene in page for scene in sample.tasks)
 
 
 def test_the_sample_is_narrowed_and_nothing_else_is_flown(smoke):
