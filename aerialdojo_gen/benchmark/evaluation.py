@@ -41,6 +41,11 @@ class Evaluation:
         """Check the names of hints."""
         check_tell(self.tell)
 
+    @property
+    def label(self) -> str:
+        """What progress is shown under."""
+        return f"{self.agent} ({self.run})"
+
     def identity(self) -> dict[str, str]:
         """Columns of `episodes` that identify the run, its agent and its hints."""
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)

@@ -84,7 +84,7 @@ def evaluate(
             if run.no_viewpoints_message and run.goals_known:
                 reporter.line(no_viewpoints_message(run.no_viewpoints_message, len(rows["scene"].unique())))
         budget = BudgetTracker(limits, *run.spent())
-        with reporter.bar(f"{evaluation.agent} ({evaluation.run})", todo.num_rows, "episodes") as bar:
+        with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
             def tell(finished: Finished) -> None:
                 budget.add(finished)

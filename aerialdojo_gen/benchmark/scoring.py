@@ -94,6 +94,11 @@ class _Replay(Evaluation):
         """Columns of `episodes` that identify the submitted run."""
         return self.named
 
+    @property
+    def label(self) -> str:
+        """What progress is shown under."""
+        return f"score {self.run}"
+
 
 def score(
     data: Where,
@@ -173,7 +178,7 @@ def _check_folder(folder: Path, name: str, tasks: dict[str, str]) -> None:
         if differing and other.name != name:
             raise UsageError(
                 f"{folder} has {other.name!r}, scored on other {differing[0]} tasks: choose the same tasks by "
-                "--split, --modality, --scene and --limit, or another --into"
+                "the options of evaluate, or another --into"
             )
 
 
@@ -190,7 +195,7 @@ def _check_release(file: Path, submission: Submission, root: DataRoot, rows: pa.
     said = described(submission.run.selection)
     check_tasks(
         rows["task_id"].to_pylist(), submission.episodes.task_id, f"{file} is refused: it",
-        f"it says that it flew {said}, and is scored on {described(selection)}; ids differ between releases",
+        f"it says that it flew {said}, and is scored on {described(selection)}",
     )  # fmt: skip
     for scene, own in scenes.items():
         if submission.scenes.get(scene) != own:

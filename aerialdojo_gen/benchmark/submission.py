@@ -234,11 +234,12 @@ def read_submission(file: Path) -> Submission:
 
 def check_tasks(wanted: Sequence[str], there: Sequence[str], what: str, mend: str) -> None:
     """Hold tasks against those that are to be there."""
-    for ids, has in ((set(there) - set(wanted), "has {} tasks beyond"), (set(wanted) - set(there), "lacks {} of")):
+    lacking, strange = set(wanted) - set(there), set(there) - set(wanted)
+    for ids, fault in ((strange, "has {} tasks of another selection or release beside"), (lacking, "lacks {} of")):
         if ids:
-            fault = has.format(f"{len(ids):,}")
+            found = fault.format(f"{len(ids):,}")
             raise SubmissionRefused(
-                f"{what} {fault} the {len(wanted):,} tasks, such as {brief(min(ids), 60)}: {mend}"
+                f"{what} {found} the {len(wanted):,} tasks, such as {brief(min(ids), 60)}: {mend}"
             )
 
 
