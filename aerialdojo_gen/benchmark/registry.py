@@ -189,7 +189,8 @@ def sample_notes(request: ReportRequest, runs: Sequence[Run]) -> list[str]:
     if request.sample is None:
         return []
     maps = sorted({scene for run in runs for scene in run.episodes.scene.tolist()})
-    notes = [f"Tasks of the paper's protocol alone; ± is the sample standard deviation over {', '.join(maps)}."]
+    spread = "; ± is the sample standard deviation over these maps" if len(maps) > 1 else ""
+    notes = [f"Tasks of the paper's protocol alone, on {', '.join(maps)}{spread}."]
     for run in runs:
         settings, flown = set(run.episodes.setting.tolist()), len(run.episodes)
         whole = sum(len(own.get(setting, ())) for own in request.sample.tasks.values() for setting in settings)

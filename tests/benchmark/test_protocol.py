@@ -49,7 +49,7 @@ def test_the_sample_is_flown_and_reported_alone(smoke, flown):
 def test_the_tables_say_what_was_flown_of_the_sample(smoke, flown):
     shown = told("report", "constant", "--protocol", "paper", "--data", smoke, "--log", flown)
     words = " ".join(shown.output.split())
-    assert "± is the sample standard deviation over U_Courtyard_0, U_Courtyard_1." in words
+    assert "protocol alone, on U_Courtyard_0, U_Courtyard_1; ± is the sample standard deviation over these" in words
     assert "of the sample's" not in shown.output
     refused = told("report", "random", "--protocol", "paper", "--data", smoke, "--log", flown)
     assert refused.exit_code == 1

@@ -143,8 +143,8 @@ def test_the_card_is_the_same_whenever_it_is_written(smoke, tmp_path):
 
 
 def task(k, setting, modality):
-    told = {"description": "It is red.", "reference_image_id": None}
-    shown = {"description": None, "reference_image_id": "ref_0"}
+    told = {"description": "It is red.", "reference_image_id": None, "image_distance_m": None}
+    shown = {"description": None, "reference_image_id": "ref_0", "image_distance_m": 4.5}
     return {
         "task_id": f"U_Test_0-{k:04}-{modality[0]}", "nav_id": f"U_Test_0-{k:04}", "scene": "U_Test_0",
         "family": "Urban", "scene_type": "Test", "partition": "ID", "subset": "train", "setting": setting,

@@ -41,8 +41,8 @@ def test_a_picture_that_says_what_is_not_so(planted, values, found_by):
     keys = change(planted, OBJECTS, row, ["object_id"], **values(row))
     found = check(planted)
     assert found.pop(found_by) == keys
-    # The anchor says how far its picture steps back, too.
-    assert set(found) <= {"anchor_step"}
+    # The anchor says how far its picture steps back, too, and so do the tasks.
+    assert set(found) <= {"anchor_step", "task_goal"}
 
 
 def test_a_part_that_is_shown_and_told_as_missing(planted):
