@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev torch docs dataset smoke evaluate test test-fast fuzz torture nightly facts lint format gallery bench lock clean
+.PHONY: help env dev torch docs dataset smoke evaluate policy test test-fast fuzz torture nightly facts lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -73,6 +73,14 @@ evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 6
 	@for agent in $(SAMPLE_AGENTS); do \
 	  $(RUN) evaluate --agent $$agent --run tables-$$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
 	@$(RUN) report $(SAMPLE_AGENTS:%=tables-%) --table results --table partition --data $(DATA) --out $(DATA)/report
+
+POLICY := $(DATA)/policies/imitation/policy.safetensors
+policy: .venv/.train  ## train the learned baseline (2 h) and fly the row of it in README: 2,000 tasks of ID test, as many of OOD test
+	@$(RUN) train imitation --data $(DATA) $(RUN_FLAGS)
+	@for split in id_test ood_test; do \
+	  $(RUN) evaluate --agent policy --option weights=$(POLICY) --run imitation-$$split --split $$split --setting base \
+	    --limit 2000 --data $(DATA) $(RUN_FLAGS) || exit 1; done
+	@$(RUN) report imitation-id_test imitation-ood_test --table averages --data $(DATA)
 
 PYTEST_FLAGS ?= -n 2 --dist loadfile
 # A test that never ends is ended; with 30 processes on two cores the fixture `smoke` took 10 min.

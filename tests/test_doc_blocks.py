@@ -34,7 +34,7 @@ NOT_RUN = {
         "takes minutes to hours",
     r"make smoke": "is what made the data that all this runs on",
     r"(\S*/)?(uv )?pip install .*": "installs packages",
-    r"train .*|evaluate --agent policy .*|report small .*|tensorboard .*": "needs the "
+    r"train .*|evaluate --agent policy .*|report (small|ood-before) .*|tensorboard .*": "needs the "
     "extra train: tests/learning/test_training.py does",
     r"(annotate|view|fly) .*|build-scenes --watch .*": "serves until Ctrl-C: "
     "tests/studio/test_annotate_tool_browser.py, tests/studio/test_view_page.py, tests/studio/test_plan_page.py, "

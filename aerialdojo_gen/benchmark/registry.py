@@ -16,11 +16,11 @@ from aerialdojo_gen.benchmark.counts import CountSpec, conduct_cells, count_tabl
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
 from aerialdojo_gen.benchmark.metrics import METRICS, at_radius
 from aerialdojo_gen.benchmark.outcome_table import Cut
-from aerialdojo_gen.benchmark.runs import GROUP_OF, UPPER_BOUND, Run
+from aerialdojo_gen.benchmark.runs import ADAPTED, GROUP_OF, UPPER_BOUND, Run
 from aerialdojo_gen.benchmark.tables import Cell, ReportRequest, Row, TableSpec, make_table, profile_head
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
-PARTITIONS = ("ID", "OOD")
+PARTITIONS = ("ID", "OOD", ADAPTED)
 MODALITIES = ("semantic", "image")
 NAMES_OF = {
     "base": "Base", "standard": "Standard", "long_horizon": "Long-Horizon", "semantic": "Semantic", "image": "Image",
@@ -73,13 +73,16 @@ def _cells(parts: Mapping[str, Cut], measures: Sequence[str]) -> list[Cell]:
 
 
 def _by(column: str, heads: Sequence[str] = (), *, gap: str = "") -> Callable[[ReportRequest], list[Cell]]:
-    """Make columns a value of a column; and, of two values, the differences of their rates."""
+    """Make columns a value of a column; and the differences of the rates of its first two values."""
     values = _ORDER[column]
     named = heads or [NAMES_OF.get(value, value) for value in values]
     cuts = [Cut(where=((column, value),)) for value in values]
 
     def columns(request: ReportRequest) -> list[Cell]:
-        cells = _cells(dict(zip(named, cuts, strict=True)), request.shown())
+        parts = dict(zip(named, cuts, strict=True))
+        if ADAPTED not in request.table.values("partition", Cut()):
+            parts.pop(ADAPTED, None)
+        cells = _cells(parts, request.shown())
         rates = {"sr": "SR", "osr": "OSR"} if gap else {}
         return cells + [Cell(gap, name, cuts[1], head, (name, cuts[0])) for name, head in rates.items()]
 
@@ -154,6 +157,15 @@ def _radius_notes(request: ReportRequest) -> list[str]:
     return notes
 
 
+def _adapted_notes(runs: Sequence[Run]) -> list[str]:
+    """Name the runs whose agents were trained on OOD scenes."""
+    scenes = {run.label: len(set(run.episodes.scene[run.episodes.partition == ADAPTED])) for run in runs}
+    said = [f"{label}, {n} scene{'s' * (n > 1)}" for label, n in scenes.items() if n]
+    return (
+        [f"{ADAPTED}: OOD scenes whose training tasks the agent was trained on: {'; '.join(said)}."] if said else []
+    )
+
+
 def caveats(runs: Sequence[Run]) -> list[str]:
     """Notes on what a comparison of runs lacks: families, episodes, SR-view, common tasks."""
     lacking: dict[tuple[str, ...], list[str]] = {}
@@ -179,6 +191,7 @@ def caveats(runs: Sequence[Run]) -> list[str]:
         )
     if told := [f"{run.label} ({run.told})" for run in runs if run.told]:
         notes.append(f"Told more than the goal: {', '.join(told)}.")
+    notes += _adapted_notes(runs)
     if len({frozenset(run.table["task_id"].to_pylist()) for run in runs}) > 1:
         notes.append("The runs flew different tasks: their scores are no comparison of agents.")
     return notes
@@ -270,6 +283,7 @@ _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTa
     "results": result_tables,
     "partition": TableSpec(
         "ID and OOD scenes", _setting_rows, _by("partition", gap="OOD − ID, points"),
+        notes=lambda r: _adapted_notes(r.runs),
     ),
     "family": TableSpec("By family", run_rows, _by("family")),
     "averages": TableSpec("Two averages", run_rows, _by_average, notes=lambda _: [

@@ -12,8 +12,9 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
 from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
@@ -60,6 +61,9 @@ def _nearest_on_segment(way: Floats, begin_m: Floats, end_m: Floats) -> Floats:
 # Agents that are not compared: the oracle, and the baselines that ignore observations.
 UPPER_BOUND, BASELINES = "upper bound", "floors"
 GROUP_OF = {"oracle": UPPER_BOUND, "stop": BASELINES, "constant": BASELINES, "random": BASELINES}
+
+# The partition of episodes in OOD scenes whose training tasks the agent was trained on.
+ADAPTED = "OOD adapted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,13 +126,26 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
             agent,
             table["agent_options"][0].as_py(),
             table,
-            episodes_of(table),
+            _mark_adapted(episodes_of(table), table["agent_options"][0].as_py()),
             read(name, "failures").num_rows,
             root,
             told=more,
         )
         for (name, table), agent, more, call in zip(tables.items(), agents, told, called, strict=True)
     ]
+
+
+def _mark_adapted(episodes: Episodes, options: str) -> Episodes:
+    """Tell OOD scenes that the agent was trained on, by `trained_on` of its logged options, from other OOD scenes."""
+    try:
+        given = loads_json(options)
+    except Malformed:
+        return episodes
+    scenes = given.get("trained_on") if isinstance(given, dict) else None
+    if not isinstance(scenes, list):
+        return episodes
+    known = np.isin(episodes.scene, [scene for scene in scenes if isinstance(scene, str)])
+    return replace(episodes, partition=np.where((episodes.partition == "OOD") & known, ADAPTED, episodes.partition))
 
 
 _BASELINE_AGENTS = tuple(agent for agent, group in GROUP_OF.items() if group == BASELINES)

@@ -313,6 +313,15 @@ def train(
             "--cache", metavar="DIR", help="Cache for rendered images.  (default: policies/cache in --data)"
         ),
     ] = None,
+    init: Annotated[
+        Path | None,
+        typer.Option(
+            "--init",
+            metavar="WEIGHTS",
+            help="Begin with the weights of another training, to adapt them to the "
+            "recipe's scenes.  (default: random weights)",
+        ),
+    ] = None,
     device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
     renderer: RendererName = "auto",
     restart: Annotated[bool, typer.Option("--restart", help="Delete an earlier training of this name.")] = False,
@@ -327,8 +336,8 @@ def train(
     chosen = load_recipe(recipe)
     try:
         run_training(
-            data, chosen.reduced() if small else chosen, out=out, cache=cache, device=device, workers=workers,
-            renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
+            data, chosen.reduced() if small else chosen, out=out, cache=cache, init=init, device=device,
+            workers=workers, renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
         )  # fmt: skip
     except KeyboardInterrupt:
         print("interrupted: the same command continues from the last checkpoint", file=sys.stderr)

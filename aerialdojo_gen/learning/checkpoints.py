@@ -31,13 +31,15 @@ class PolicyInfo:
     release: str  # Fingerprint of the release that it learned from
     actions: str  # Fingerprint of the action set
     named: tuple[str, ...] = ()  # Words that pictures are searched for
+    scenes: tuple[str, ...] = ()  # Scenes whose tasks it was trained on, in the order of their numbers
+    init: str = ""  # SHA-256 of the weights that its training began with; empty for random ones
 
     def to_json(self) -> str:
         """Return it as JSON."""
         s, v = self.sensors, self.vocabulary
         return json.dumps({
             "shape": self.shape, "words": v.words, "length": v.length, "release": self.release,
-            "actions": self.actions, "named": self.named,
+            "actions": self.actions, "named": self.named, "scenes": self.scenes, "init": self.init,
             "sensors": [s.views, s.width, s.height, s.fov_deg, s.max_depth_m],
         })  # fmt: skip
 
@@ -66,9 +68,10 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
         views, width, height, fov_deg, max_depth_m = given["sensors"]
         sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
         words = Vocabulary(given["words"], given["length"])
-        # Weights of an earlier version search for nothing.
-        named = tuple(map(str, given.get("named", ())))
-        about = PolicyInfo(given["shape"], words, sensors, given["release"], given["actions"], named)
+        # Weights of an earlier version search for nothing, or do not say where they were trained.
+        named, scenes = (tuple(map(str, given.get(key, ()))) for key in ("named", "scenes"))
+        init = str(given.get("init", ""))
+        about = PolicyInfo(given["shape"], words, sensors, given["release"], given["actions"], named, scenes, init)
     except AerialDojoError as error:
         raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
     except Exception as error:  # safetensors has an error of its own, and a header may say anything

@@ -49,6 +49,13 @@ class Policy(AgentBase):
         """Return the weights' digest, for the instances that fly and for the log."""
         return {"sha256": self._sha256}
 
+    def used_options(self) -> dict[str, Any]:
+        """Return the options for the log, and what the weights tell of their training."""
+        return {
+            "weights": self._weights, "sha256": self._sha256, "any_release": self._any_release,
+            "device": self._device, "trained_on": list(self._about.scenes), "init": self._about.init,
+        }  # fmt: skip
+
     def suits(self, release: str) -> None:
         """Refuse a release of other scenes."""
         if release != self._about.release and not self._any_release:
@@ -122,6 +129,8 @@ def _check_shapes(about: checkpoints.PolicyInfo, shape: Any) -> None:
         )
     if len(about.named) != shape.named:
         raise ValueError(f"{len(about.named)} words to search for, for weights of {shape.named}")
+    if about.scenes and len(about.scenes) != shape.scenes:
+        raise ValueError(f"{len(about.scenes)} scenes, for weights of {shape.scenes}")
     if vocabulary.length > _LONGEST:
         raise ValueError(f"texts of {vocabulary.length} tokens, {_LONGEST} at most")
 

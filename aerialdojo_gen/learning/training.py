@@ -22,6 +22,7 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
+from aerialdojo_gen.learning.adaptation import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
@@ -59,6 +60,7 @@ def train(
     *,
     out: str | Path | None = None,
     cache: str | Path | None = None,
+    init: str | Path | None = None,
     device: str = "auto",
     workers: int | None = None,
     renderer: str = "auto",
@@ -79,6 +81,9 @@ def train(
         Folder of the weights and checkpoints; ``policies/NAME`` in the data directory where absent.
     cache : str or Path, optional
         Folder of what was drawn; ``policies/cache`` in the data directory where absent. Other recipes use it too.
+    init : str or Path, optional
+        Weights of another training to begin with, such as those of the ID scenes; random ones where absent. Their
+        words and scenes keep their numbers, and new ones are added.
     device : str
         ``cpu``, ``cuda``, or ``auto`` for a GPU where there is one.
     workers : int, optional
@@ -98,7 +103,7 @@ def train(
     MissingPackage
         There is no PyTorch.
     UsageError
-        No task fits, or the folder has another training's checkpoint.
+        No task fits, the folder has another training's checkpoint, or the initial weights do not fit the recipe.
     StoreError
         There is no release, or a scene's mesh is missing.
     """
@@ -119,40 +124,48 @@ def train(
     drawn = Path(cache) if cache is not None else base / "policies" / "cache"
     make_folder(folder)
     with open_root(folder).lock():
-        own = _Training(root, recipe, folder, drawn, device, workers, renderer, reporter or Reporter(True))
+        given = None if init is None else read_initial_weights(init)
+        own = _Training(root, recipe, folder, drawn, given, device, workers, renderer, reporter or Reporter(True))
         return own.run(restart)
 
 
 class _Training:
     def __init__(
-        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, device: str, workers: int | None,
-        renderer: str, reporter: Reporter,
+        self, root: DataRoot, recipe: Recipe, folder: Path, cache: Path, init: InitialWeights | None, device: str,
+        workers: int | None, renderer: str, reporter: Reporter,
     ) -> None:  # fmt: skip
         from aerialdojo_gen.learning.imitation import Learner
         from aerialdojo_gen.learning.network import Network, Shape
 
         torch = torch_package("train")
         self._root, self._recipe, self._folder, self._cache = root, recipe, folder, cache
-        self._workers, self._renderer, self._reporter = workers, renderer, reporter
+        self._init, self._workers, self._renderer, self._reporter = init, workers, renderer, reporter
         d, m = recipe.data, recipe.model
         self._sensors = Sensors(d.views, bool(d.views), bool(d.views), d.size_px, d.size_px)
         self._selection = (Selection((d.split,)).splits, d.settings)
         self._index, named = self._read_index()
-        self._vocabulary = Vocabulary.of(self._index.goal_texts)
+        vocabulary, scenes, words = Vocabulary.of(self._index.goal_texts), self._index.scenes, named
+        if init is not None:
+            init.check_fit(self._sensors, m)
+            vocabulary = init.vocabulary(vocabulary)
+            scenes, words = joined(init.about.scenes, scenes), joined(init.about.named, named)
         shape = Shape(
-            words=len(self._vocabulary), views=len(d.views), size_px=d.size_px, scenes=len(self._index.scenes),
-            named=len(named), **dict(m),
+            words=len(vocabulary), views=len(d.views), size_px=d.size_px, scenes=len(scenes), named=len(words),
+            **dict(m),
         )  # fmt: skip
         self._about = checkpoints.PolicyInfo(
-            asdict(shape), self._vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(),
-            named,
+            asdict(shape), vocabulary, self._sensors, release_fingerprint(root), actions_fingerprint(), words, scenes,
+            "" if init is None else init.sha256,
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
         if device == "cpu":
             torch.use_deterministic_algorithms(True)
             # Not needed, as no tensor is read before it is written, and costs a tenth of the time.
             torch.utils.deterministic.fill_uninitialized_memory = False
-        self._learner = Learner(Network(shape), recipe, device)
+        network = Network(shape)
+        if init is not None:
+            init.copy_to(network)
+        self._learner = Learner(network, recipe, device)
         # The patch classifier is trained before the references.
         self._first = -1 if named else 0
         self._learner.begin(self._first)
@@ -177,6 +190,8 @@ class _Training:
             f"{int(index.steps.sum()):,} steps; {self._about.shape['words']:,} words; "
             f"{sum(p.numel() for p in learner.network.parameters()):,} weights on {learner.device}"
         )
+        if self._init is not None:
+            report.line(f"train {recipe.name}: begins with {self._init.path}, {self._known_to(self._init)}")
         self._tensorboard = _tensorboard(self._folder / "tensorboard")
         parts = self._collect(index, None, "drawing references")
         self._exploration = self._explore()
@@ -196,6 +211,15 @@ class _Training:
         checkpoints.write(last, tensors, about, state)
         report.line(f"train {recipe.name}: weights in {last}")
         return TrainingResult(self._weights(0), last)
+
+    def _known_to(self, init: InitialWeights) -> str:
+        """Say what the initial weights know, and what they do not."""
+        about, known = self._about, init.about
+        words, scenes = len(known.vocabulary), len(known.scenes)
+        return (
+            f"scenes known: {scenes:,}, new: {len(about.scenes) - scenes:,}; "
+            f"words known: {words:,}, new: {len(about.vocabulary) - words:,}"
+        )
 
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
         """Read the training trajectories, and the words that images will be searched for."""
@@ -242,7 +266,10 @@ class _Training:
         like = self._parts(self._index, None)[0]
         parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
         with make_executor("local", self._workers) as executor:
-            return Pool(collect(parts, executor, self._reporter, "rendering extra views"), scenes, self._vocabulary)
+            return Pool(
+                collect(parts, executor, self._reporter, "rendering extra views"), self._about.scenes,
+                self._about.vocabulary,
+            )  # fmt: skip
 
     def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
@@ -257,7 +284,7 @@ class _Training:
             train_patch_classifier(self._learner, self._exploration, self._about.named, log)
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
-        pool = Pool(parts, self._index.scenes, self._vocabulary)
+        pool = Pool(parts, self._about.scenes, self._about.vocabulary)
         log = self._log(f"round {phase}" if phase else "imitation", epochs)
         self._learner.learn(pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, log)
 
@@ -319,12 +346,12 @@ class _Training:
         recipe["train"].pop("checkpoint_s")
         own = {"recipe": hashlib.sha256(json.dumps(recipe, sort_keys=True).encode()).hexdigest(),
                "release": self._about.release, "trajectories": self._index.digest,
-               "action set": self._about.actions}  # fmt: skip
+               "action set": self._about.actions, "set of initial weights": self._about.init or "none"}  # fmt: skip
         path = self._folder / _SETTINGS
         if path.is_file():
             before = read_json(path, UsageError)
             for name, value in own.items():
-                known = str(before.get(name)) if isinstance(before, dict) else "none"
+                known = str(before.get(name, "none")) if isinstance(before, dict) else "none"
                 if known != value:
                     raise UsageError(
                         f"{self._folder} was begun with another {name}: its fingerprint is {known[:16]}, and that of "
