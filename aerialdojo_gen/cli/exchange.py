@@ -219,15 +219,23 @@ def push_to_hub(
     private: Annotated[bool, typer.Option("--private", help="If the dataset is new, make it private.")] = False,
     revision: Annotated[str | None, typer.Option("--revision", help="Branch to write to.  (default: main)")] = None,
     meshes: Annotated[bool, typer.Option("--meshes", help="Upload scene meshes too; evaluate needs them.")] = False,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy", metavar="NAME", help="Upload the weights of this training too, such as imitation; repeatable."
+        ),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Upload the release to the Hugging Face Hub, with its card as README; the token is HF_TOKEN."""
     from aerialdojo_gen.exchange import hub
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    print(
-        hub.push_to_hub(repo, data, private=private, revision=revision, meshes=meshes, reporter=Reporter(quiet=quiet))
-    )
+    moved = hub.push_to_hub(
+        repo, data, private=private, revision=revision, meshes=meshes, policies=policy or (),
+        reporter=Reporter(quiet=quiet),
+    )  # fmt: skip
+    print(moved)
 
 
 @app.command("pull")

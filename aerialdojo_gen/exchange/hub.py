@@ -65,6 +65,7 @@ def push_to_hub(
     private: bool = False,
     revision: str | None = None,
     meshes: bool = False,
+    policies: Sequence[str] = (),
     reporter: Reporter | None = None,
 ) -> Moved:
     """Send a release to the Hub as a data set; the twin of ``aerialdojo-gen push-to-hub``.
@@ -84,6 +85,8 @@ def push_to_hub(
         Branch to write to; the main one where absent.
     meshes : bool
         Send the scenes' meshes too: `evaluate`, `view` and the whole of `validate` want them.
+    policies : sequence of str
+        Names of trainings whose last weights are sent too, such as ``imitation``.
     reporter : Reporter, optional
         Is told what is done.
 
@@ -109,6 +112,7 @@ def push_to_hub(
     files = {name: root.path / FOLDER / name for name in own if (root.path / FOLDER / name).is_file()}
     if meshes:
         files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
+    files |= {_policy_file(name): _weights(root, name) for name in policies}
     size = sum(path.stat().st_size for path in files.values())
     reporter.line(f"push-to-hub: {len(files):,} files, {size / 1e6:,.1f} MB to {hub.address}/datasets/{repo}")
     with hub.explain_errors("make or write to"):
@@ -140,9 +144,9 @@ def pull_release(
 ) -> Moved:
     """Fetch a release from the Hub; the twin of ``aerialdojo-gen pull``.
 
-    Only files that a release has are fetched, by the names that they have here. What was fetched stays after a
-    failure, and the same call goes on from there. Each file is held against the digest that the server has of it, and
-    all parts against their own; then the release appears whole.
+    Only files that a release has are fetched, by the names that they have here, and the weights of policies. What was
+    fetched stays after a failure, and the same call goes on from there. Each file is held against the digest that the
+    server has of it, and all parts against their own; then the release appears whole.
 
     Parameters
     ----------
@@ -155,7 +159,7 @@ def pull_release(
     meshes : bool
         Fetch the meshes too, where the data set has them.
     replace : bool
-        Whether a release, and meshes, that are there may be lost.
+        Whether a release, meshes and weights that are there may be lost.
     reporter : Reporter, optional
         Shows progress.
 
@@ -163,7 +167,7 @@ def pull_release(
     ------
     UsageError
         There is no such data set or revision, it holds no release, or the data directory has another one, or other
-        meshes of its scenes.
+        meshes of its scenes, or other weights.
     StoreError
         What came is damaged, or the disk is full.
     AerialDojoError
@@ -190,7 +194,7 @@ def pull_release(
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     if not replace:
-        _keep_meshes(root, {name: sibling for name, sibling in wanted.items() if _is_mesh(name)}, repo)
+        _keep_own(root, {name: sibling for name, sibling in wanted.items() if _is_beside(name)}, repo)
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
@@ -216,11 +220,25 @@ def scene_of(name: str) -> str:
 
 
 def _is_ours(name: str) -> bool:
-    return name in _BESIDE or bool(scene_of(name))
+    return name in _BESIDE or _is_policy(name) or bool(scene_of(name))
 
 
 def _is_mesh(name: str) -> bool:
     return name.startswith("meshes/")
+
+
+def _policy_file(name: str) -> str:
+    return f"policies/{name}/policy.safetensors"
+
+
+def _is_policy(name: str) -> bool:
+    training = PurePosixPath(name).parent.name
+    return is_plain(training) and name == _policy_file(training)
+
+
+def _is_beside(name: str) -> bool:
+    """Whether a file lies beside the release in a data directory, and not in it."""
+    return _is_mesh(name) or _is_policy(name)
 
 
 def _mesh(root: LocalRoot, scene: str) -> Path:
@@ -230,15 +248,24 @@ def _mesh(root: LocalRoot, scene: str) -> Path:
     return path
 
 
-def _keep_meshes(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
-    """Refuse to take the place of meshes that are others: without a release they may be all that somebody has."""
+def _weights(root: LocalRoot, name: str) -> Path:
+    path = root.path / _policy_file(name)
+    if not is_plain(name) or not path.is_file():
+        raise UsageError(
+            f"there are no weights {path}: --policy takes the name of a training in {root.path / 'policies'}"
+        )
+    return path
+
+
+def _keep_own(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
+    """Refuse to take the place of other meshes or weights: without a release they may be all that somebody has."""
     others = [name for name in sorted(wanted) if (root.path / name).is_file()]
     others = [name for name in others if not _is_as_told(root.path / name, wanted[name])]
     if others:
         more = f" and {len(others) - 1} more" if others[1:] else ""
         raise UsageError(
             f"{root.at(others[0])}{more} would be replaced by {repo}'s: name another folder with --data, or add "
-            "--no-meshes or --replace"
+            f"{'--no-meshes or ' * _is_mesh(others[0])}--replace"
         )
 
 
@@ -281,8 +308,8 @@ def _is_as_told(path: Path, sibling: Any) -> bool:
 
 
 def _place(folder: Path, name: str) -> Path:
-    """Return where a file of a data set lies in a data directory: meshes beside the release."""
-    return folder / name if _is_mesh(name) else folder / FOLDER / name
+    """Return where a file of a data set lies in a data directory: meshes and weights beside the release."""
+    return folder / name if _is_beside(name) else folder / FOLDER / name
 
 
 def _check(root: DataRoot, meshes: Collection[str]) -> None:
@@ -297,13 +324,13 @@ def _check(root: DataRoot, meshes: Collection[str]) -> None:
 
 
 def _settle(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
-    """Give the fetched files their places: the release in one step, the meshes before it."""
-    for name in filter(_is_mesh, names):
+    """Give the fetched files their places: the release in one step, what lies beside it before."""
+    for name in filter(_is_beside, names):
         with root.commit(name) as temporary:
             _place(partial, name).replace(temporary)
     with root.lock(), atomic_folder(root.path / FOLDER) as folder:
         for name in names:
-            if not _is_mesh(name):
+            if not _is_beside(name):
                 make_folder((folder / name).parent)
                 _place(partial, name).replace(folder / name)
     shutil.rmtree(partial, ignore_errors=True)

@@ -93,6 +93,29 @@ def test_a_mesh_of_ones_own_is_not_lost(smoke, hub, call, tmp_path):
     assert files_of(tmp_path / "meshes") == files_of(smoke / "meshes")
 
 
+def test_weights_of_a_policy_travel_with_the_release(smoke, hub, call, tmp_path):
+    data, name = tmp_path / "sent", "policies/imitation/policy.safetensors"
+    shutil.copytree(smoke / "release", data / "release")
+    missing = call("push-to-hub", NAME, "--data", data, "--policy", "imitation")
+    assert has_failed(missing, 2, "there are no weights", name) is True
+    assert (
+        has_failed(call("push-to-hub", NAME, "--data", data, "--policy", "../x"), 2, "there are no weights") is True
+    )
+    (data / name).parent.mkdir(parents=True)
+    (data / name).write_bytes(b"weights")
+    (data / name).with_name("checkpoint.safetensors").write_bytes(b"stays here")
+    assert call("push-to-hub", NAME, "--data", data, "--policy", "imitation")[0] == 0
+    assert hub.repos[NAME].files == {**files_of(data / "release"), name: b"weights"}
+    hub.repos[NAME].files |= dict.fromkeys(("policies/../policy.safetensors", "policies/a/run.safetensors"), b"x")
+    assert call("pull", NAME, "--data", tmp_path / "mine")[0] == 0
+    assert files_of(tmp_path / "mine" / "policies") == {"imitation/policy.safetensors": b"weights"}
+    own = tmp_path / "own" / name
+    own.parent.mkdir(parents=True)
+    own.write_bytes(b"trained here")
+    assert has_failed(call("pull", NAME, "--data", tmp_path / "own"), 2, str(own), "or add --replace") is True
+    assert own.read_bytes() == b"trained here"
+
+
 @pytest.mark.parametrize("address", ["http://hub.example", "http://10.0.0.7:8080/hf", "http://127.0.0.1.example"])
 def test_a_token_goes_to_no_other_machine_unencrypted(hub, call, tmp_path, monkeypatch, address):
     monkeypatch.setenv("HF_ENDPOINT", address)
