@@ -109,6 +109,12 @@ Out = Annotated[
     str | None,
     typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
 ]
+SubmissionFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
+    ),
+]
 PipelineFile = Annotated[
     Path | None,
     typer.Option(

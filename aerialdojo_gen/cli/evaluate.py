@@ -32,6 +32,7 @@ from aerialdojo_gen.cli.common import (
     SelectionSeed,
     Setting,
     Split,
+    SubmissionFile,
     TaskLimit,
     Tell,
     Workers,
@@ -92,12 +93,7 @@ def evaluate(
     renderer: RendererName = "auto",
     tell: Tell = None,
     out: Out = None,
-    submission: Annotated[
-        Path | None,
-        typer.Option(
-            "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
-        ),
-    ] = None,
+    submission: SubmissionFile = None,
     attempts: Annotated[
         int,
         typer.Option(

@@ -19,6 +19,7 @@ from aerialdojo_gen.cli.common import (
     SelectionSeed,
     Setting,
     Split,
+    SubmissionFile,
     TaskLimit,
     Tell,
     merge_scenes,
@@ -47,6 +48,7 @@ def fly(
     renderer: RendererName = "auto",
     tell: Tell = None,
     out: Out = None,
+    submission: SubmissionFile = None,
     restart: Annotated[bool, typer.Option("--restart", help="Delete the run's earlier flights.")] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
@@ -74,3 +76,8 @@ def fly(
     )
     say = partial(print, flush=True)
     serve_session(data, evaluation, out=out, restart=restart, port=port, browser=browser, say=say)
+    if submission is not None:
+        from aerialdojo_gen.benchmark.submission import write_submission
+
+        size = write_submission(data, out or data, evaluation.run, submission)
+        say(f"{submission}: {size:,} bytes")

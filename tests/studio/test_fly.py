@@ -18,6 +18,8 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.scoring import score
+from aerialdojo_gen.benchmark.submission import write_submission
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
@@ -100,6 +102,9 @@ def test_flights_are_logged_as_the_oracles_are_and_no_task_is_offered_twice(smok
         kept = [name for name in own.columns if name not in OWN]
         assert own[kept].equals(oracles[kept])
     assert set(read_run(tmp_path, "human-ann")["agent"].to_pylist()) == {"human:ann"}
+    write_submission(smoke, tmp_path, "human-ann", tmp_path / "ann.json.gz")
+    card = score(smoke, tmp_path / "ann.json.gz", tmp_path / "scored", selection=TWO)
+    assert (card.agent, card.rows[0].mean["sr"]) == ("human:ann", 1.0)
     assert (read_run(tmp_path, "human-ann", "timings").to_pandas().agent_s > 0).all()
 
 
