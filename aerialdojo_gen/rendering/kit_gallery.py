@@ -27,7 +27,7 @@ _FIRST = ("storeys", "bays", "rows", "count", "height_m", "rise_m", "width_m", "
 
 
 @dataclass(frozen=True)
-class _Use:
+class Use:
     """A table of a plan that calls a builder."""
 
     plan: str
@@ -43,14 +43,14 @@ class _Use:
             found = found[key]
         return dict(found)
 
-    def varied(self, key: str, value: Any) -> _Use:
+    def varied(self, key: str, value: Any) -> Use:
         """Change one argument."""
         tables = copy.deepcopy(dict(self.tables))
         found: Any = tables
         for step in self.path:
             found = found[step]
         found[key] = value
-        return _Use(self.plan, tables, self.entry, self.path)
+        return Use(self.plan, tables, self.entry, self.path)
 
 
 def kit_sheets(catalogue: Catalogue, plans: Sequence[Path]) -> Iterator[tuple[str, Image]]:
@@ -67,7 +67,7 @@ def kit_sheets(catalogue: Catalogue, plans: Sequence[Path]) -> Iterator[tuple[st
     tuple of str and (H, W, 3) uint8
         sRGB.
     """
-    uses = _uses(plans)
+    uses = uses_of(plans)
     modules: dict[str, list[str]] = {}
     for name, one in kit().items():
         modules.setdefault(one.function.__module__.rpartition(".")[2], []).append(name)
@@ -81,25 +81,25 @@ def kit_sheets(catalogue: Catalogue, plans: Sequence[Path]) -> Iterator[tuple[st
         yield f"kit-{module.replace('_', '-')}", contact_sheet(pictures, labels, SETTINGS)
 
 
-def _uses(plans: Sequence[Path]) -> dict[str, list[_Use]]:
-    """Find the calls of each builder, at most one a plan and then others."""
-    found: dict[str, list[_Use]] = {}
+def uses_of(plans: Sequence[Path]) -> dict[str, list[Use]]:
+    """Find the calls of each builder in plans, one of every plan first."""
+    found: dict[str, list[Use]] = {}
     for path in plans:
         whole = read_toml(path, AssetError)
         head = {key: value for key, value in whole.items() if key not in ("site", "inventory", "moves", "level")}
         for number, step in enumerate(whole.get("ground", {}).get("steps", ())):
-            found.setdefault(step["make"], []).append(_Use(path.stem, head, "", ("ground", "steps", number)))
+            found.setdefault(step["make"], []).append(Use(path.stem, head, "", ("ground", "steps", number)))
         named: list[dict[str, Any]] = []
         for entry in [one for some in whole.get("site", ()) for one in some.get("entries", [some])]:
             tables = {**head, "site": [*named, entry]}
             for inner in _calls(entry):
-                use = _Use(path.stem, tables, f"site[{len(named)}]", ("site", len(named), *inner))
+                use = Use(path.stem, tables, f"site[{len(named)}]", ("site", len(named), *inner))
                 found.setdefault(use.call["make"], []).append(use)
             named += [entry] if "as" in entry else []
     return {name: sorted(some, key=lambda use: _rank(use, some)) for name, some in found.items()}
 
 
-def _rank(use: _Use, some: Sequence[_Use]) -> int:
+def _rank(use: Use, some: Sequence[Use]) -> int:
     """Number a use among those of its plan."""
     return [other for other in some if other.plan == use.plan].index(use)
 
@@ -115,9 +115,9 @@ def _calls(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str |
             yield from _calls(inner, (*path, key))
 
 
-def _pictures(name: str, uses: Sequence[_Use], catalogue: Catalogue) -> Iterator[tuple[Image, str]]:
+def _pictures(name: str, uses: Sequence[Use], catalogue: Catalogue) -> Iterator[tuple[Image, str]]:
     shown: list[Image] = []
-    for use, label in _settings(name, uses):
+    for use, label in settings_of(name, uses):
         picture = _picture(use, catalogue)
         # What cannot be seen of an argument, such as room that it keeps, is no setting.
         if picture is not None and not any(np.array_equal(picture, other) for other in shown):
@@ -127,7 +127,7 @@ def _pictures(name: str, uses: Sequence[_Use], catalogue: Catalogue) -> Iterator
             return
 
 
-def _settings(name: str, uses: Sequence[_Use]) -> Iterator[tuple[_Use, str]]:
+def settings_of(name: str, uses: Sequence[Use]) -> Iterator[tuple[Use, str]]:
     """Yield uses with different arguments, then variations of the first."""
     seen: list[dict[str, Any]] = []
     for use in uses:
@@ -160,7 +160,7 @@ def _scaled(value: Any, scale: float) -> Any:
     return None
 
 
-def _picture(use: _Use, catalogue: Catalogue) -> Image | None:
+def _picture(use: Use, catalogue: Catalogue) -> Image | None:
     """Build a use by itself; None where it cannot stand alone."""
     entries: dict[str, str] = {}
     try:

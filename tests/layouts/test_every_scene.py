@@ -35,11 +35,11 @@ from aerialdojo_gen.scenes.model import Scene
 
 SCENES = sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
 TYPES = sorted({name.rpartition("_")[0] for name in SCENES})
-# SHA-256 of the meshes of the release, as sha256sum writes them: `make dataset`, then
-# (cd data/meshes && sha256sum *.glb) > tests/layouts/meshes.sha256.
+# SHA-256 of the meshes of the release, by scene.
 RELEASED = {
-    name.removesuffix(".glb"): digest
-    for digest, name in (line.split() for line in Path(__file__).with_name("meshes.sha256").read_text().splitlines())
+    Path(name).stem: digest
+    for digest, name in map(str.split, (ASSETS.parent / "tests/golden/release.sha256").read_text().splitlines())
+    if name.startswith("meshes/")
 }
 # How deep in what bears it a prop's foot may be, metres: boulders lie half in the ground, trees root in slopes, what
 # a flood has moved stands in the water.

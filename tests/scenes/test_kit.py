@@ -1,0 +1,67 @@
+"""The builders of the kit, each by itself: with the arguments of plans, and with others near them."""
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.layout_checks import catalogue, nightly_unless
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.rendering.kit_gallery import settings_of, uses_of
+from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.plans.build import build_tables
+
+ASSETS = Path(__file__).parents[2] / "scene_assets"
+USES = uses_of(sorted(ASSETS.glob("s[cm]*/*_[01].toml")))
+# Builders that only add-map and add-terrain call: tests/imports builds with them.
+OF_PLACES = {
+    "bar_fences", "buildings", "garden_walls", "street_network", "surveyed_heights", "surveyed_surfaces",
+    "water_over_low_ground",
+}  # fmt: skip
+MAX_TRIANGLES = 60_000
+SETTINGS = 8
+
+
+def test_every_builder_is_used():
+    assert set(kit()) - set(USES) <= OF_PLACES
+
+
+def unmatched_edges(parts):
+    """Count the edges of a body that no face borders the other way round."""
+    corners = np.concatenate([part.vertices[part.faces] for part in parts]).astype(np.float64)
+    places, index = np.unique(np.round(corners.reshape(-1, 3), 3), axis=0, return_inverse=True)
+    a, b, c = index.reshape(-1, 3).T
+    there = np.concatenate([[a, b], [b, c], [c, a]], axis=1)
+    there = there[:, there[0] != there[1]]
+    ways = np.sort(there[0] * len(places) + there[1]), np.sort(there[1] * len(places) + there[0])
+    return int((ways[0] != ways[1]).sum())
+
+
+@pytest.mark.parametrize("name", [nightly_unless(k % 8 == 0, name) for k, name in enumerate(sorted(USES))])
+def test_what_a_builder_makes_is_sound_or_refused_in_a_line(name):
+    built = 0
+    for use, label in islice(settings_of(name, USES[name]), SETTINGS):
+        entries: dict[str, str] = {}
+        refusal = ""
+        try:
+            scene = build_tables(use.plan, use.tables, catalogue(), entries)
+        except AssetError as error:
+            refusal = str(error)
+        if refusal:
+            assert use.plan in refusal, label
+            assert "\n" not in refusal, label
+            continue
+        built += 1
+        floor = scene["ground"].bounds[0, 2]
+        for instance in scene.instances:
+            if entries.get(instance.node) != use.entry or instance.category in catalogue():
+                continue
+            assert sum(len(part.faces) for part in instance.parts) <= MAX_TRIANGLES, label
+            assert instance.bounds[0, 2] > floor - 30.0, label
+            assert unmatched_edges(instance.parts) == 0, f"{label}: {instance.node} is open"
+            for part in instance.parts:
+                assert np.isfinite(part.vertices).all(), label
+                assert part.faces.min() >= 0
+                assert part.faces.max() < len(part.vertices)
+    assert built
