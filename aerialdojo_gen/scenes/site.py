@@ -39,7 +39,6 @@ class Site:
         self.folder = folder  # Of the scene's file, and of a table of heights beside it
         self.head = head
         self.catalogue = catalogue
-        self.rng = self.rng_for("layout")
         x, y = head.size_m
         self.extent = rectangle(-x / 2, -y / 2, x / 2, y / 2)
         self.instances: list[Instance] = []
