@@ -83,7 +83,10 @@ def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, t
     (tmp_path / "imitation").write_text('name = "mine"\n')  # a file goes before a name
     assert '"name":"mine"' in read("imitation").stdout
     told = read("imitatoin").stderr
-    assert "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: blind, imitation" in told
+    assert (
+        "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: adapt, adapt-mall, blind, imitation"
+        in told
+    )
 
 
 def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):

@@ -317,7 +317,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         }
         if self._image_shape is not None:
             goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
-            goal["image_distance_m"] = spaces.Box(0.0, np.inf, (1,), np.float32)
+            goal["image_distance_m"] = spaces.Box(0.0, 1000.0, (1,), np.float32)
         if "heading" in self._tell:
             goal |= {"heading": spaces.Discrete(len(DIRECTIONS)), "heading_deg": spaces.Box(0, 359, (1,), np.int32)}
         s = self._sensors

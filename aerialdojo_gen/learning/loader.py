@@ -145,9 +145,10 @@ class Loader:
         try:
             for batch in self._loading:
                 yield batch if self._tensors else _as_arrays(batch)
-        except RuntimeError as error:
-            # torch has no class for it; what a worker raises itself comes as its own class.
-            if "DataLoader worker" not in str(error):
+        except (RuntimeError, ConnectionError, EOFError) as error:
+            # torch has no class for it; what a worker raises itself comes as its own class. A worker that dies while
+            # it hands a batch over breaks the connection.
+            if isinstance(error, RuntimeError) and "DataLoader worker" not in str(error):
                 raise
             self._loading = None
             raise WorkerDied(
