@@ -126,7 +126,7 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
             agent,
             table["agent_options"][0].as_py(),
             table,
-            _mark_adapted(episodes_of(table), table["agent_options"][0].as_py()),
+            mark_adapted(episodes_of(table), table["agent_options"][0].as_py()),
             read(name, "failures").num_rows,
             root,
             told=more,
@@ -135,7 +135,7 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
     ]
 
 
-def _mark_adapted(episodes: Episodes, options: str) -> Episodes:
+def mark_adapted(episodes: Episodes, options: str) -> Episodes:
     """Tell OOD scenes that the agent was trained on, by `trained_on` of its logged options, from other OOD scenes."""
     try:
         given = loads_json(options)

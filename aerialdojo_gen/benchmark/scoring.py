@@ -28,6 +28,7 @@ from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, METRICS, PROFILES, episodes_of, summarize
 from aerialdojo_gen.benchmark.runner import evaluate
+from aerialdojo_gen.benchmark.runs import ADAPTED, mark_adapted
 from aerialdojo_gen.benchmark.submission import (
     Digest,
     Flown,
@@ -139,8 +140,10 @@ def score(
         evaluate(root, replay, out=temporary, workers=workers, reporter=reporter)
         found = logged(open_root(temporary), name)
         _check_replay(file, submission, found)
+        marked = mark_adapted(episodes_of(found.table), submission.run.agent_options)
         card = ScoreCard(
-            name=name, agent=submission.run.agent, told=submission.run.told, adapted=adapted,
+            name=name, agent=submission.run.agent, told=submission.run.told,
+            adapted=adapted or bool((marked.partition == ADAPTED).any()),
             scored=f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d}, by {__version__}",
             code=submission.run.code, tasks=tasks, rows=list(_score_rows(found.table)),
         )  # fmt: skip

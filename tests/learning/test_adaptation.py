@@ -9,6 +9,8 @@ from support.trainings import history
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.benchmark.scoring import score
+from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.store.files import file_digest
@@ -47,6 +49,7 @@ learning_rate = 1e-2
 [dagger]
 rounds = 0
 """
+BOTH = ("before", "after")
 # A rate at which no weight changes that is not 0.
 STILL = {"learning_rate": 1e-30, "epochs": 1}
 
@@ -175,6 +178,9 @@ def test_a_folder_that_was_begun_with_other_weights_is_not_gone_on_with(smoke, c
         UsageError, match=r"another set of initial weights: its .* and that of this one is none; give"
     ):
         train(smoke, still, out=adapted.parent, cache=cache, device="cpu", workers=1)
+    before = file_digest(adapted)
+    train(smoke, still, out=adapted.parent, cache=cache, init=learned, device="cpu", workers=1)
+    assert file_digest(adapted) == before, "the same command has nothing left to learn"
 
 
 def test_a_run_says_where_its_policy_was_trained_and_the_report_tells_ood_from_ood_adapted(
@@ -185,9 +191,10 @@ def test_a_run_says_where_its_policy_was_trained_and_the_report_tells_ood_from_o
         assert done.exit_code == 0, done.output
         return done.stdout
 
-    for name, weights in (("before", learned), ("after", adapted)):
+    for name, weights in zip(BOTH, (learned, adapted), strict=True):
         run("evaluate", "--agent", "policy", "--option", f"weights={weights}", "--run", name, "--split", "test",
-            "--limit", "4", "--out", str(tmp_path), "--workers", "1")  # fmt: skip
+            "--limit", "4", "--out", str(tmp_path), "--submission", str(tmp_path / f"{name}.json.gz"),
+            "--workers", "1")  # fmt: skip
     rows = json.loads(run("report", "before", "after", "--log", str(tmp_path), "--no-floors", "--json"))
     parts = {(row["run"], row["name"]) for row in rows if row["scope"] == "partition"}
     assert parts == {("before", "ID"), ("before", "OOD"), ("after", "ID"), ("after", "OOD adapted")}
@@ -197,3 +204,6 @@ def test_a_run_says_where_its_policy_was_trained_and_the_report_tells_ood_from_o
     assert "OOD adapted: OOD scenes whose training tasks the agent was trained on: policy (after), 1 scene." in page
     alone = run("report", "before", "--log", str(tmp_path), "--no-floors", "--table", "partition")
     assert "adapted" not in alone
+    chosen = Selection(("test",), limit=4)
+    cards = [score(smoke, tmp_path / f"{name}.json.gz", tmp_path / "scored", selection=chosen) for name in BOTH]
+    assert [card.adapted for card in cards] == [False, True]
