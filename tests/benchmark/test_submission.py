@@ -189,6 +189,13 @@ def test_what_does_not_replay_is_refused(smoke, mine, tmp_path, change, message)
     assert not list(tmp_path.glob("scored/*"))
 
 
+def test_half_a_turn_has_two_names(smoke, mine, scored, tmp_path):
+    """A yaw just above -π may come out just below π on another machine."""
+    file = changed(mine, tmp_path / "f", edit("yaw_rad", 5, lambda yaw: yaw - math.copysign(math.tau, yaw)))
+    card = score(smoke, file, tmp_path / "scored", selection=CHOSEN)
+    assert card.rows == next(other.rows for other in scored_runs(scored) if other.name == card.name)
+
+
 def test_actions_that_were_changed_by_hand_are_refused(mine, tmp_path):
     content = json.loads(gzip.decompress(mine.read_bytes()))
     edit("actions", 2, another_turn)(content)
