@@ -54,7 +54,7 @@ async function follow() {
       state = next;
       tell();
       // What cannot be built leaves the last scene in place.
-      if (!state.error) await show();
+      if (!state.error || (!view && state.n_triangles)) await show();
       document.body.dataset.version = state.version;
     }
   } catch (error) {
