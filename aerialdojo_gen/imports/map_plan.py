@@ -189,7 +189,13 @@ def _barriers(barriers: Sequence[Mapping[str, Any]], site: shapely.Polygon) -> l
                 points = [[round(x, 2), round(y, 2)] for x, y in leg.simplify(0.1).coords]
                 groups.setdefault((barrier["kind"], barrier["height_m"]), []).append(points)
     made = {
-        "wall": lambda lines, high: {"make": "garden_walls", "height_m": high, "lines": lines},
+        "wall": lambda lines, high: {
+            "make": "walls",
+            "height_m": high,
+            "material": "stone",
+            "category": "garden_wall",
+            "lines": lines,
+        },
         "fence": lambda lines, high: {"make": "bar_fences", "height_m": high, "lines": lines},
         "hedge": lambda lines, high: {"make": "fence_panels", "of": "hedge_block", "panel_m": 4, "lines": lines},
     }

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.rubble import Breadth
 from aerialdojo_gen.scenes.kit.ruins import Extent
-from aerialdojo_gen.scenes.kit.structures import block, columns, railing
+from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
 from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
@@ -29,18 +29,8 @@ from aerialdojo_gen.scenes.site import Site
 class Hall:
     """A steel hall in its own frame: x along its length, its front looks along -y.
 
-    Attributes
-    ----------
-    length_m, depth_m, eaves_m, ridge_m : float
-        Its size; the ridge runs along x.
-    blast : (x, y)
-        Where the blast was, in its own frame, metres.
-    reach_m : float
-        Cladding nearer to the blast than this is gone.
-    gallery_m : float
-        Height of a gallery along the back wall; 0 for none.
-    cladding, steel : str
-        Materials.
+    The ridge runs along x. Cladding nearer to the `blast` (own frame) than `reach_m` is gone; `gallery_m` is the
+    height of a gallery along the back wall, 0 for none.
     """
 
     length_m: Extent
@@ -82,25 +72,15 @@ def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: 
 
 def _portal(hall: Hall, x: float, rng: np.random.Generator) -> list[np.ndarray]:
     y, e, r = hall.depth_m / 2, hall.eaves_m, hall.ridge_m
-    line = [
-        (x, -y, -0.6),
-        (x, -y, e * 0.5),
-        (x, -y, e),
-        (x, -y / 2, (e + r) / 2),
-        (x, 0.0, r),
-        (x, y / 2, (e + r) / 2),
-        (x, y, e),
-        (x, y, e * 0.5),
-        (x, y, -0.6),
-    ]
+    half = [(y, -0.6), (y, e * 0.5), (y, e), (y / 2, (e + r) / 2)]
     out = []
-    for px, py, pz in line:
-        away = np.array([px - hall.blast[0], py - hall.blast[1]])
+    for py, pz in [*((-v, z) for v, z in half), (0.0, r), *half[::-1]]:
+        away = np.array([x - hall.blast[0], py - hall.blast[1]])
         distance = float(np.linalg.norm(away))
         push = 2.4 * float(np.exp(-((distance / (0.8 * hall.reach_m)) ** 2))) * min(max(pz, 0.0) / e, 1.3)
         shift = away / max(distance, 1e-6) * push + rng.uniform(-0.12, 0.12, size=2) * min(push, 1.0)
         sag = -0.55 * push if pz > e * 0.9 else 0.0
-        out.append(np.array([px + shift[0], py + shift[1], pz + sag]))
+        out.append(np.array([x + shift[0], py + shift[1], pz + sag]))
     return out
 
 
@@ -126,14 +106,8 @@ def _sheet(hall: Hall, quad: tuple[np.ndarray, ...], rng: np.random.Generator) -
         normal = -normal
     u, v = b - a, d - a
     fray = 0.14 if distance < 1.6 * gone else 0.0
-    flat = [
-        (0.0, 0.0),
-        (1.0, 0.0),
-        (1.0, 1.0 - fray * rng.uniform()),
-        (0.5, 1.0 - 2 * fray * rng.uniform()),
-        (0.0, 1.0 - fray * rng.uniform()),
-    ]
-    plate = extrude(Polygon(flat), 0.05)
+    torn = [(x, 1.0 - most * rng.uniform()) for x, most in ((1.0, fray), (0.5, 2 * fray), (0.0, fray))]
+    plate = extrude(Polygon([(0.0, 0.0), (1.0, 0.0), *torn]), 0.05)
     s, t, w = plate.vertices.T
     warp = np.outer(s * t, (c - b) - (d - a))
     lift = normal * 0.2
@@ -187,15 +161,8 @@ def burst_tank(
             ((radius_m + 0.06) * float(np.cos(a)), (radius_m + 0.06) * float(np.sin(a)), height_m * band) for a in arc
         ]
         parts.append(("steel", sweep(path=ring, section=(0.08, 0.18))))
-    lid = tilted_plate(
-        (radius_m * 1.5, radius_m * 1.5),
-        0.08,
-        (0.0, 0.0, height_m * 0.42),
-        (10.0, 28.0),
-        float(np.degrees(toward)),
-        rng,
-    )
-    parts.append(("rust", lid))
+    side, middle, yaw_deg = radius_m * 1.5, (0.0, 0.0, height_m * 0.42), float(np.degrees(toward))
+    parts.append(("rust", tilted_plate((side, side), 0.08, middle, (10.0, 28.0), yaw_deg, rng)))
     area = Point(x, y).buffer(radius_m + 0.6, quad_segs=6)
     site.add(node, "burst_tank", Frame(x, y).parts(parts, base), footprint=area)
 
@@ -207,25 +174,13 @@ def broken_bridge(
 ) -> float:  # fmt: skip
     """Put up a bridge with a walkway, broken between two shares of its length; gives the walkway's height, metres.
 
-    Parameters
-    ----------
-    ends : two of (x, y)
-        Its ends, metres.
-    over : list of (x, y)
-        Points of the ground; the walkway lies `clear_m` over the highest.
-    gap : (float, float)
-        Where it is broken, shares of the length from its first end.
-    walkway_m : float
-        Width of the walkway, metres.
-    pipes : bool
-        Whether pipes run beside it; else it is a footbridge.
-    category : str
-        As in `Site.add`.
+    It stands between two ends; its walkway, `walkway_m` wide, lies `clear_m` over the highest ground of points
+    `over`. Without `pipes` it is a footbridge.
     """
     rng = site.rng_for("bridge", node)
     (a, b), z_m = ends, max(site.ground_z(*point) for point in over) + clear_m
-    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-    frame = Frame(a[0], a[1], float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+    length, yaw_deg = leg(a, b)
+    frame = Frame(*a, yaw_deg)
     steel, deck = [], []
     runs: dict[str, list[Mesh]] = {}
     for s0, s1 in ((0.0, gap[0] * length), (gap[1] * length, length)):
@@ -241,19 +196,13 @@ def broken_bridge(
         toward = 1.0 if s0 == 0.0 else -1.0
         torn = s1 if s0 == 0.0 else s0
         start = s0 if s0 == 0.0 else s1
-        lines = (
-            (-w - 0.5, 0.22, "paint:#d8b23a"),
-            (-w - 1.05, 0.15, "paint:#b9bec4"),
-            (w + 0.45, 0.18, "paint:#3f7d4e"),
-        )
+        lines = ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"),
+                 (w + 0.45, 0.18, "paint:#3f7d4e"))  # fmt: skip
         for k, (v, radius, colour) in enumerate(lines if pipes else ()):
             drop = float(rng.uniform(0.6, 2.0))
             end = torn + toward * float(rng.uniform(0.2, 1.6))
-            path = [
-                (start, v, z_m - 0.1 + 0.1 * k),
-                (torn - toward * 1.2, v, z_m - 0.1 + 0.1 * k),
-                (end, v + float(rng.uniform(-0.5, 0.5)), z_m - drop),
-            ]
+            path = [(s, v, z_m - 0.1 + 0.1 * k) for s in (start, torn - toward * 1.2)]
+            path.append((end, v + float(rng.uniform(-0.5, 0.5)), z_m - drop))
             runs.setdefault(colour, []).append(sweep(path=path, radius=radius, sides=8))
     parts: Parts = [("sheet_metal", merge(deck)), ("rust", merge(steel))]
     parts += [(colour, merge(bodies)) for colour, bodies in runs.items()]

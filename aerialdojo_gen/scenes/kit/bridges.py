@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import Mesh, merge
@@ -31,22 +31,8 @@ def bridge_deck(
 ) -> Parts:  # fmt: skip
     """Make a deck: roadway with marks, footways, edge beams and girders.
 
-    Parameters
-    ----------
-    x0, x1 : float
-        Its ends.
-    road_m, half_m : float
-        Half widths of the roadway and of the whole.
-    depth_m : float
-        Height of its edge beams.
-    girder, pavement : str
-        Materials of beams and girders, and of the footways.
-    girders : sequence of float
-        Where girders run below it, y in metres.
-    girder_m : float
-        How far they reach below the road.
-    holes : sequence of area
-        Left open, e.g. for the legs of pylons.
+    `road_m` and `half_m` are half widths of the roadway and of the whole; edge beams are `depth_m` high; `girders`
+    run at those y and reach `girder_m` below the road; `holes` stay open, e.g. for the legs of pylons.
     """
     h, r = half_m, road_m
     sheet: BaseGeometry = rectangle(x0, -h, x1, h)
@@ -57,7 +43,7 @@ def bridge_deck(
     beams = rectangle(x0, -h, x1, h).difference(rectangle(x0, -h + 0.5, x1, h - 0.5))
     for hole in holes:
         beams = beams.difference(hole)
-    below = [slab(p, -depth_m, -0.35) for p in _pieces(beams)]
+    below = [slab(p, -depth_m, -0.35) for p in polygons_of(beams)]
     below += [block(x0, y - 0.3, x1, y + 0.3, -girder_m, -0.35) for y in girders]
     cross = [
         block(x - 0.15, -h + 0.4, x + 0.15, h - 0.4, -depth_m + 0.1, -0.35)
@@ -69,8 +55,8 @@ def bridge_deck(
     return [
         (girder, merge([*below, *cross])),
         ("asphalt", slab(road, -0.35, 0.0)),
-        ("concrete", merge([slab(p, -0.35, -0.05) for p in _pieces(under)])),
-        (pavement, merge([slab(p, -0.05, FOOTWAY_M) for p in _pieces(ways)])),
+        ("concrete", merge([slab(p, -0.35, -0.05) for p in polygons_of(under)])),
+        (pavement, merge([slab(p, -0.05, FOOTWAY_M) for p in polygons_of(ways)])),
         ("marking", merge(marks)),
     ]
 
@@ -156,10 +142,6 @@ def toll_islands(
 
 def _bar(a: tuple[float, float, float], b: tuple[float, float, float], thick_m: float) -> Mesh:
     return sweep(path=[a, b], section=(thick_m, thick_m))
-
-
-def _pieces(area: BaseGeometry) -> list[BaseGeometry]:
-    return [p for p in getattr(area, "geoms", [area]) if p.area > 1e-4]
 
 
 @site_builder

@@ -13,7 +13,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails, plates, posts
-from aerialdojo_gen.scenes.kit.structures import Parts, block, letters, stairs
+from aerialdojo_gen.scenes.kit.structures import Parts, block, leg, letters, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, crown
@@ -32,8 +32,7 @@ def hoarding(
     wood: list[Mesh] = []
     count = 0
     for a, b in pairwise(line):
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+        length, yaw = leg(a, b)
         turn = rotation(0.0, 0.0, yaw)
         n = max(round(length / 4.0), 1)
         wide = length / n
@@ -63,18 +62,7 @@ def site_offices(
 ) -> float:  # fmt: skip
     """Stack cabins, with galleries and stairs along their front; gives the height of the stack's roof.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the stack takes its ground.
-    at, yaw_deg : (x, y), float
-        Middle of the back, and where the front looks.
-    columns, storeys : int
-        How many side by side, and one on the other.
-    colours : list of str
-        Materials of the cabins, in turn.
-    on : float
-        Height of its ground.
+    `at` is the middle of the back, on ground at the height `on`; the cabins take the colours in turn.
     """
     wide, deep, high = CABIN_M
     half = columns * wide / 2

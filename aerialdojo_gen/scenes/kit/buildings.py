@@ -13,25 +13,16 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.plans.values import Area, Bodies, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
+_RoofKind = Literal["flat", "gable", "hip"]
+
 
 @site_builder
 def building(
-    site: Site,
-    *,
-    outline: Area,
-    wall: Material,
-    roof: Material,
-    storeys: int = 2,
-    storey_m: Number = 3.2,
-    roof_kind: Literal["flat", "gable", "hip"] = "flat",
-    roof_m: Number = 2.5,
-    parapet_m: Number = 0.6,
-    overhang_m: Number = 0.4,
-    on: Number | None = None,
-    category: str = "building",
-    attributes: dict[str, str] = {},  # noqa: B006
+    site: Site, *, outline: Area, wall: Material, roof: Material, storeys: int = 2, storey_m: Number = 3.2,
+    roof_kind: _RoofKind = "flat", roof_m: Number = 2.5, parapet_m: Number = 0.6, overhang_m: Number = 0.4,
+    on: Number | None = None, category: str = "building", attributes: dict[str, str] = {},  # noqa: B006
     extra: Bodies = [],  # noqa: B006
-) -> float:
+) -> float:  # fmt: skip
     """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
     if not isinstance(outline, Polygon):
         raise AssetError("outline: an area in one piece is wanted")
@@ -51,7 +42,7 @@ class Block:
     wall: Material
     storeys: int = 2
     roof: Material | None = None  # Its own, and the kind of it
-    roof_kind: Literal["flat", "gable", "hip"] = "flat"
+    roof_kind: _RoofKind = "flat"
 
 
 @site_builder

@@ -52,20 +52,8 @@ def concrete_frame(
 ) -> None:  # fmt: skip
     """Put up a frame: columns, slabs, guard rails, and starter bars on the columns that will go on.
 
-    Parameters
-    ----------
-    site : Site
-        Where; only the columns take ground.
-    xs, ys : list of float
-        Grid lines on which columns stand, metres.
-    slabs : list of Slab
-        From the lowest up.
-    base_m : float
-        What the lowest columns stand on.
-    column_m, bars_m : float
-        Width of a column, and length of the starter bars.
-    concrete : str
-        Material.
+    Columns stand where grid lines `xs` and `ys` cross, the lowest on `base_m`; only they take ground. Slabs are given
+    from the lowest up; `bars_m` is the length of the starter bars.
     """
     parts: Parts = []
     low, d = base_m, column_m * 0.36
@@ -178,18 +166,7 @@ def scaffold(
 ) -> None:  # fmt: skip
     """Put up a façade scaffold to the left of a line: standards, decks, rails, and nets in places.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the scaffold takes its ground.
-    line : (start, end)
-        Ends of its inner side, metres.
-    z : (foot, top)
-        Heights of its feet, and of its uppermost deck.
-    net : str, optional
-        Material of the nets.
-    lift_m, depth_m : float
-        About the height of a lift, and its depth.
+    The line is its inner side, `z` the heights of its feet and of its uppermost deck; a lift is about `lift_m` high.
     """
     (a, b), high = line, z[1] - z[0]
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))

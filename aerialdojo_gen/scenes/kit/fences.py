@@ -84,16 +84,6 @@ def _pieces(line: Line, piece_m: float) -> Iterator[Line]:
 
 
 @site_builder
-def garden_walls(
-    site: Site, *, lines: list[Line], height_m: Number = 1.4, thickness_m: Number = 0.3, material: Material = "stone"
-) -> None:
-    """Put up walls along lines, on the ground at their points."""
-    for line in lines:
-        body = wall(site, line, height_m, thickness_m)
-        site.add(None, "garden_wall", [(material, body)], footprint=LineString(line).buffer(0.2))
-
-
-@site_builder
 def bar_fences(site: Site, *, lines: list[Line], height_m: Number = 1.1, material: Material = "iron") -> None:
     """Put up fences of three bars between posts along lines, on the ground at their points."""
     for line in lines:
@@ -119,9 +109,10 @@ def walls(
     site: Site, *, lines: list[Line], height_m: Annotated[Number, Field(gt=0)], material: Material,
     thickness_m: Annotated[Number, Field(gt=0)] = 0.3, category: str = "wall",
 ) -> None:  # fmt: skip
-    """Put up plain walls along lines on the ground, each as a structure of its own."""
+    """Put up plain walls along lines, on the ground at their points, each as a structure of its own."""
     for line in lines:
-        site.add(None, category, [(material, wall(site, line, height_m, thickness_m))])
+        body = wall(site, line, height_m, thickness_m)
+        site.add(None, category, [(material, body)], footprint=LineString(line).buffer(thickness_m / 2 + 0.05))
 
 
 @site_builder

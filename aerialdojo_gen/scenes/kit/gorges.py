@@ -74,13 +74,9 @@ def paint_gorge(
 
 @site_builder
 def by_stream(
-    site: Site,
-    *,
-    things: list[tuple[str, Number, Number, Number]],
-    phrase: str,
-    on: Number | None = None,
+    site: Site, *, things: list[tuple[str, Number, Number, Number]], phrase: str, on: Number | None = None,
     stream: Stream = _STREAM,
-) -> None:
+) -> None:  # fmt: skip
     """Place things by how far east of a winding stream they are, y, and yaw; on its banks, or at a height."""
     for category, dx, y, yaw in things:
         x = stream.x(y) + dx

@@ -44,17 +44,9 @@ def strew_trees(
 
 @site_builder
 def growth(
-    site: Site,
-    *,
-    area: Area,
-    zones: list[Zone],
-    spacing_m: Number,
-    room_m: Number,
-    limit: int,
-    settle_m: Number = 0.5,
-    stream: str = "growth",
-    by_pose: bool = False,
-) -> None:
+    site: Site, *, area: Area, zones: list[Zone], spacing_m: Number, room_m: Number, limit: int,
+    settle_m: Number = 0.5, stream: str = "growth", by_pose: bool = False,
+) -> None:  # fmt: skip
     """Strew plants over an area where there is room about them; each is of the first zone that it lies in.
 
     The limit and the categories of a zone count those that stand; `by_pose`, those without room too.

@@ -49,24 +49,8 @@ def hall(
 ) -> float:  # fmt: skip
     """Put up a hall at z = 0 with open gates and bands of windows; gives the height of its eaves.
 
-    Parameters
-    ----------
-    site : Site
-        Where; walls take their ground, the floor inside stays free.
-    category : str
-        What it is called.
-    box : (x0, y0, x1, y1)
-        Its plan, metres.
-    eaves_m : float
-        Height of its walls.
-    wall, base : str
-        Materials of the walls and of their lowest 1.2 m.
-    roof : HallRoof
-        What covers it.
-    gates : dict
-        Openings by side: (from, to, sill, head) along the wall from its west or south end, metres.
-    name, sign_side, letter_m : str, str, float
-        Written high on the wall of a side, so high.
+    The walls take their ground, the floor inside stays free; `base` is the material of their lowest 1.2 m. Gates are
+    (from, to, sill, head) by side, along the wall from its west or south end; the name stands high on a side.
     """
     x0, y0, x1, y1 = box
     parts = {"saw": _saw_roof, "flat": _flat_roof, "gable": _gable_roof}[roof.kind](box, eaves_m, wall, roof)

@@ -147,16 +147,9 @@ def level_cross(_site: Site, terrain: Terrain, *, half_m: At, blend_m: At) -> Te
 
 @ground_builder
 def slope(
-    _site: Site,
-    terrain: Terrain,
-    *,
-    start_m: Number,
-    end_m: Number,
-    to_m: Number,
-    within: tuple[Number, Number] = (-2000.0, 2000.0),
-    axis: Literal["x", "y"] = "x",
-    only_up: bool = False,
-) -> Terrain:
+    _site: Site, terrain: Terrain, *, start_m: Number, end_m: Number, to_m: Number,
+    within: tuple[Number, Number] = (-2000.0, 2000.0), axis: Literal["x", "y"] = "x", only_up: bool = False,
+) -> Terrain:  # fmt: skip
     """Let the ground slope along an axis from its own height to another, level beyond; only within two limits.
 
     With `only_up` it slopes from z = 0, and higher ground stays as it is.

@@ -16,17 +16,7 @@ from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import (
-    Parts,
-    Point,
-    block,
-    columns,
-    deck,
-    letters,
-    parapet,
-    ramp,
-    stairs,
-)
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, deck, letters, parapet, ramp, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
@@ -53,26 +43,9 @@ def parking_rows(
 ) -> None:  # fmt: skip
     """Mark rows of parking bays, and park vehicles in a share of them.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    rows : list of (x, y, yaw_deg, count)
-        Middle of the closed side, the direction towards it, and the number of bays.
-    bay_m : (float, float)
-        Width and depth of a bay, metres.
-    material : str
-        Of the marks.
-    marks : bool
-        Whether the bays are marked; above the ground they never are.
-    occupancy : float
-        Share of the bays that is taken, 0 to 1.
-    phrase : str
-        Where the vehicles are, in words.
-    on : float, optional
-        Height of the floor; the ground by default.
-    vehicles : dict of str to float
-        Categories and how often they come.
+    A row is (x, y, yaw_deg, count): the middle of its closed side, the direction towards it, and the number of bays
+    of (width, depth). Vehicles are categories and how often they come; `on` is the floor's height, the ground's by
+    default, and above the ground no bays are marked.
     """
     bays: list[Pose] = []
     for x, y, yaw_deg, count in rows:
@@ -88,16 +61,8 @@ def slanted_bays(
 ) -> None:  # fmt: skip
     """Mark slanted bays along x from a point eastwards, and park vehicles in a share of them.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    rows : list of (x, y, north, count)
-        West end of the open side, whether the vehicles face north or south, and the number of bays.
-    slant_deg, pitch_m, depth_m : float
-        Direction of the bays from the row's, their distance along it, and their depth.
-    occupancy, phrase, vehicles : float, str, dict of str to float
-        As for `parking_rows`.
+    A row is (x, y, north, count): the west end of its open side, whether the vehicles face north, and the number of
+    bays, `slant_deg` from the row's direction and `pitch_m` apart along it.
     """
     c = np.cos(np.radians(slant_deg)) * depth_m
     bays = []
@@ -112,14 +77,9 @@ def slanted_bays(
 
 
 def park_cars(
-    site: Site,
-    bays: Sequence[Pose],
-    occupancy: float,
-    place: str,
-    *,
-    z: float | None = None,
+    site: Site, bays: Sequence[Pose], occupancy: float, place: str, *, z: float | None = None,
     kinds: Mapping[str, float] = VEHICLES,
-) -> None:
+) -> None:  # fmt: skip
     """Park vehicles in a share of bays (middle, and the way in), some backwards and none quite straight."""
     names, weights = list(kinds), np.array(list(kinds.values()))
     for bay in bays:
@@ -141,20 +101,9 @@ def parking_deck(
 ) -> float:  # fmt: skip
     """Build a parking deck with ramps at its east and north sides; gives the height of its highest floor, metres.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    box : (x0, y0, x1, y1)
-        Outline of the floors, metres; ramps stand outside it, and a stair tower at the south-west corner.
-    levels : int
-        Number of floors, the ground's and the roof's among them.
-    level_m : float
-        From floor to floor; 0.4 m of it are slab and beam.
-    wall, floor, band, tower : str
-        Materials; the band is the stripe along the edges of the floors.
-    phrase : str
-        Where it stands, in words.
+    The box is the outline of its floors, the ground and the roof among the `levels`; ramps stand outside it, a stair
+    tower at its south-west corner. Slab and beam are 0.4 m of a level; the band is a stripe along the edges of the
+    floors.
     """
     x0, y0, x1, y1 = box
     plan = rectangle(*box)
@@ -278,22 +227,8 @@ def lockup_garages(
 ) -> float:  # fmt: skip
     """Put up a row of lock-up garages along x, their doors to the south; gives the height of their roof, metres.
 
-    Parameters
-    ----------
-    site : Site
-        Where; one can fly in by the doors that are open.
-    at : (x, y)
-        South-west corner, metres.
-    count : int
-        Number of garages.
-    doors : list of str
-        Materials of the doors, in turn.
-    open_doors : list of int
-        Which are open, the first being 0.
-    bay_m : (float, float)
-        Width and depth of a garage.
-    height_m, wall, roof, phrase : float, str, str, str
-        Of the walls, their materials, and where the garages are in words.
+    `at` is their south-west corner; doors take the materials in turn, and one can fly in by those that are open,
+    counted from 0; a bay is (width, depth).
     """
     (x0, y0), (width, depth), high = at, bay_m, height_m
     x1, back = x0 + count * width, y0 + depth

@@ -83,18 +83,8 @@ def process_tower(
 ) -> None:  # fmt: skip
     """Put up a steel structure with platforms, vessels that rise through them, and stairs at its west side.
 
-    Parameters
-    ----------
-    site : Site
-        Where; columns, vessels and stairs take their ground.
-    box : (x0, y0, x1, y1)
-        Outline of its columns, metres.
-    levels : list of float
-        Heights of the platforms.
-    vessels : list of (x, y, radius, top, material)
-        Upright vessels; they stand on the ground.
-    steel, floor : str
-        Materials.
+    The box is the outline of its columns, `levels` the heights of the platforms; vessels are (x, y, radius, top,
+    material) and stand on the ground. Columns, vessels and stairs take their ground.
     """
     x0, y0, x1, y1 = box
     nx, ny = (max(round(d / 5.5), 1) for d in (x1 - x0, y1 - y0))

@@ -6,7 +6,6 @@ The water is the ground itself, level at z = 0; quays are painted with a rise, s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -18,7 +17,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, leg, rail_legs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, crown, cylinder
@@ -108,7 +107,7 @@ def jetties(
     """Build wooden jetties on piles, each straight from the first point of a line to its last, the floor at `z`."""
     for line in lines:
         (x0, y0), (x1, y1) = line[0], line[-1]
-        length = float(np.hypot(x1 - x0, y1 - y0))
+        length, yaw_deg = leg((x0, y0), (x1, y1))
         count = max(round(length / 4.0), 1)
         piles = [(length * k / count, s * (width_m / 2 - 0.1)) for k in range(count + 1) for s in (-1, 1)]
         joists = [block(0.0, s - 0.08, length, s + 0.08, z - 0.36, z - 0.12) for s in (-0.8, 0.8)]
@@ -117,8 +116,7 @@ def jetties(
             ("wood", merge(joists)),
             (pile, columns(piles, -0.3, z + 0.55, 0.15, 6)),
         ]
-        frame = Frame(x0, y0, float(np.degrees(np.arctan2(y1 - y0, x1 - x0))))
-        site.add(None, "jetty", frame.parts(local))
+        site.add(None, "jetty", Frame(x0, y0, yaw_deg).parts(local))
 
 
 @site_builder
@@ -188,18 +186,11 @@ def bar_railing(
 def bars(path: Sequence[Point], z_m: float, material: str = "#f1f0ea", height_m: float = 1.0) -> Parts:
     """Make an open railing of posts every 2 m and three bars along a path on a floor at `z_m`."""
     bodies: list[Mesh] = []
-    for a, b in pairwise(path):
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+    for length, turn, middle, spots in rail_legs(path, 2.0):
         for share, thick in ((0.35, 0.04), (0.68, 0.04), (1.0, 0.09)):
             bar = rotated(box(size=(length, thick, thick)), turn)
             bodies.append(translated(bar, (*middle, z_m + share * height_m - thick)))
-        count = max(round(length / 2.0), 1)
-        for k in range(count + 1):
-            t = k / count
-            at = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, z_m)
-            bodies.append(translated(rotated(box(size=(0.08, 0.08, height_m)), turn), at))
+        bodies += [translated(rotated(box(size=(0.08, 0.08, height_m)), turn), (*spot, z_m)) for spot in spots]
     return [(material, merge(bodies))]
 
 

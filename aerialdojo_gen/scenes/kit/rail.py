@@ -18,7 +18,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
@@ -49,18 +49,8 @@ def tracks(
 ) -> None:  # fmt: skip
     """Lay sleepers and rails along middle lines.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    lines : list of line
-        The middle of each track.
-    on : float
-        Height of the ballast's top; the rails' top lies `RAIL_M` - `BED_M` above it.
-    clear : area, optional
-        Where another track has sleepers already.
-    sleeper, rail : str
-        Materials.
+    `on` is the height of the ballast's top, `RAIL_M` - `BED_M` below that of the rails; in the area `clear` another
+    track has sleepers already.
     """
     for line in lines:
         site.add(None, "track", _track(line, on, clear, sleeper, rail))
@@ -90,8 +80,8 @@ def light_tracks(site: Site, *, lines: list[Line], gauge_m: Number = 1.5, bed: M
         z = site.ground_z(*line[0])
         parts: Parts = []
         for a, b in pairwise(line):
-            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-            turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+            length, yaw_deg = leg(a, b)
+            turn = rotation(0.0, 0.0, yaw_deg)
             rail = cuboid(size=[length, 0.08, 0.16])
             rails = [translated(rail, (length / 2, s * gauge_m / 2, 0.0)) for s in (-1, 1)]
             ties = [translated(cuboid(size=[0.25, 2.5, 0.06]), (s, 0.0, 0.0)) for s in np.arange(0.6, length, 1.2)]
@@ -160,35 +150,22 @@ def overhead_portals(
     """
     if len(feet) != len(at_x):
         raise AssetError(f"feet: {len(feet)} pairs of heights for {len(at_x)} portals")
+    low, high = sorted(posts)
     for x, foot in zip(at_x, feet, strict=True):
-        _portal(site, x, posts, foot, tracks, z_m, wire_m)
-
-
-def _portal(
-    site: Site, x: float, posts: tuple[float, float], foot: tuple[float, float], tracks: Sequence[float], z_m: float,
-    wire_m: float,
-) -> None:  # fmt: skip
-    steel, (y0, y1) = "#7b8288", posts
-    bars = [block(x - 0.17, y - 0.17, x + 0.17, y + 0.17, f, z_m + 0.7) for y, f in zip((y0, y1), foot, strict=True)]
-    bars += [block(x - 0.09, min(y0, y1), x + 0.09, max(y0, y1), z, z + 0.12) for z in (z_m, z_m + 0.58)]
-    count = max(round(abs(y1 - y0) / 1.4), 2)
-    ys = np.linspace(min(y0, y1), max(y0, y1), count + 1)
-    zigzag = [(x, float(y), z_m + (0.06 if k % 2 else 0.62)) for k, y in enumerate(ys)]
-    bars.append(sweep(path=zigzag, section=(0.07, 0.07)))
-    insulators = []
-    for y in tracks:
-        bars.append(block(x - 0.05, y - 0.05, x + 0.05, y + 0.05, wire_m + 0.6, z_m))
-        insulators.append(translated(cylinder(radius=0.11, height=0.5, segments=8), (x, y, wire_m + 0.08)))
-    feet = [
-        block(x - 0.45, y - 0.45, x + 0.45, y + 0.45, f - 0.3, f + 0.25) for y, f in zip((y0, y1), foot, strict=True)
-    ]
-    site.add(
-        None,
-        "overhead_line_portal",
-        [(steel, merge(bars)), ("#7a3f2c", merge(insulators)), ("concrete", merge(feet))],
-    )
-    for y, f in zip((y0, y1), foot, strict=True):
-        site.occupy(rectangle(x - 0.5, y - 0.5, x + 0.5, y + 0.5), f, f + 7.0)
+        stood = list(zip(posts, foot, strict=True))
+        bars = [block(x - 0.17, y - 0.17, x + 0.17, y + 0.17, f, z_m + 0.7) for y, f in stood]
+        bars += [block(x - 0.09, low, x + 0.09, high, z, z + 0.12) for z in (z_m, z_m + 0.58)]
+        ys = np.linspace(low, high, max(round((high - low) / 1.4), 2) + 1)
+        zigzag = [(x, float(y), z_m + (0.06 if k % 2 else 0.62)) for k, y in enumerate(ys)]
+        bars.append(sweep(path=zigzag, section=(0.07, 0.07)))
+        bars += [block(x - 0.05, y - 0.05, x + 0.05, y + 0.05, wire_m + 0.6, z_m) for y in tracks]
+        insulator = cylinder(radius=0.11, height=0.5, segments=8)
+        insulators = merge([translated(insulator, (x, y, wire_m + 0.08)) for y in tracks])
+        blocks = merge([block(x - 0.45, y - 0.45, x + 0.45, y + 0.45, f - 0.3, f + 0.25) for y, f in stood])
+        parts: Parts = [("#7b8288", merge(bars)), ("#7a3f2c", insulators), ("concrete", blocks)]
+        site.add(None, "overhead_line_portal", parts)
+        for y, f in stood:
+            site.occupy(rectangle(x - 0.5, y - 0.5, x + 0.5, y + 0.5), f, f + 7.0)
 
 
 @site_builder

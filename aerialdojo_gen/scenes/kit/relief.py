@@ -21,20 +21,7 @@ def strew_things(
 ) -> list[Instance]:
     """Set things out where an area has room for them and for a drone around them, a spot each.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    place : str
-        What descriptions say of where they are, e.g. ``"on the square"``.
-    area : shapely geometry
-        World frame, metres.
-    categories : list of str
-        In the order of placing; what finds no room is left out.
-    stream : str
-        Of the draws.
-    clear_m : float
-        Room kept around each, metres.
+    Categories are set out in their order; what finds no room, with `clear_m` about it, is left out.
     """
     rng = site.rng_for("strew", stream)
     spots = poisson_disc(area, 1.1, rng, limit=2000)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -85,13 +86,9 @@ def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int)
 
 @site_builder
 def scarp(
-    site: Site,
-    *,
-    path: Line,
-    width_m: Breadth,
-    material: Material,
+    site: Site, *, path: Line, width_m: Breadth, material: Material,
     slips: Annotated[list[Area], Field(max_length=500)],
-) -> None:
+) -> None:  # fmt: skip
     """Paint the bare earth along a fault, and where more of it slipped."""
     bare = LineString(path).buffer(width_m / 2, quad_segs=2).union(shapely.union_all(slips))
     site.paint(bare.intersection(site.extent), material)
@@ -111,29 +108,18 @@ def cracks(site: Site, starts: list[tuple[Number, Number, Number]], length_m: Nu
                 points.append((float(at[0]), float(at[1])))
             if len(points) > 2:
                 widths = np.linspace(0.22, 0.05, len(points))
-                band = shapely.union_all(
-                    [
-                        LineString(points[k : k + 2]).buffer(float(widths[k]), cap_style="square", quad_segs=1)
-                        for k in range(len(points) - 1)
-                    ]
-                )
+                legs = [LineString(pair).buffer(float(width), cap_style="square", quad_segs=1)
+                        for pair, width in zip(pairwise(points), widths[:-1], strict=True)]  # fmt: skip
+                band = shapely.union_all(legs)
                 site.paint(band.simplify(0.04).intersection(site.extent), "#2b2926")
 
 
 @site_builder
 def strew_chunks(
-    site: Site,
-    area: Area,
-    spacing_m: Breadth,
-    stream: str,
-    *,
-    plate: Material = "concrete",
-    lump: Material = "rubble",
-    brick: Material = "brick",
-    beam: Material = "concrete",
-    size_m: tuple[Number, Number] = (0.5, 1.9),
-    limit: Annotated[int, Field(ge=1, le=2000)] = 400,
-) -> Instance | None:
+    site: Site, area: Area, spacing_m: Breadth, stream: str, *, plate: Material = "concrete",
+    lump: Material = "rubble", brick: Material = "brick", beam: Material = "concrete",
+    size_m: tuple[Number, Number] = (0.5, 1.9), limit: Annotated[int, Field(ge=1, le=2000)] = 400,
+) -> Instance | None:  # fmt: skip
     """Strew loose pieces over free ground of an area; larger pieces take their ground."""
     rng = site.rng_for("chunks", stream)
     kinds = (("slab", plate, 0.34), ("lump", lump, 0.3), ("brick", brick, 0.24), ("beam", beam, 0.12))
@@ -167,50 +153,15 @@ def strew_about_heaps(
 
 @site_builder
 def slab_pile(
-    site: Site,
-    at: At,
-    yaw_deg: Number,
-    size_m: tuple[Number, Number],
-    count: Annotated[int, Field(ge=1, le=40)],
-    stream: str,
-    *,
-    base_m: Number | None = None,
-    gap_m: Number = 0.75,
-    floor: Material = "concrete",
-    wall: Material = "plaster",
-    tilt_deg: Number = 5.0,
-    top: Material | None = None,
-    node: str | None = None,
-) -> float:
+    site: Site, at: At, yaw_deg: Number, size_m: tuple[Number, Number], count: Annotated[int, Field(ge=1, le=40)],
+    stream: str, *, base_m: Number | None = None, gap_m: Number = 0.75, floor: Material = "concrete",
+    wall: Material = "plaster", tilt_deg: Number = 5.0, top: Material | None = None, node: str | None = None,
+) -> float:  # fmt: skip
     """Pile up the floors of a pancaked building, crushed walls between them; the top one lies level.
 
-    Parameters
-    ----------
-    site : Site
-        Where.
-    at, yaw_deg : (x, y), float
-        Middle of the pile, metres, and the direction of its length.
-    size_m : (float, float)
-        Length and width of the lowest floor, metres.
-    count : int
-        Number of floors.
-    stream : str
-        Of the draws.
-    base_m : float, optional
-        Height of its foot; the ground's in the middle by default.
-    gap_m : float
-        Mean distance of the floors, metres.
-    floor, wall, top : str
-        Materials; `top` is that of the highest floor where it differs.
-    tilt_deg : float
-        Most that a floor is tilted across.
-    node : str, optional
-        As in `Site.add`.
-
-    Returns
-    -------
-    float
-        Height of the level top, metres.
+    `at` is its middle, `yaw_deg` the direction of its length, `size_m` (length, width) of the lowest floor; it stands
+    at `base_m`, or on the ground in the middle. Floors are about `gap_m` apart, and tilted by `tilt_deg` across at
+    most; `top` is the material of the highest where it differs. Gives the height of the level top.
     """
     rng = site.rng_for("pile", stream)
     x, y = at
@@ -229,9 +180,8 @@ def slab_pile(
         middle = (x + float(shift[0]), y + float(shift[1]), z)
         size = (size_m[0] * shrink, size_m[1] * shrink)
         yaw = yaw_deg + float(rng.uniform(-4, 4))
-        parts.append(
-            ((top or floor) if level else floor, tilted_plate(size, 0.26, middle, (tilt[0], tilt[1]), yaw, rng))
-        )
+        plate = tilted_plate(size, 0.26, middle, (tilt[0], tilt[1]), yaw, rng)
+        parts.append(((top or floor) if level else floor, plate))
         for _ in range(int(sum(size_m) / 1.3)):
             # Crushed wall and columns look out between the floors all around.
             edge, s = int(rng.integers(4)), float(rng.uniform(-0.45, 0.45))
@@ -239,24 +189,13 @@ def slab_pile(
             u, v = u * size[0], v * size[1]
             px, py = x + u * np.cos(turn) - v * np.sin(turn), y + u * np.sin(turn) + v * np.cos(turn)
             body = chunk("slab" if rng.uniform() < 0.6 else "brick", float(rng.uniform(1.0, 2.2)), rng)
-            parts.append(
-                (
-                    (wall, floor, "rubble")[int(rng.integers(3))],
-                    translated(body, (float(px), float(py), z - gap_m * 0.75)),
-                )
-            )
+            material = (wall, floor, "rubble")[int(rng.integers(3))]
+            parts.append((material, translated(body, (float(px), float(py), z - gap_m * 0.75))))
             out = float(np.degrees(np.arctan2(py - y, px - x)))
             if rng.uniform() < 0.5:
                 parts.append(("rust", bars((float(px), float(py)), z - 0.13, out, rng, 1.3)))
-    area = Polygon(
-        [
-            (-size_m[0] / 2, -size_m[1] / 2),
-            (size_m[0] / 2, -size_m[1] / 2),
-            (size_m[0] / 2, size_m[1] / 2),
-            (-size_m[0] / 2, size_m[1] / 2),
-        ]
-    )
-    plan = translate(rotate(area, yaw_deg, origin=(0, 0)), x, y)
+    u, v = size_m[0] / 2, size_m[1] / 2
+    plan = translate(rotate(Polygon([(-u, -v), (u, -v), (u, v), (-u, v)]), yaw_deg, origin=(0, 0)), x, y)
     core = scale(plan, 0.8, 0.72)
     parts.append(("rubble", slab(core, base - 0.5, z - 0.4)))
     site.add(node, "collapsed_building", parts)

@@ -88,16 +88,8 @@ def broken_arcade(
 ) -> float:  # fmt: skip
     """Put up an arcade with a hole in its flat roof; gives the height of that roof, metres.
 
-    Parameters
-    ----------
-    plan : area
-        Of the roof.
-    at : (x, y)
-        Where the ground has the height that its floor lies at.
-    posts, stubs : list of (x, y), list of (x, y, height)
-        Columns that reach the roof, and those that end below it, metres.
-    hole : Bite
-        World frame; torn at all heights below its head.
+    `plan` is that of the roof, `at` a point of the ground at its floor's height. `posts` reach the roof, `stubs` (x,
+    y, height) do not; the hole is in the world frame, torn at all heights below its head.
     """
     base = site.ground_z(*at)
     top = base + height_m
@@ -128,12 +120,9 @@ class Shored:
 
 @site_builder
 def raking_shores(
-    site: Site,
-    *,
-    node: str,
-    fronts: Annotated[list[Shored], Field(min_length=1, max_length=100)],
+    site: Site, *, node: str, fronts: Annotated[list[Shored], Field(min_length=1, max_length=100)],
     height_m: Number = 5.4,
-) -> None:
+) -> None:  # fmt: skip
     """Prop leaning and cracked fronts with raking timbers that reach `height_m` over the ground floor."""
     timber = []
     for front in fronts:

@@ -22,18 +22,7 @@ def shopping_hall(
 ) -> float:  # fmt: skip
     """Put up a hall of two storeys with passages through the lower one; gives the height of its roof, metres.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the hall takes its ground, but for the passages.
-    node, category : str
-        Names of the structure.
-    outline, passages : area
-        Its plan, in one piece, and what is left open of the ground storey.
-    wall, upper_wall, cornice, soffit, roof : str
-        Materials; the soffit is the ceiling of the passages.
-    storey_m : float
-        Height of a storey.
+    It takes its ground, but for the passages, which are left open of the ground storey; the soffit is their ceiling.
     """
     if not isinstance(outline, Polygon):
         raise AssetError("outline: an area in one piece is wanted")
@@ -59,20 +48,7 @@ def anchor_store(
 ) -> float:  # fmt: skip
     """Put up a department store, its name and door to the south; gives the height of its roof, metres.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the store takes its ground.
-    node : str
-        Name of the structure.
-    box : (x0, y0, x1, y1)
-        Its plan, metres, without the porch and its canopy in front.
-    height_m : float
-        Of its walls.
-    sign : str
-        Its name, in letters on the front.
-    wall, glass, trim : str
-        Materials.
+    The box is its plan without the porch and its canopy in front; `sign` is its name, in letters on the front.
     """
     x0, y0, x1, y1 = box
     middle = (x0 + x1) / 2

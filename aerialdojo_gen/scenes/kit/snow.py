@@ -15,7 +15,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number, Point
+from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, crown
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
@@ -62,26 +62,22 @@ def ice_ridges(
     site: Site, *, lines: list[Line], height_m: Annotated[Number, Field(gt=0, le=20)], material: Material
 ) -> None:
     """Push broken slabs of ice or snow up into ridges along lines."""
-    for k, line in enumerate(lines):
-        _ice_ridge(site, line, height_m, material, site.rng_for("ridge", k))
-
-
-def _ice_ridge(site: Site, points: list[Point], height_m: float, material: str, rng: np.random.Generator) -> None:
-    line = LineString(points)
-    parts: Parts = []
-    for s in np.arange(0.4, line.length, 1.1):
-        p = line.interpolate(float(s))
-        h = height_m * float(rng.uniform(0.55, 1.0))
-        z = site.ground_z(p.x, p.y)
-        if rng.random() < 0.6:
-            body = box(size=(float(rng.uniform(1.0, 1.8)), float(rng.uniform(0.4, 0.8)), h * 1.25))
-            turn = rotation(float(rng.uniform(-24, 24)), float(rng.uniform(-18, 18)), float(rng.uniform(0, 180)))
-            body = rotated(body, turn)
-        else:
-            body = crown(radii=(0.9, 0.8, h * 0.7), noise=0.35, subdivisions=1, seed=int(rng.integers(1000)))
-        wander = rng.uniform(-0.35, 0.35, size=2)
-        parts.append((material, translated(body, (p.x + wander[0], p.y + wander[1], z - 0.35))))
-    site.add(None, "ice_ridge", parts, footprint=line.buffer(1.0))
+    for number, points in enumerate(lines):
+        line, rng = LineString(points), site.rng_for("ridge", number)
+        parts: Parts = []
+        for s in np.arange(0.4, line.length, 1.1):
+            p = line.interpolate(float(s))
+            h = height_m * float(rng.uniform(0.55, 1.0))
+            z = site.ground_z(p.x, p.y)
+            if rng.random() < 0.6:
+                body = box(size=(float(rng.uniform(1.0, 1.8)), float(rng.uniform(0.4, 0.8)), h * 1.25))
+                turn = rotation(float(rng.uniform(-24, 24)), float(rng.uniform(-18, 18)), float(rng.uniform(0, 180)))
+                body = rotated(body, turn)
+            else:
+                body = crown(radii=(0.9, 0.8, h * 0.7), noise=0.35, subdivisions=1, seed=int(rng.integers(1000)))
+            wander = rng.uniform(-0.35, 0.35, size=2)
+            parts.append((material, translated(body, (p.x + wander[0], p.y + wander[1], z - 0.35))))
+        site.add(None, "ice_ridge", parts, footprint=line.buffer(1.0))
 
 
 @site_builder

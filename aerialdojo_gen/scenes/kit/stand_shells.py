@@ -77,18 +77,9 @@ def stand_platforms(*, areas: Areas, z: tuple[Number, Number], floor: Material, 
 
 @part_builder
 def cantilever_roof(
-    *,
-    at: At,
-    yaw_deg: Number,
-    size_m: tuple[Number, Number],
-    z_m: Number,
-    roof: Material,
-    truss: Material,
-    fascia: Material,
-    foot_m: Number = 0.0,
-    bay_m: Annotated[Number, Field(ge=1.0)] = 6.0,
-    rise_m: Number = 2.4,
-) -> Parts:
+    *, at: At, yaw_deg: Number, size_m: tuple[Number, Number], z_m: Number, roof: Material, truss: Material,
+    fascia: Material, foot_m: Number = 0.0, bay_m: Annotated[Number, Field(ge=1.0)] = 6.0, rise_m: Number = 2.4,
+) -> Parts:  # fmt: skip
     """Make a level roof of (length, depth), its underside at `z_m`, that hangs from cantilevered trusses above it.
 
     `at` is the middle of its back edge, where the columns stand on `foot_m`; it reaches forward along `yaw_deg`.

@@ -95,18 +95,10 @@ _STRIPES = Stripes()
 
 @site_builder
 def stand(
-    site: Site,
-    *,
-    tier: Tier,
-    seats: Annotated[list[Material], Field(min_length=1)],
-    node: str | None = None,
-    stripes: Stripes = _STRIPES,
-    gangway_m: Annotated[Number, Field(ge=2.0)] = 8.2,
-    clear: Area | None = None,
-    concrete: Material = "concrete",
-    step: Material = "concrete",
-    more: Bodies | None = None,
-) -> None:
+    site: Site, *, tier: Tier, seats: Annotated[list[Material], Field(min_length=1)], node: str | None = None,
+    stripes: Stripes = _STRIPES, gangway_m: Annotated[Number, Field(ge=2.0)] = 8.2, clear: Area | None = None,
+    concrete: Material = "concrete", step: Material = "concrete", more: Bodies | None = None,
+) -> None:  # fmt: skip
     """Put up a tier of a stand, gangways `gangway_m` apart; no seats stand in `clear`, and `more` belongs to it."""
 
     def colour(x: float, y: float, row: int) -> str:
@@ -143,28 +135,13 @@ def passage(foot: Pose, width_m: float, length_m: float) -> Polygon:
 
 
 def tier_parts(
-    tier: Tier,
-    feet: Sequence[Pose],
-    *,
-    concrete: str,
-    step: str,
-    seat: Callable[[float, float, int], str],
+    tier: Tier, feet: Sequence[Pose], *, concrete: str, step: str, seat: Callable[[float, float, int], str],
     clear: BaseGeometry | None = None,
-) -> Parts:
+) -> Parts:  # fmt: skip
     """Make a tier: steps, a front wall with a parapet, walls along portals, half steps in gangways, and seats.
 
-    Parameters
-    ----------
-    tier : Tier
-        What to build.
-    feet : sequence of Pose
-        Feet of the gangways, from `gangways`.
-    concrete, step : str
-        Materials of the rows and of the gangways' half steps.
-    seat : callable
-        ``(x, y, row) -> material`` of a seat.
-    clear : shapely geometry, optional
-        Where no seats stand: platforms, rooms, things.
+    `feet` are those of gangways, from `gangways`; ``seat(x, y, row)`` gives a seat's material; none stands in
+    `clear`.
     """
     holes = unary_union(tier.portals) if tier.portals else Polygon()
     bodies: list[Mesh] = []

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
@@ -14,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, block
+from aerialdojo_gen.scenes.kit.structures import Parts, block, leg, rail_legs
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box
@@ -38,22 +37,7 @@ def guard_rail(
 ) -> Parts:  # fmt: skip
     """Make a guard rail along a line, or around a floor a little inside of its edge, open in the gaps.
 
-    Parameters
-    ----------
-    z_m : float
-        Height of the floor.
-    line : line, optional
-        Where it runs.
-    around : area, optional
-        The floor in place of a line.
-    gaps : areas
-        Where it is open.
-    inset_m : float
-        From the floor's edge.
-    material, toe : str
-        Of the rails, and of a toe board; without a `toe` there is none.
-    post_m : float
-        About the distance between posts.
+    The floor is at `z_m`; posts stand about `post_m` apart; without a `toe` there is no toe board.
     """
     path: BaseGeometry = LineString(line) if around is None else rim(around, gaps, inset_m)
     return guard_rails(path, z_m, material=material, toe=toe, post_m=post_m)
@@ -86,13 +70,13 @@ def conveyor_gallery(
 ) -> None:  # fmt: skip
     """Carry a closed conveyor from a point up to another, the middles of its floor, on trestles at shares of it."""
     (xa, ya, za), (xb, yb, zb) = start, end
-    length, rise = float(np.hypot(xb - xa, yb - ya)), zb - za
+    (length, yaw_deg), rise = leg((xa, ya), (xb, yb)), zb - za
     tube = sweep(path=[(0.0, 0.0, high_m / 2), (length, 0.0, rise + high_m / 2)], section=(wide_m, high_m))
     n = max(int(length // 3.0), 1)
     at = [length * (k + 0.5) / n for k in range(n)]
     panes = [translated(box(size=[1.3, wide_m + 0.1, 0.7]), (u, 0.0, rise * u / length + high_m * 0.5)) for u in at]
     lid = sweep(path=[(0.0, 0.0, high_m + 0.1), (length, 0.0, rise + high_m + 0.1)], section=(wide_m + 0.3, 0.16))
-    turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(yb - ya, xb - xa))))
+    turn = rotation(0.0, 0.0, yaw_deg)
     raw: Parts = [(wall, tube), ("glass:#7f95a0", merge(panes)), ("iron", lid)]
     parts: Parts = [(material, translated(rotated(body, turn), start)) for material, body in raw]
     for t in legs:
@@ -112,19 +96,13 @@ def guard_rails(
     steel: list[Mesh] = []
     boards: list[Mesh] = []
     for line in getattr(path, "geoms", [path]):
-        for a, b in pairwise(line.coords):
-            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        for length, turn, middle, spots in rail_legs(line.coords, post_m):
             if length < 0.4:
                 continue
-            turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
-            middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
             for level in (0.52, 1.04):
                 steel.append(translated(rotated(box(size=[length, 0.06, 0.06]), turn), (*middle, z_m + level)))
             boards.append(translated(rotated(box(size=[length, 0.04, 0.2]), turn), (*middle, z_m)))
-            count = max(round(length / post_m), 1)
-            for k in range(count + 1):
-                at = (a[0] + (b[0] - a[0]) * k / count, a[1] + (b[1] - a[1]) * k / count, z_m)
-                steel.append(translated(box(size=[0.07, 0.07, 1.1]), at))
+            steel += [translated(box(size=[0.07, 0.07, 1.1]), (*spot, z_m)) for spot in spots]
     parts: Parts = [(material, merge(steel))] if steel else []
     return [*parts, (toe, merge(boards))] if toe is not None and boards else parts
 

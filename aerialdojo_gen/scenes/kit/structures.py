@@ -5,7 +5,7 @@ Every function returns meshes in world coordinates with their materials, to be g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated
 
@@ -28,6 +28,21 @@ from aerialdojo_gen.scenes.site import Site
 Parts = list[tuple[str, Mesh]]
 Point = tuple[float, float]
 _Spacing = Annotated[Number, Field(ge=0.5)]
+
+
+def leg(a: Point, b: Point) -> tuple[float, float]:
+    """Give the length of a leg, metres, and its direction, degrees."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return float(np.hypot(dx, dy)), float(np.degrees(np.arctan2(dy, dx)))
+
+
+def rail_legs(path: Sequence[Point], spacing_m: float) -> Iterator[tuple[float, np.ndarray, Point, list[Point]]]:
+    """Yield length, turn, middle and places of posts of every leg, the posts about `spacing_m` apart."""
+    for a, b in pairwise(path):
+        length, yaw = leg(a, b)
+        shares = [k / n for n in (max(round(length / spacing_m), 1),) for k in range(n + 1)]
+        spots = [(a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t) for t in shares]
+        yield length, rotation(0.0, 0.0, yaw), ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), spots
 
 
 def block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
@@ -58,22 +73,14 @@ def railing(
     Without a `pane` it has two slim bars below the handrail: what stands behind it is seen.
     """
     posts, panes, rails = [], [], []
-    for a, b in pairwise(path):
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-        turn = rotation(0.0, 0.0, yaw)
+    for length, turn, middle, spots in rail_legs(path, 2.0):
         if pane is None:
             bars = [_posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)]
             rails += bars
         else:
             panes.append(_posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
         rails.append(_posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
-        count = max(round(length / 2.0), 1)
-        for k in range(count + 1):
-            t = k / count
-            at = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t, z_m)
-            posts.append(_posed(box(size=[0.08, 0.08, height_m]), turn, at))
+        posts += [_posed(box(size=[0.08, 0.08, height_m]), turn, (*spot, z_m)) for spot in spots]
     body = (frame, merge(posts + rails))
     return [body] if pane is None else [(pane, merge(panes)), body]
 
@@ -102,16 +109,7 @@ def stairs(
 ) -> Parts:  # fmt: skip
     """Make open stairs that climb from `foot` along `yaw_deg`: treads between two stringers.
 
-    Parameters
-    ----------
-    foot : (x, y)
-        Middle of the lowest edge, metres.
-    yaw_deg : float
-        Direction of climbing, degrees.
-    width_m, rise_m, run_m : float
-        Of the whole flight.
-    z_m : float
-        Height of its foot.
+    `foot` is the middle of the lowest edge, at the height `z_m`; width, rise and run are those of the whole flight.
     """
     count = max(round(rise_m / 0.22), 2)
     step, going = rise_m / count, run_m / count
@@ -159,9 +157,8 @@ def canopy(
 
 def ramp(a: Point, b: Point, z0_m: float, z1_m: float, width_m: float, *, floor: str, wall: str) -> Parts:
     """Make a straight ramp of a car park from `a` up to `b` with low walls on both sides."""
-    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-    turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
-    rise = z1_m - z0_m
+    (length, yaw_deg), rise = leg(a, b), z1_m - z0_m
+    turn = rotation(0.0, 0.0, yaw_deg)
     way = profile(points=[(0.0, -0.02), (length, rise - 0.3), (length, rise), (0.0, 0.01)], width=width_m)
     edge = [(0.0, 0.0), (length, rise - 0.3), (length, rise + 0.9), (0.0, 0.9)]
     sides = [translated(profile(points=edge, width=0.2), (0.0, s * (width_m / 2 + 0.1), 0.0)) for s in (-1, 1)]

@@ -32,20 +32,8 @@ def stone_viaduct(
 ) -> Parts:  # fmt: skip
     """Make a viaduct for one track at z = 0: arches with rings, a string course, parapets, pilasters, ballast.
 
-    Parameters
-    ----------
-    x0, x1 : float
-        Its ends.
-    foot_m : float
-        Height of its foot.
-    arches : list of (middle, radius, springing)
-        Its openings.
-    piers : list of float
-        Where pilasters stand between the arches, x in metres.
-    ballast_m : float
-        Height of the ballast's top.
-    stone, trim, ballast : str
-        Materials.
+    Arches are (middle, radius, springing); pilasters stand at the x of `piers`, the ballast reaches up to
+    `ballast_m`.
     """
     parts: Parts = [(stone, arcade(x0, x1, foot_m, 0.0, arches, 5.0))]
     rings = []
@@ -125,24 +113,12 @@ def _circle(x: float, z: float, radius: float) -> BaseGeometry:
 
 
 def arcade(
-    x0: float,
-    x1: float,
-    z0: float,
-    z1: float,
-    arches: Sequence[tuple[float, float, float]],
-    width_m: float,
+    x0: float, x1: float, z0: float, z1: float, arches: Sequence[tuple[float, float, float]], width_m: float,
     y: float = 0.0,
-) -> Mesh:
+) -> Mesh:  # fmt: skip
     """Make a wall of round arches that runs along x.
 
-    Parameters
-    ----------
-    x0, x1, z0, z1 : float
-        Ends, foot and top, metres.
-    arches : sequence of (middle, radius, springing)
-        Each opening reaches from the foot up to its springing and half a circle beyond, metres.
-    width_m : float
-        Across, about `y`.
+    Each opening (middle, radius, springing) reaches from the foot up to its springing and half a circle beyond.
     """
     face: BaseGeometry = rectangle(x0, z0, x1, z1)
     for middle, radius, spring in arches:

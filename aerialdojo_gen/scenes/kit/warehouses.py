@@ -25,24 +25,8 @@ def warehouse(
 ) -> float:  # fmt: skip
     """Put up a hall with big doors along its front, and a flat or pitched roof; gives the height of its eaves.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the hall takes its ground.
-    box : (x0, y0, x1, y1)
-        Its plan, metres.
-    height_m : float
-        Of its walls.
-    wall, roof, doors, lettering : str
-        Materials.
-    name : str
-        Stands on the front.
-    facing_deg : float
-        Of the front: a multiple of 90.
-    ridge_m : float
-        Height of the ridge over the eaves; 0 for a flat roof with a low rim.
-    category, on : str, float
-        Its own category, and the height of its floor.
+    The name stands on the front, which faces a multiple of 90 degrees; without `ridge_m`, the ridge's height over the
+    eaves, the roof is flat with a low rim. `on` is the height of the floor.
     """
     x0, y0, x1, y1 = box
     plan, top = rectangle(*box), on + height_m

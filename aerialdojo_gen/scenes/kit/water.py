@@ -105,22 +105,7 @@ def flat_house(
 ) -> float:  # fmt: skip
     """Put up a building with a flat roof that people can flee to; gives the height of its roof, metres.
 
-    Parameters
-    ----------
-    site : Site
-        Where; the building takes its ground.
-    box : (x0, y0, x1, y1)
-        Its plan, metres.
-    storeys : int
-        Of 3.1 m each.
-    wall, trim, roof, door : str
-        Materials.
-    name : str
-        Stands over the front door.
-    facing_deg : float
-        Of the front: a multiple of 90.
-    parapet_m : float
-        Height of the rim of its roof.
+    Storeys are 3.1 m high; the front faces a multiple of 90 degrees, with the name over its door.
     """
     x0, y0, x1, y1 = box
     plan, top = rectangle(x0, y0, x1, y1), storeys * 3.1 - DEPTH_M + 0.3

@@ -48,14 +48,9 @@ class Strewn:
 
 @site_builder
 def woods(
-    site: Site,
-    *,
-    area: Area,
-    spacing_m: Annotated[Number, Field(ge=0.5)],
-    species: Annotated[list[Species], Field(min_length=1)],
-    density: ScalarField | None = None,
-    place: str = "",
-) -> None:
+    site: Site, *, area: Area, spacing_m: Annotated[Number, Field(ge=0.5)],
+    species: Annotated[list[Species], Field(min_length=1)], density: ScalarField | None = None, place: str = "",
+) -> None:  # fmt: skip
     """Grow trees over an area where there is room, of a species drawn by habitat at every place.
 
     They stand `spacing_m` apart where the density is 1, and further where it is less.
@@ -76,20 +71,11 @@ def woods(
 
 @site_builder
 def strew(
-    site: Site,
-    *,
-    of: str,
-    area: Area,
-    spacing_m: Annotated[Number, Field(ge=0.2)],
-    limit: Annotated[int, Field(ge=0, le=10_000)],
-    density: ScalarField | None = None,
-    place: str = "",
-    scale: Annotated[Number, Field(ge=0.05, le=20)] = 1.0,
-    roles: dict[str, Material] | None = None,
-    params: dict[str, Number] | None = None,
-    attributes: dict[str, str] | None = None,
-    solid: bool = True,
-) -> None:
+    site: Site, *, of: str, area: Area, spacing_m: Annotated[Number, Field(ge=0.2)],
+    limit: Annotated[int, Field(ge=0, le=10_000)], density: ScalarField | None = None, place: str = "",
+    scale: Annotated[Number, Field(ge=0.05, le=20)] = 1.0, roles: dict[str, Material] | None = None,
+    params: dict[str, Number] | None = None, attributes: dict[str, str] | None = None, solid: bool = True,
+) -> None:  # fmt: skip
     """Strew undergrowth or stones over an area, where there is room; things that lie are turned along the slope."""
     category, _, variant = of.partition(":")
     rng = site.rng_for("strew", category)

@@ -35,16 +35,8 @@ _GRID_M = 0.01
 class Bite:
     """A round, ragged hole that a collapse left in a building; usually wider above than below.
 
-    Attributes
-    ----------
-    x, y : float
-        Its axis in the building's frame, metres.
-    foot_m, head_m : float
-        Radius at `z0_m` and at `z1_m`.
-    z0_m, z1_m : float
-        Nothing is torn below `z0_m`; above `z1_m` the radius stays.
-    seed : int
-        Of its ragged edge.
+    Its axis is in the building's frame, its radius `foot_m` at `z0_m`, below which nothing is torn, and `head_m` from
+    `z1_m` on; the seed is that of its ragged edge.
     """
 
     x: Number
@@ -98,35 +90,13 @@ def _wave(seed: int) -> Floats:
 
 
 def torn_wall(
-    a: XY,
-    b: XY,
-    face: BaseGeometry,
-    bites: Sequence[Bite],
-    rng: np.random.Generator,
-    openings: Sequence[tuple[float, float, float, float]] = (),
-    thickness_m: float = 0.28,
-) -> Mesh | None:
+    a: XY, b: XY, face: BaseGeometry, bites: Sequence[Bite], rng: np.random.Generator,
+    openings: Sequence[tuple[float, float, float, float]] = (), thickness_m: float = 0.28,
+) -> Mesh | None:  # fmt: skip
     """Make what is left of an upright wall.
 
-    Parameters
-    ----------
-    a, b : (x, y)
-        Ends of its middle line, metres.
-    face : shapely geometry
-        The whole wall as (along, up) metres.
-    bites : sequence of Bite
-        What was torn out.
-    rng : numpy.random.Generator
-        Draws the broken edges.
-    openings : sequence of (from, to, sill, head)
-        Windows and doors, metres.
-    thickness_m : float
-        Of the wall.
-
-    Returns
-    -------
-    Mesh or None
-        None where nothing stands.
+    `a` and `b` are the ends of its middle line, `face` is the whole wall as (along, up) in metres, openings are
+    (from, to, sill, head). None where nothing stands.
     """
     top = face.bounds[3]
     for u0, u1, sill, head in openings:
@@ -219,14 +189,7 @@ def tilted_plate(
 def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
     """Make a loose piece about the origin, a third of it below z = 0.
 
-    Parameters
-    ----------
-    kind : str
-        ``"slab"``, ``"lump"``, ``"beam"`` or ``"brick"``.
-    size_m : float
-        About its length, metres.
-    rng : numpy.random.Generator
-        Draws its pose and proportions.
+    The kind is ``"slab"``, ``"lump"``, ``"beam"`` or ``"brick"``, about `size_m` long.
     """
     f = rng.uniform(0.7, 1.2, size=3)
     if kind == "lump":

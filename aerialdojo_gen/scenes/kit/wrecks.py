@@ -20,86 +20,39 @@ from aerialdojo_gen.scenes.plans.values import Material, Number
 
 @dataclass(frozen=True)
 class Style:
-    """What a building looks like.
-
-    Attributes
-    ----------
-    wall, band : str
-        Materials of the outer walls, and of sills and balconies.
-    floor : str
-        Of the floors' edges and undersides.
-    inner : tuple of str
-        Of the partitions, room by room.
-    roof : str
-        Of a pitched roof, or of the covering of a flat one.
-    storey_m, bay_m : float
-        Height of a storey and distance of the windows, metres.
-    window_m : (float, float, float)
-        Width, sill and head of a window, metres.
-    wall_m : float
-        Thickness of the outer walls, metres.
-    columns : bool
-        Whether a frame of columns carries the floors.
-    shops : bool
-        Wide shop windows in the ground storey of the front.
-    panes, soot : float
-        Shares of the windows that kept their panes, and that have a plume of soot above.
-    """
+    """What a building looks like."""
 
     wall: Material = "plaster:#cfc3ab"
-    band: Material = "concrete"
-    floor: Material = "concrete"
+    band: Material = "concrete"  # Of sills and balconies
+    floor: Material = "concrete"  # Of the floors' edges and undersides
     inner: Annotated[tuple[Material, ...], Field(min_length=4)] = (
-        "plaster:#b9c7b0",
-        "plaster:#c9b0a0",
-        "plaster:#a9b6c4",
-        "plaster:#d3c79a",
-    )
+        "plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a",
+    )  # fmt: skip
     roof: Material = "gravel:#8f8a82"
     storey_m: Annotated[Number, Field(ge=2, le=20)] = 3.1
     bay_m: Annotated[Number, Field(ge=1, le=50)] = 3.4
-    window_m: tuple[Number, Number, Number] = (1.5, 0.9, 2.3)
+    window_m: tuple[Number, Number, Number] = (1.5, 0.9, 2.3)  # Width, sill and head
     wall_m: Annotated[Number, Field(ge=0.05, le=2)] = 0.28
-    columns: bool = True
-    shops: bool = False
-    panes: Number = 0.55
+    columns: bool = True  # Whether a frame of columns carries the floors
+    shops: bool = False  # Wide shop windows in the ground storey of the front
+    panes: Number = 0.55  # Shares of the windows that kept their panes, and that have a plume of soot above
     soot: Number = 0.0
 
 
 @dataclass(frozen=True)
 class Wreck:
-    """A damaged building.
-
-    Attributes
-    ----------
-    frame : Frame
-        Middle of its plan, and the direction of its length.
-    length_m, depth_m, storeys : float, float, int
-        Its size.
-    style : Style
-        Its look.
-    bites : tuple of Bite
-        What was torn out, in its own frame.
-    lean_deg : float
-        How far the whole of it leans to its front.
-    ridge_m : float
-        Height of a pitched roof's ridge over the eaves; 0 makes a flat roof.
-    rooms_m : float
-        Distance of the partitions across it.
-    balconies : bool
-        Whether the front has them.
-    """
+    """A damaged building."""
 
     frame: Frame
     length_m: float
     depth_m: float
     storeys: int
     style: Style = field(default_factory=Style)
-    bites: tuple[Bite, ...] = ()
-    lean_deg: float = 0.0
-    ridge_m: float = 0.0
-    rooms_m: float = 6.8
-    balconies: bool = False
+    bites: tuple[Bite, ...] = ()  # In its own frame
+    lean_deg: float = 0.0  # How far the whole of it leans to its front
+    ridge_m: float = 0.0  # Height of a pitched roof's ridge over the eaves; 0 makes a flat roof
+    rooms_m: float = 6.8  # Distance of the partitions across it
+    balconies: bool = False  # Whether the front has them
 
     @property
     def plan(self) -> Polygon:

@@ -33,7 +33,26 @@ class Stack:
 def container_stacks(site: Site, *, stacks: list[Stack], yaw_deg: Number = 0.0, on: Number = 0.0) -> None:
     """Stack long containers on a floor at the height `on`; every stack takes its ground."""
     for stack in stacks:
-        _container_stack(site, stack, yaw_deg, on)
+        rng = site.rng_for("stack", *stack.at)
+        bodies: dict[str, list[Mesh]] = {}
+        dark: list[Mesh] = []
+        for i, bay in enumerate(stack.tiers):
+            for j, high in enumerate(bay):
+                for k in range(high):
+                    colour = COLOURS[int(rng.integers(len(COLOURS)))]
+                    u, v, w = i * (LONG_M + 0.5), j * (WIDE_M + 0.12), k * HIGH_M
+                    body = block(u, v, u + LONG_M, v + WIDE_M, w, w + HIGH_M - 0.04)
+                    bodies.setdefault(colour, []).append(body)
+                    for end, out in ((u, -1), (u + LONG_M, 1)):
+                        a, b = sorted((end, end + out * 0.03))
+                        dark += [block(a, v + s, b, v + s + 0.07, w + 0.1, w + 2.4) for s in (0.35, 0.95, 1.42, 2.0)]
+        turn = rotation(0.0, 0.0, yaw_deg)
+        made = [*((f"corrugated:{c}", m) for c, m in sorted(bodies.items())), ("#c9ccce", dark)]
+        parts: Parts = [(name, translated(rotated(merge(m), turn), (*stack.at, on))) for name, m in made]
+        length = len(stack.tiers) * (LONG_M + 0.5) - 0.5
+        width = max(len(bay) for bay in stack.tiers) * (WIDE_M + 0.12) - 0.12
+        plan = translate(rotate(rectangle(0, 0, length, width), yaw_deg, origin=(0, 0)), *stack.at)
+        site.add(None, "container_stack", parts, footprint=plan)
 
 
 @site_builder
@@ -73,28 +92,3 @@ def brick_stacks(
         bodies = [block(x - u, y - v, x + u, y + v, on, z),
                   block(x - u + 0.4, y - v + 0.3, x + u - 1.2, y + v - 0.3, z, z + 0.35)]  # fmt: skip
         site.add(None, "brick_stack", [(material, merge(bodies))], footprint=rectangle(x - u, y - v, x + u, y + v))
-
-
-def _container_stack(site: Site, stack: Stack, yaw_deg: float, on: float) -> None:
-    rng = site.rng_for("stack", *stack.at)
-    bodies: dict[str, list[Mesh]] = {}
-    dark: list[Mesh] = []
-    for i, bay in enumerate(stack.tiers):
-        for j, high in enumerate(bay):
-            for k in range(high):
-                colour = COLOURS[int(rng.integers(len(COLOURS)))]
-                u, v, w = i * (LONG_M + 0.5), j * (WIDE_M + 0.12), k * HIGH_M
-                body = block(u, v, u + LONG_M, v + WIDE_M, w, w + HIGH_M - 0.04)
-                bodies.setdefault(colour, []).append(body)
-                for end, out in ((u, -1), (u + LONG_M, 1)):
-                    a, b = sorted((end, end + out * 0.03))
-                    dark += [block(a, v + s, b, v + s + 0.07, w + 0.1, w + 2.4) for s in (0.35, 0.95, 1.42, 2.0)]
-    turn = rotation(0.0, 0.0, yaw_deg)
-    parts: Parts = [
-        (f"corrugated:{c}", translated(rotated(merge(m), turn), (*stack.at, on))) for c, m in sorted(bodies.items())
-    ]
-    parts.append(("#c9ccce", translated(rotated(merge(dark), turn), (*stack.at, on))))
-    length = len(stack.tiers) * (LONG_M + 0.5) - 0.5
-    width = max(len(bay) for bay in stack.tiers) * (WIDE_M + 0.12) - 0.12
-    plan = translate(rotate(rectangle(0, 0, length, width), yaw_deg, origin=(0, 0)), *stack.at)
-    site.add(None, "container_stack", parts, footprint=plan)
