@@ -3,10 +3,11 @@
 `places/<scene type>.toml` has one table per scene and one phrase per line:
 
     [U_Factory_0]
-    "in the coal yard" = { surface = "dirt*", near = "coal_heap*" }
+    "in the coal yard" = { surface = "dirt*", near = "coal_heap*", also = ["among the coal heaps"] }
 
 All conditions must hold of the built mesh. Things are patterns of node names or categories, with alternatives
 separated by ``|``; surfaces are patterns of materials. The word fixes the length: *beside* means at most 5 m.
+`also` gives other wordings, true under the same conditions; `say` one that texts use instead of the phrase itself.
 """
 
 from __future__ import annotations
@@ -46,14 +47,28 @@ def places_of(scene: str) -> Mapping[str, Conditions] | None:
     tables = read_toml(path, AnnotationError) if path.is_file() else {}
     if scene not in tables:
         return None
-    for phrase, conditions in tables[scene].items():
-        check_conditions(f"{path.name}: [{scene}] {phrase!r}", conditions)
+    check_phrases(f"{path.name}: [{scene}]", tables[scene])
     return dict(tables[scene])
+
+
+def check_phrases(where: str, phrases: Mapping[str, Any]) -> None:
+    """Raise an `AnnotationError` if a phrase's conditions are invalid, or if two phrases share a wording."""
+    said: dict[str, str] = {}
+    for phrase, entry in phrases.items():
+        check_conditions(f"{where} {phrase!r}", entry)
+        for wording in sorted({phrase, *_wordings(phrase, entry)}):
+            other = said.setdefault(wording.lower(), phrase)
+            if other != phrase:
+                raise AnnotationError(f"{where} {phrase!r}: {wording!r} is a wording of {other!r} too")
+
+
+def _wordings(phrase: str, entry: Conditions) -> tuple[str, ...]:
+    return entry.get("say", phrase), *entry.get("also", ())
 
 
 def check_conditions(where: str, conditions: Any) -> None:
     """Raise an `AnnotationError` that begins with `where` if the conditions are invalid."""
-    if not isinstance(conditions, dict) or not conditions:
+    if not isinstance(conditions, dict) or not conditions.keys() - _WORDS:
         raise AnnotationError(f"{where}: must be a table of at least one condition")
     for key, value in conditions.items():
         if key not in _FORMS:
@@ -77,8 +92,15 @@ def _among(value: Any) -> bool:
     )  # fmt: skip
 
 
+def _texts(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_text, value)) and 0 < len(set(value)) == len(value)
+
+
+# Keys that are no conditions.
+_WORDS = frozenset({"say", "also"})
 _FORMS: Mapping[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(THINGS | SIDES | {"surface", "by"}, _text),
+    **dict.fromkeys(THINGS | SIDES | {"surface", "by", "say"}, _text),
+    "also": _texts,
     "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
     "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),
     "z": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_number, v)) and v[0] < v[1],
@@ -105,6 +127,7 @@ class Places:
     def __init__(self, geometry: SceneGeometry, phrases: Mapping[str, Conditions]) -> None:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
+        self._said = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in phrases.items()}
         self._ground_materials = GroundMaterials(geometry)
         self._sets: dict[str, frozenset[int]] = {}
         self._slabs: dict[int, NDArray[np.float64]] = {}
@@ -118,11 +141,15 @@ class Places:
         """List the bound phrases, in lower case."""
         return sorted(self._phrases)
 
+    def wordings(self, phrase: str) -> tuple[str, ...]:
+        """List the wordings that texts may use for a bound phrase, in lower case: its own or `say`, then `also`."""
+        return self._said[phrase]
+
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
         """Return the first condition of a phrase that does not hold for instance `i`; empty if all hold."""
         key = i, phrase, slack
         if key not in self._found:
-            conditions = self._phrases[phrase].items()
+            conditions = {k: v for k, v in self._phrases[phrase].items() if k not in _WORDS}.items()
             wrong = (f"{name} = {value!r}" for name, value in conditions if not self._holds(i, name, value, slack))
             self._found[key] = next(wrong, "")
         return self._found[key]

@@ -11,7 +11,7 @@ from support.annotation_scenes import NAMES, PAINTS, box, street, street_annotat
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
-from aerialdojo_gen.annotations.places import Places, check_conditions, places_of
+from aerialdojo_gen.annotations.places import Places, check_conditions, check_phrases, places_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance, Scene
@@ -83,6 +83,8 @@ def test_a_phrase_is_so_of_what_stands_there_and_of_nothing_else(yard, phrase, c
         ({"part": "upper left"}, "is not what it takes"),
         ({"floor": ["first", "house"]}, "is not what it takes"),
         ({"z": [4, 2]}, "is not what it takes"),
+        ({"also": ["among the sheds"]}, "at least one condition"),
+        ({"z": [2, 4], "also": ["among the sheds", "among the sheds"]}, "is not what it takes"),
     ],
 )
 def test_a_binding_that_is_none_is_refused(conditions, message):
@@ -95,6 +97,15 @@ def test_all_scenes_have_places_and_all_files_are_right():
     assert len(scenes) == 42
     assert all(places_of(scene) for scene in scenes)
     assert places_of("U_Street_0") is None
+
+
+def test_a_wording_belongs_to_one_phrase_and_may_replace_it(yard):
+    said = {"surface": "grey", "say": "out in the Yard", "also": ["amid the cars"]}
+    phrases = {"in the yard": said, "by the wall": {"beside": "wall_000"}}
+    check_phrases("[U_Yard_0]", phrases)
+    assert Places(SceneGeometry(yard), phrases).wordings("in the yard") == ("out in the Yard", "amid the cars")
+    with pytest.raises(AnnotationError, match="'by the wall': 'by the wall' is a wording of 'in the yard' too"):
+        check_phrases("[U_Yard_0]", phrases | {"in the yard": said | {"also": ["By the wall"]}})
 
 
 def _faults(place: str, says: str) -> list[str]:
