@@ -10,6 +10,7 @@ from typing import Any
 
 from aerialdojo_gen.annotations.claims import spoken
 from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.model import Instance
 
@@ -54,21 +55,40 @@ class Words:
 
     name: str  # Common name
     looks: tuple[str, ...] = ()  # Noun phrases to follow "with" or "it has"
-    verb: str = "stands"  # Verb and participle: ``"stands"`` and ``"standing"`` by default
-    participle: str = "standing"
+    nouns: tuple[str, ...] = ()  # Synonyms, true of every instance; of a collective whole: ``"line of wheelie bins"``
+    # A collective's words: ``"wheelie bins"``, which adjectives precede, and ``"row"``; empty for all else.
+    plural_heads: tuple[str, ...] = ()
+    collectives: tuple[str, ...] = ()
+    verbs: tuple[tuple[str, str], ...] = (("stands", "standing"),)  # Verbs and their participles, the usual one first
     group: str = ""  # Determiner of plural names: ``"a patch of"``; else empty
     reference: bool = True  # Whether descriptions of other objects may refer to it
     target: bool = True  # Whether it may become an object
 
+    @property
+    def verb(self) -> str:
+        """The usual verb: ``"stands"``."""
+        return self.verbs[0][0]
+
+    @property
+    def participle(self) -> str:
+        """Its participle: ``"standing"``."""
+        return self.verbs[0][1]
+
+
+_KEYS = ("nouns", "plural_head", "collective", "verbs", "group", "reference", "target")
+
 
 @cache
-def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str], frozenset[str]]:
+def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, str], frozenset[str]]:
     """Read the entries by category, the phrases of values, and the colours."""
     tables: dict[str, Any] = {}
     for path in sorted((Path(__file__).parent / "phrases").glob("*.toml")):
         for name, entry in read_toml(path, AnnotationError).items():
             if name in tables:
                 raise AnnotationError(f"{path}: [{name}] stands in another file of its folder already")
+            for key in entry if name not in ("values", "colours") else ():
+                if key not in _KEYS:
+                    raise AnnotationError(f"{path}: [{name}]: unknown key {key!r}{nearest(key, _KEYS)}")
             tables[name] = entry
     colours = frozenset(tables.pop("colours"))
     values = {key: str(value) for key, value in tables.pop("values").items()}
@@ -78,13 +98,15 @@ def _tables() -> tuple[dict[str, dict[str, object]], dict[str, str], frozenset[s
 def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
     """Look up the words for a category."""
     entry = _tables()[0].get(category, {})
-    verb, participle = _VERBS.get(kind, ("stands", "standing"))
+    verbs = entry.get("verbs", [_VERBS.get(kind, ("stands", "standing"))])
     in_catalogue = name is not None
     return Words(
         name=name or spoken(category),
         looks=looks,
-        verb=str(entry.get("verb", verb)),
-        participle=str(entry.get("participle", participle)),
+        nouns=tuple(entry.get("nouns", ())),
+        plural_heads=tuple(entry.get("plural_head", ())),
+        collectives=tuple(entry.get("collective", ())),
+        verbs=tuple((verb, participle) for verb, participle in verbs),
         group=str(entry.get("group", "")),
         reference=bool(entry.get("reference", in_catalogue)),
         target=bool(in_catalogue and target and entry.get("target", True)),

@@ -15,7 +15,8 @@ FORMS = ("round", "boxy", "flat", "slender", "tapering", "pointed", "sloping", "
 MEASURES = ("length", "width", "height")
 RELATIONS = ("above", "below", "in front of", "behind", "beside", "inside", "around")
 PLACES = ("on top", "at the bottom", "in the middle")
-_KEYS = ("say", "has", "lacks", "count", "form", "colour", "material", "size", "order")
+_SAYS = ("say", "also", "adjective", "clause")
+_KEYS = (*_SAYS, "has", "lacks", "count", "form", "colour", "material", "size", "order")
 _TERM = r"(?:(?P<{0}p>[a-z0-9_|]+)\.)?(?P<{0}m>length|width|height)"
 _SIZE = re.compile(
     _TERM.format("a") + r"\s*(?P<sign>[<>])\s*(?P<factor>\d+(?:\.\d+)?)?(?:\s*\*\s*)?(?:" + _TERM.format("b") + r")?"
@@ -52,7 +53,10 @@ class Order:
 class Look:
     """A phrase and its claims."""
 
-    phrase: str  # A noun phrase that follows "with" or "it has"
+    phrase: str  # A noun phrase that follows "with" or "it has"; its key in the catalogue
+    also: tuple[str, ...] = ()  # Other such phrases, which claim no more
+    adjectives: tuple[str, ...] = ()  # The same before the name: ``"slatted"``
+    clauses: tuple[str, ...] = ()  # The same as a clause about "it": ``"it lies on its roof"``
     has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
     lacks: tuple[str, ...] = ()
     count: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # Copies of a part
@@ -61,6 +65,11 @@ class Look:
     material: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     size: tuple[Comparison, ...] = ()
     order: tuple[Order, ...] = ()
+
+    @property
+    def wordings(self) -> tuple[str, ...]:
+        """All ways to say it."""
+        return (self.phrase, *self.also, *self.adjectives, *self.clauses)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -77,10 +86,12 @@ def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where:
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
     looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
-    phrases = [look.phrase for look in looks]
-    for k, phrase in enumerate(phrases):
-        if phrase in phrases[:k]:
-            raise AssetError(f"{where} looks[{k}]: duplicate phrase {phrase!r}")
+    said: set[str] = set()
+    for k, look in enumerate(looks):
+        for wording in look.wordings:
+            if wording in said:
+                raise AssetError(f"{where} looks[{k}]: duplicate phrase {wording!r}")
+            said.add(wording)
     return looks
 
 
@@ -90,10 +101,14 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
     for key in entry:
         if key not in _KEYS:
             raise AssetError(f"{where}: unknown key {key!r}{nearest(key, _KEYS)}")
-    if len(entry) == 1:
-        raise AssetError(f"{where}: {entry['say']!r} claims nothing that can be checked: add {', '.join(_KEYS[1:])}")
+    if not set(entry) - set(_SAYS):
+        claims = ", ".join(_KEYS[len(_SAYS) :])
+        raise AssetError(f"{where}: {entry['say']!r} claims nothing that can be checked: add {claims}")
     look = Look(
         entry["say"].strip(),
+        also=_words(entry, "also", where),
+        adjectives=_words(entry, "adjective", where),
+        clauses=_clauses(entry, where),
         has=_words(entry, "has", where),
         lacks=_words(entry, "lacks", where),
         count={name: _range(n, f"{where} count {name}") for name, n in _table(entry, "count", where).items()},
@@ -111,6 +126,14 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
         if form not in FORMS:
             raise AssetError(f"{where}: unknown form {form!r}{nearest(form, FORMS)} (one of {', '.join(FORMS)})")
     return look
+
+
+def _clauses(entry: Mapping[str, Any], where: str) -> tuple[str, ...]:
+    clauses = _words(entry, "clause", where)
+    for clause in clauses:
+        if clause.split(" ")[0] not in ("it", "its"):
+            raise AssetError(f'{where}: clause {clause!r} must begin with "it" or "its"')
+    return clauses
 
 
 def _table(entry: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:

@@ -8,7 +8,7 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, false_claims
 
-MIN_LOOKS = 4
+MIN_LOOKS = 3
 
 
 def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None) -> list[str]:
