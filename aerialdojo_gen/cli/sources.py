@@ -162,9 +162,9 @@ def annotate_draft(
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotations.draft import DraftOptions
+    from aerialdojo_gen.imports.drafting import draft_scene
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
-    from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
     config, roots = open_pipeline(pipeline_file(pipeline), Path("data"))
     given = named_scene(name, scene)

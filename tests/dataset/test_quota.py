@@ -14,13 +14,13 @@ from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.pipeline.stages.work.quota import Kept, apportion, difficulty_level, select_quota, train_quotas
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows
-from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}

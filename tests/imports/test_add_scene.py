@@ -15,6 +15,7 @@ from aerialdojo_gen.base.errors import AnnotationError, AssetError, StoreError, 
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.files import check_glb, read_mesh
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
@@ -22,7 +23,6 @@ from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 
 def raw(mesh: trimesh.Trimesh, name: str = "") -> RawNode:

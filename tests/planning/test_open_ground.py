@@ -19,13 +19,13 @@ from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.dataset.validate.below_ground import open_ground
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
+from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.studio.annotate.drafting import draft_scene
 
 NAME = "Hills_0"
 
