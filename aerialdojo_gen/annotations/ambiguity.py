@@ -10,34 +10,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
-from aerialdojo_gen.annotations.claims import DISTRACTOR_SLACK, Lexicon, Reading
-from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.geometry.frames import compass_direction
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """Index of the nearest landmark in the plane, and the compass direction from it."""
-
-    landmark: int
-    direction: str
-
-
-def nearest_landmark(centre_m: NDArray[np.float64], landmarks_m: NDArray[np.float64]) -> Bearing | None:
-    """Find the nearest landmark in the plane (centres in world metres); None where there is no direction."""
-    if len(landmarks_m) == 0:
-        return None
-    offset = np.asarray(centre_m)[:2] - np.asarray(landmarks_m)[:, :2]
-    # Rounded to millimetres, so that the result does not depend on floating-point noise.
-    nearest = int(np.argmin(np.round(np.hypot(offset[:, 0], offset[:, 1]), 3)))
-    dx, dy = float(offset[nearest, 0]), float(offset[nearest, 1])
-    return None if dx == 0.0 and dy == 0.0 else Bearing(nearest, compass_direction(dx, dy))
+from aerialdojo_gen.annotations.bearings import Bearing, nearest_landmark
+from aerialdojo_gen.annotations.parsing import Lexicon, Reading
+from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
 
 
 def first_sentence(text: str) -> str:

@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.annotations.ambiguity import Ambiguity, nearest_landmark
+from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.appearance import Looks, false_colours, false_phrases
-from aerialdojo_gen.annotations.claims import Lexicon
+from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.head_noun import NounChecker
+from aerialdojo_gen.annotations.parsing import Lexicon
 from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry

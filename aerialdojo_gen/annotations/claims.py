@@ -1,281 +1,336 @@
-"""Parse the claims of an English description by a small grammar.
+"""What can be said of an object: structured claims, each with its own check on the mesh.
 
-It knows three kinds of phrase: *things* (names of the scene's categories and landmarks), *values* (of the instances'
-attributes: red, open, in the car park) and *relations* (beside, under, north of, between ... and). Values before a
-thing, or with no thing after them in the clause, belong to it or to the subject; a relation and the things after it
-make a claim. Unknown words are skipped: a missed claim makes the ambiguity check stricter, never laxer.
+Texts are made from claims and never read back. A claim is true of an instance if `SceneClaims.holds` it with slack 1.
+A distractor is held to `DISTRACTOR_SLACK`, with the benefit of every doubt: a relation holds of it if it stands so
+to any thing that the mention's words fit.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
-from aerialdojo_gen.annotations.places import Places
-from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.store.schemas import DIRECTIONS
+import numpy as np
 
-DISTRACTOR_SLACK = 1.35
-GROUP = "group"  # the determiner of a plural name ("a row of"): not a value
-PLACE = "place"  # the attribute with the phrase of place from the layout
+from aerialdojo_gen.annotations.appearance import unsupported_colours
+from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.phrases import Noun
+from aerialdojo_gen.annotations.places import Places, places_of
+from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.geometry.frames import compass_direction
+from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.model import Instance
 
-_TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
-# Compass corners are one word in the tables; people write two.
-_CORNER = re.compile(r"\b(north|south)[- ](east|west)")
-_STOPS = frozenset(".;:!?")
-_VERBS = frozenset(
-    [
-        "is",
-        "are",
-        "stands",
-        "grows",
-        "lies",
-        "sits",
-        "hangs",
-        "rises",
-        "leans",
-        "floats",
-        "flies",
-        "waits",
-        "has",
-        "have",
-        "which",
-        "that",
-        "it",
-        "its",
-        "you",
-    ]
-)
+KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
+# Attributes that are no adjectives: claims of a kind of their own, or words of the noun.
+_NO_VALUES = frozenset({"colour", "size", "place", "called", "group"})
+# Words for one colour: a thing that has one of them may be said to have another.
+_ONE_COLOUR = (
+    {"grey", "gray", "silver"}, {"beige", "cream", "sand", "tan"}, {"teal", "turquoise"},
+    {"gold", "golden", "yellow"}, {"maroon", "red"}, {"violet", "purple", "lilac"},
+    {"russet", "rusty", "reddish", "brown"}, {"navy", "blue"},
+)  # fmt: skip
+# Stricter than the check, so that claims stay true after small changes of the scene.
+_TIGHT = 0.9
+_REACH_M, _FAR_M = 9.0, 15.0
+_MAX_THINGS, _MAX_BETWEEN, _MIN_SIZE_M = 14, 8, 0.3
 
 
-def _relations() -> dict[str, str]:
-    phrases = {
-        "beside": "beside, right beside, next to, right next to, alongside, by, adjacent to, flanked by, "
-        "close beside, at the foot of",
-        "against": "leaning against, right against",
-        "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
-        "surrounded by, facing, around",
-        "at": "at",
-        "front": "in front of, before",
-        "behind": "behind, at the back of",
-        "on": "on, on top of, atop, upon, on the top of",
-        "under": "under, beneath, underneath, below, sheltered by, in the shade of, under the cover of",
-        "above": "above, over, high above",
-        "between": "between, in between",
-    }
-    table = {phrase.strip(): relation for relation, many in phrases.items() for phrase in many.split(",")}
-    for direction in DIRECTIONS:
-        for form in ("{} of", "to the {} of", "just {} of", "on the {} side of", "at the {} side of"):
-            table[form.format(direction)] = f"side:{direction}"
-    return table
+@dataclass(frozen=True)
+class Mention:
+    """A thing that a claim names."""
 
-
-RELATIONS: Mapping[str, str] = _relations()
-
-
-def _tokens(text: str) -> list[str]:
-    return _TOKEN.findall(_CORNER.sub(r"\1\2", text.lower()))
+    node: str
+    noun: str  # Its category's name, or the landmark's
+    said: tuple[str, ...] = ()  # Adjectives that the text must say with it ("red")
+    unique: bool = False  # Whether the scene has one such thing: "the", else "a"
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A relation that a description asserts of its object."""
+    """One thing that is said of an object."""
 
-    relation: str
-    things: tuple[frozenset[int], ...]
-    text: str  # The matched words, for messages
+    kind: str  # One of `KINDS`
+    key: str  # "red", "state=open top", a look's phrase, "beside", "north of", a phrase of place, "northeast"
+    things: tuple[Mention, ...] = ()
 
-    def holds(self, geometry: SceneGeometry, i: int, slack: float = 1.0) -> bool:
-        """Whether the claim is true of instance `i`; see `relations` for `slack`."""
-        reach = 15.0 * slack
-        close = set(geometry.neighbours(i, reach))
-        sets = [sorted((things & close) - {i}) for things in self.things]
-        if self.relation == "between":
-            return len(sets) == 2 and any(geometry.between(i, j, k, slack) for j in sets[0] for k in sets[1])
-        if self.relation.startswith("side:"):
-            direction = self.relation.removeprefix("side:")
-            return any(geometry.side(i, j, direction, slack) for j in sets[0])
-        test = _TESTS[self.relation]
-        return any(test(geometry, i, j, slack) for j in sets[0])
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON, as stored with its object."""
+        things = [{"node": m.node, "noun": m.noun, "said": list(m.said), "unique": m.unique} for m in self.things]
+        return {"kind": self.kind, "key": self.key, **({"things": things} if things else {})}
+
+    @classmethod
+    def from_json(cls, raw: Any) -> Claim:
+        """Read `to_json`; ValueError where it is malformed."""
+        things = raw.get("things", []) if isinstance(raw, dict) else None
+        if not isinstance(things, list) or raw.get("kind") not in KINDS or not isinstance(raw.get("key"), str):
+            raise ValueError("a claim has a kind, a key and things")
+        return cls(raw["kind"], raw["key"], tuple(map(_mention, things)))
 
 
-_TESTS: Mapping[str, Callable[[SceneGeometry, int, int, float], bool]] = {
+def _mention(raw: Any) -> Mention:
+    if not isinstance(raw, dict) or raw.keys() != {"node", "noun", "said", "unique"}:
+        raise ValueError("a thing of a claim has node, noun, said and unique")
+    node, noun, said, unique = raw["node"], raw["noun"], raw["said"], raw["unique"]
+    if not isinstance(said, list) or not all(isinstance(word, str) for word in (node, noun, *said)):
+        raise ValueError("a thing of a claim has words")
+    return Mention(node, noun, tuple(said), bool(unique))
+
+
+class SceneClaims:
+    """The claims about the instances of one scene."""
+
+    def __init__(
+        self, vocabulary: Vocabulary, landmarks: Sequence[Landmark], geometry: SceneGeometry | None = None
+    ) -> None:
+        self.vocabulary, self.scene = vocabulary, vocabulary.scene
+        self.geometry = geometry or SceneGeometry(self.scene)
+        bound = None if self.scene.imported else places_of(self.scene.name)
+        self.places = None if bound is None else Places(self.geometry, bound)
+        self.landmarks = tuple(self.geometry.index[mark.node] for mark in landmarks)
+        self._landmark_names = {
+            self.geometry.index[m.node]: m.name for m in sorted(landmarks, key=lambda m: m.id, reverse=True)
+        }
+        self._nouns = vocabulary.nouns
+        self._count = Counter(noun.name for noun in self._nouns)
+        self._short = Counter(noun.short for noun in self._nouns)
+        self._fitting: dict[Mention, frozenset[int]] = {}
+
+    @cached_property
+    def bearings(self) -> list[Bearing | None]:
+        """Nearest landmark and direction of every instance."""
+        places = self.geometry.centres[list(self.landmarks)]
+        return [nearest_landmark(centre, places) for centre in self.geometry.centres]
+
+    @cached_property
+    def _groups(self) -> dict[tuple[str, Bearing | None], list[int]]:
+        groups: dict[tuple[str, Bearing | None], list[int]] = {}
+        for i, instance in enumerate(self.scene.instances):
+            groups.setdefault((instance.category, self.bearings[i]), []).append(i)
+        return groups
+
+    def candidates(self, i: int) -> list[int]:
+        """Other instances of the same category, landmark and direction."""
+        return [j for j in self._groups[self.scene.instances[i].category, self.bearings[i]] if j != i]
+
+    def distractors(self, i: int, claims: Sequence[Claim]) -> list[int]:
+        """Instances that claims of `i` fit as well: nothing but other claims tells them from it."""
+        return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
+
+    def of(self, i: int) -> tuple[Claim, ...]:
+        """All true claims of an instance, by kind, the most natural first."""
+        instance = self.scene.instances[i]
+        found = [*self._values(instance)]
+        found += [Claim("part", say) for say in self.vocabulary.looks(instance)]
+        found += self._place(i)
+        found += self._relations(i)
+        bearing = self.bearings[i]
+        if bearing is not None and bearing.clear:
+            found.append(Claim("direction", bearing.direction, (self._mention_of(self.landmarks[bearing.landmark]),)))
+        return tuple(found)
+
+    def holds(self, claim: Claim, j: int, slack: float = 1.0) -> bool:
+        """Whether a claim is true of an instance; see `relations` for `slack`."""
+        return _HOLDS[claim.kind](self, claim, j, slack)
+
+    def _values(self, instance: Instance) -> Iterator[Claim]:
+        attributes = instance.attributes
+        colour = attributes.get("colour", "")
+        if colour and not unsupported_colours(colour, instance, self.scene.materials):
+            yield Claim("colour", colour)
+        if attributes.get("size"):
+            yield Claim("size", attributes["size"])
+        for key, value in attributes.items():
+            if value and key not in _NO_VALUES:
+                yield Claim("attribute", f"{key}={value}")
+
+    def _place(self, i: int) -> list[Claim]:
+        place = self.scene.instances[i].attributes.get("place", "")
+        bound = self.places is None or (place.lower() in self.places and not self.places.fault(i, place.lower()))
+        return [Claim("place", place)] if place and bound else []
+
+    def _relations(self, i: int) -> list[Claim]:
+        things = [j for j in self.geometry.neighbours(i, _REACH_M) if self._may_mention(i, j)]
+        weights = {j: self._weight(i, j) for j in things}
+        things.sort(key=lambda j: (-weights[j], j))
+        found: list[tuple[float, Claim]] = []
+        for j in things[:_MAX_THINGS]:
+            mention = (self._mention_of(j),)
+            found += [(factor * weights[j], Claim("relation", key, mention)) for key, factor in self._pairs(i, j)]
+        for a, j in enumerate(things[:_MAX_BETWEEN]):
+            for k in things[a + 1 : _MAX_BETWEEN]:
+                first, second = self._mention_of(j), self._mention_of(k)
+                if self.scene.imported and 0.0 in (self.geometry.gap_m(i, j), self.geometry.gap_m(i, k)):
+                    continue
+                if (first.noun, first.said) != (second.noun, second.said) and self.geometry.between(i, j, k, _TIGHT):
+                    claim = Claim("relation", "between", (first, second))
+                    found.append((1.2 * min(weights[j], weights[k]), claim))
+        return [claim for _, claim in sorted(found, key=lambda item: -item[0])]
+
+    def _pairs(self, i: int, j: int) -> Iterator[tuple[str, float]]:
+        """Relations of an instance to another one, and how natural each is."""
+        g, imported = self.geometry, self.scene.imported
+        resting, covered = g.support(i) == j, j in g.covers(i)
+        if resting and (not imported or g.rests_on(i, j)):
+            yield "on", 3.0
+        if covered and not (imported and g.support(j) == i):
+            yield "under", 2.0
+        if resting or covered or (imported and g.gap_m(i, j) == 0.0):
+            return
+        if g.beside(i, j, _TIGHT):
+            yield "beside", 1.5
+        elif g.near(i, j, _TIGHT) and g.level_gap_m(i, j) > 0.0:
+            yield "near", 0.8
+        anatomy = self.scene.instances[j].anatomy
+        if anatomy is not None and anatomy.fronts_rad:
+            if g.front(i, j, _TIGHT):
+                yield "front", 1.2
+            elif len(anatomy.fronts_rad) == 1 and g.behind(i, j, _TIGHT):
+                yield "behind", 1.1
+        bearing = g.bearing_rad(i, j)
+        if bearing is not None and g.level_gap_m(i, j) > 0.0:
+            direction = compass_direction(float(np.cos(bearing)), float(np.sin(bearing)))
+            # From the middle of a long thing and from its nearest point it is the same direction, or none is said.
+            offset = g.centres[i] - g.centres[j]
+            if g.side(i, j, direction, _TIGHT) and lies_towards(offset, direction, 22.5 - BORDER_DEG):
+                yield f"{direction} of", 1.0
+
+    def _may_mention(self, i: int, j: int) -> bool:
+        size = self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]
+        return j != i and self.vocabulary.words[j].reference and float(size.max()) >= _MIN_SIZE_M
+
+    def _weight(self, i: int, j: int) -> float:
+        noun, size = self._nouns[j], float((self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]).max())
+        rarity = 1.0 / self._count[noun.name] ** 0.5 + 1.0 / self._short[noun.short] ** 0.5
+        salience = (2.0 if j in self._landmark_names else 1.0) * rarity * min(size, 4.0) ** 0.4
+        same = self._nouns[i].name == noun.name
+        return salience / (1.5 + self.geometry.gap_m(i, j)) * (0.5 if same else 1.0)
+
+    def _mention_of(self, j: int) -> Mention:
+        """Name a thing by as few words as are unique in the scene, else by its short noun phrase."""
+        node, noun = self.scene.instances[j].node, self._nouns[j]
+        if j in self._landmark_names:
+            return Mention(node, self._landmark_names[j], (), True)
+        plain = Mention(node, noun.name, (), True)
+        if len(self.fitting(plain)) == 1:
+            return plain
+        full = Mention(node, noun.name, noun.adjectives, True)
+        return full if len(self.fitting(full)) == 1 else Mention(node, noun.name, noun.adjectives, False)
+
+    def fitting(self, mention: Mention) -> frozenset[int]:
+        """Instances that a mention's words fit, with every doubt: an unknown colour may be the one that is said."""
+        if mention not in self._fitting:
+            named = self._named(mention.noun)
+            self._fitting[mention] = frozenset(j for j in named if all(self._may_be(j, a) for a in mention.said))
+        return self._fitting[mention]
+
+    def _named(self, noun: str) -> list[int]:
+        """Landmarks and instances of a name; a picnic bench is a bench, too."""
+        marks = [j for j, name in self._landmark_names.items() if name == noun]
+        ending = f" {noun}"
+        return [*marks, *(j for j, n in enumerate(self._nouns) if j not in marks and f" {n.name}".endswith(ending))]
+
+    @cached_property
+    def _keys_of(self) -> Mapping[str, frozenset[str]]:
+        """Attributes by the adjectives that stand for their values."""
+        keys: dict[str, set[str]] = {}
+        for instance, noun in zip(self.scene.instances, self._nouns, strict=True):
+            for adjective in noun.adjectives:
+                own = (key for key, value in instance.attributes.items() if _words(value) & _words(adjective))
+                keys.setdefault(adjective, set()).update(own)
+        return {adjective: frozenset(found) for adjective, found in keys.items()}
+
+    def _may_be(self, j: int, adjective: str) -> bool:
+        """Whether an instance may be called by an adjective."""
+        noun: Noun = self._nouns[j]
+        if any(_covers(own, adjective) for own in noun.adjectives):
+            return True
+        # What is said of no attribute of it is not denied, either.
+        return not self._keys_of.get(adjective, frozenset()) & self.scene.instances[j].attributes.keys()
+
+    def _colour_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        instance = self.scene.instances[j]
+        own = instance.attributes.get("colour", "")
+        if slack > 1.0:
+            return not own or _covers(own, claim.key)
+        return _words(claim.key) <= _words(own) and not unsupported_colours(claim.key, instance, self.scene.materials)
+
+    def _value_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        key, _, value = claim.key.rpartition("=")
+        own = self.scene.instances[j].attributes.get(key or "size", "")
+        return _words(value) <= _words(own) if own else slack > 1.0
+
+    def _part_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        instance = self.scene.instances[j]
+        if slack <= 1.0:
+            return claim.key in self.vocabulary.looks(instance)
+        looks = [look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key]
+        return bool(valid_looks(looks, instance, self.scene.materials))
+
+    def _place_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        place = claim.key.lower()
+        if self.places is None:
+            return self.scene.instances[j].attributes.get("place", "").lower() == place
+        return place in self.places and not self.places.fault(j, place, slack)
+
+    def _direction_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        marks = [self.geometry.index.get(m.node, -1) for m in claim.things]
+        return (
+            len(marks) == 1
+            and marks[0] in self.landmarks
+            and claim.key in DIRECTIONS
+            and lies_towards(self.geometry.centres[j] - self.geometry.centres[marks[0]], claim.key, 22.5 * slack)
+        )
+
+    def _relation_holds(self, claim: Claim, j: int, slack: float) -> bool:
+        close = set(self.geometry.neighbours(j, _FAR_M * slack))
+        sets = [sorted((self.fitting(m) & close) - {j}) for m in claim.things]
+        if claim.key == "between":
+            return len(sets) == 2 and any(self.geometry.between(j, a, b, slack) for a in sets[0] for b in sets[1])
+        if len(sets) != 1:
+            return False
+        direction = claim.key.removesuffix(" of")
+        if direction in DIRECTIONS:
+            return any(self._is_side(j, k, direction, slack) for k in sets[0])
+        test = _RELATIONS.get(claim.key)
+        return test is not None and any(test(self.geometry, j, k, slack) for k in sets[0])
+
+    def _is_side(self, j: int, k: int, direction: str, slack: float) -> bool:
+        """Whether an instance is in that direction of another: of a landmark from its centroid, as the goal says."""
+        towards = lies_towards(self.geometry.centres[j] - self.geometry.centres[k], direction, 22.5 * slack)
+        seen = self.geometry.side(j, k, direction, slack)
+        if slack > 1.0:
+            return seen or (towards and self.geometry.near(j, k, slack))
+        return seen and (towards or k not in self.landmarks)
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[^\W_]+", text.lower()))
+
+
+def _covers(own: str, said: str) -> bool:
+    """Whether a value may be called by another one: dark green is green, and silver is grey."""
+    mine = _words(own)
+    return all(
+        word in mine or any(word in colours and mine & colours for colours in _ONE_COLOUR) for word in _words(said)
+    )
+
+
+_Test = Callable[[SceneGeometry, int, int, float], bool]
+_RELATIONS: Mapping[str, _Test] = {
     "beside": SceneGeometry.beside, "against": SceneGeometry.against, "at": SceneGeometry.at,
     "near": SceneGeometry.near, "front": SceneGeometry.front, "behind": SceneGeometry.behind, "on": SceneGeometry.on,
     "under": SceneGeometry.under, "above": SceneGeometry.above,
 }  # fmt: skip
-
-
-@dataclass
-class Reading:
-    """The result of parsing a text."""
-
-    values: list[str] = field(default_factory=list)  # Attribute values asserted of the subject, anywhere
-    named: list[str] = field(default_factory=list)  # Those directly before the subject's own name
-    claims: list[Claim] = field(default_factory=list)  # Relations asserted of the subject
-    # Names of things outside any relation: what the text calls the subject.
-    subjects: list[str] = field(default_factory=list)
-    places: list[str] = field(default_factory=list)  # Phrases of place, lower case, bound to conditions or not
-
-
-@dataclass
-class _State(Reading):
-    """A reading under way."""
-
-    relation: str = ""
-    words: list[str] = field(default_factory=list)
-    pending: list[str] = field(default_factory=list)
-    first: frozenset[int] | None = None
-    adjacent: bool = False
-
-    def end_clause(self) -> None:
-        # After "beside a bench with ..." the values belong to the bench, not to the subject.
-        self.values += [] if self.relation else self.pending
-        self.pending, self.relation, self.words, self.first = [], "", [], None
-
-
-class Lexicon:
-    """The phrases that descriptions of a scene are parsed with."""
-
-    def __init__(
-        self,
-        geometry: SceneGeometry,
-        names: Mapping[str, str],
-        landmarks: Mapping[str, int],
-        places: Places | None = None,
-    ) -> None:
-        self.places = places
-        instances = geometry.scene.instances
-        self._attributes = [i.attributes for i in instances]
-        self._categories = [i.category for i in instances]
-        self._keys_of: dict[str, set[str]] = {}
-        self._phrases: dict[tuple[str, ...], tuple[str, str]] = {}
-        self._things: dict[str, frozenset[int]] = {}
-        by_name: dict[str, set[int]] = {}
-        for i, instance in enumerate(instances):
-            by_name.setdefault(names.get(instance.category, spoken(instance.category)).lower(), set()).add(i)
-        things = {name: frozenset(members) for name, members in by_name.items()}
-        things |= {name.lower(): frozenset([i]) for name, i in landmarks.items()}
-        given = [item for attributes in self._attributes for item in attributes.items()]
-        where = {value.lower() for key, value in given if key == PLACE and places is not None}
-        values = {value for key, value in given if (places is None or key != PLACE) and key != GROUP}
-        for key, value in given:
-            if value in values:
-                self._keys_of.setdefault(value.lower(), set()).add(key)
-        for phrase, relation in RELATIONS.items():
-            self._add(phrase, "relation", relation)
-        for value in sorted(values):
-            self._add(value, "value", value.lower())
-        for phrase in sorted(where | set(places.phrases() if places else ())):
-            self._add(phrase, "place", phrase)
-        for name in sorted(things):
-            self._things[name] = things[name]
-            for form in (plural(name), name):
-                self._add(form, "thing", name)
-        self._longest = max(map(len, self._phrases), default=0)
-        self._general: frozenset[str] = frozenset()
-
-    def add_values(self, key: str, words: Iterable[str]) -> None:
-        """Add words as values of an attribute; they match any word of a value ("green" in "dark green")."""
-        new = {word for word in words if (word,) not in self._phrases}
-        for word in new:
-            self._add(word, "value", word)
-            self._keys_of.setdefault(word, set()).add(key)
-        self._general |= new
-        self._longest = max(self._longest, 1)
-
-    def members(self, name: str) -> frozenset[int]:
-        """Return the instances with a name."""
-        return self._things.get(name, frozenset())
-
-    def _add(self, phrase: str, kind: str, meaning: str) -> None:
-        tokens = tuple(_tokens(phrase))
-        if tokens:
-            self._phrases[tokens] = (kind, meaning)
-
-    def read(self, text: str, subject: int) -> Reading:
-        """Parse a description or a name."""
-        tokens = _tokens(text)
-        state, at = _State(), 0
-        while at < len(tokens):
-            if tokens[at] in _STOPS or (tokens[at] in ",()" and state.first is None):
-                state.end_clause()
-            length, kind, meaning = self._match(tokens, at)
-            words = tokens[at : at + length]
-            if not kind and tokens[at] in _VERBS:
-                state.end_clause()
-            if kind == "relation":
-                state.end_clause()
-                state.relation, state.words = meaning, list(words)
-            elif kind == "place":
-                state.end_clause()
-                state.places.append(meaning)
-            elif kind == "value":
-                state.pending.append(meaning)
-                state.words += words
-            elif kind == "thing":
-                self._thing(state, meaning, words, subject)
-            elif state.relation:
-                state.words += words
-            state.adjacent = kind == "value" or (state.adjacent and tokens[at] == "and")
-            at += length
-        state.end_clause()
-        return state
-
-    def _match(self, tokens: list[str], at: int) -> tuple[int, str, str]:
-        for length in range(min(self._longest, len(tokens) - at), 0, -1):
-            found = self._phrases.get(tuple(tokens[at : at + length]))
-            if found:
-                return length, *found
-        return 1, "", ""
-
-    def _thing(self, state: _State, name: str, words: list[str], subject: int) -> None:
-        members = self._things[name]
-        if state.relation:
-            chosen = frozenset(i for i in members if self.fits(i, state.pending))
-            text = " ".join([*state.words, *words])
-            if state.relation != "between":
-                state.claims.append(Claim(state.relation, (chosen,), text))
-            elif state.first is None:
-                state.first = chosen
-            else:
-                state.claims.append(Claim("between", (state.first, chosen), text))
-                state.first = None
-            state.words = [*state.words, *words]
-        else:
-            state.subjects.append(name)
-        if not state.relation and subject in members:
-            state.values += state.pending
-            state.named += state.pending if state.adjacent else []
-        state.pending = []
-
-    def fits(self, i: int, values: Iterable[str]) -> bool:
-        """Whether an instance can have these values; values of attributes that it lacks are ignored."""
-        return not any(self.denied(i, value) for value in values)
-
-    def denied(self, i: int, value: str) -> bool:
-        """Whether an instance has attributes of this value's kind, but not this value."""
-        attributes = self._attributes[i]
-        own = [attributes[key].lower() for key in self._keys_of.get(value, ()) if key in attributes]
-        if value in self._general:
-            own = [word for words in own for word in _TOKEN.findall(words)]
-        return bool(own) and value not in own
-
-    def has(self, i: int, value: str) -> bool:
-        """Whether an instance has that value."""
-        return value in {v.lower() for v in self._attributes[i].values()}
-
-
-def spoken(category: str) -> str:
-    """Return a category as words: ``delivery_van`` is a delivery van."""
-    return category.replace("_", " ")
-
-
-def plural(name: str) -> str:
-    """Return the regular plural of a name."""
-    if name.endswith(("s", "x", "ch", "sh")):
-        return name + "es"
-    if name.endswith("y") and name[-2:-1] not in "aeiou":
-        return name[:-1] + "ies"
-    return name + "s"
+_HOLDS: Mapping[str, Callable[[SceneClaims, Claim, int, float], bool]] = {
+    "colour": SceneClaims._colour_holds, "size": SceneClaims._value_holds, "attribute": SceneClaims._value_holds,
+    "part": SceneClaims._part_holds, "place": SceneClaims._place_holds, "relation": SceneClaims._relation_holds,
+    "direction": SceneClaims._direction_holds,
+}  # fmt: skip

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter, Vocabulary
+from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.landmarks import spread_m
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import rank

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.claims import Claim
 from aerialdojo_gen.annotations.compose import RELATIONS
+from aerialdojo_gen.annotations.parsing import Claim
 from aerialdojo_gen.annotations.phrases import Noun, Words
 from aerialdojo_gen.geometry.frames import compass_direction
 

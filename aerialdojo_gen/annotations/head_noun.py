@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from aerialdojo_gen.annotations.claims import plural, spoken
+from aerialdojo_gen.annotations.phrases import plural, spoken
 from aerialdojo_gen.scenes.model import Instance
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")

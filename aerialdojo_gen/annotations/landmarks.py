@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from aerialdojo_gen.annotations.describing import NON_OBJECTS, Vocabulary
 from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 

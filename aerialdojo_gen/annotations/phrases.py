@@ -8,7 +8,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.annotations.claims import spoken
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -47,6 +46,20 @@ _LETTERED = frozenset({"sign", "billboard", "board", "arch", "banner"})
 _MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
 _PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
+
+
+def spoken(category: str) -> str:
+    """Return a category as words: ``delivery_van`` is a delivery van."""
+    return category.replace("_", " ")
+
+
+def plural(name: str) -> str:
+    """Return the regular plural of a name."""
+    if name.endswith(("s", "x", "ch", "sh")):
+        return name + "es"
+    if name.endswith("y") and name[-2:-1] not in "aeiou":
+        return name[:-1] + "ies"
+    return name + "s"
 
 
 @dataclass(frozen=True)

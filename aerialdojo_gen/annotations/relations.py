@@ -20,6 +20,8 @@ from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Floats = NDArray[np.float64]
 
+DISTRACTOR_SLACK = 1.35
+
 AGAINST_M = 0.5
 BESIDE_M = 3.0
 AT_M = 5.0

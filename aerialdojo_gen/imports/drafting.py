@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from aerialdojo_gen.annotations.describing import UNKNOWN, Vocabulary
 from aerialdojo_gen.annotations.draft import (
     MAX_PER_CATEGORY,
     SCENERY,
@@ -20,6 +19,7 @@ from aerialdojo_gen.annotations.draft import (
 )
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.vocabulary import UNKNOWN, Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AnnotationError, UsageError

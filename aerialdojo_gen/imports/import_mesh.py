@@ -11,7 +11,7 @@ import shapely
 import trimesh
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.describing import UNKNOWN
+from aerialdojo_gen.annotations.vocabulary import UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region, connected_bodies, unique_rows
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic

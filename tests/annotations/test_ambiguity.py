@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.annotation_scenes import GOOD, NAMES, box, street
 
-from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import make_ambiguity
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.store.schemas import DIRECTIONS

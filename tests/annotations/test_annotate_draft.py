@@ -10,11 +10,11 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions, redraft_annotations
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue

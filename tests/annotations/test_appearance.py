@@ -115,7 +115,7 @@ def test_relations_are_read_as_strictly_as_they_are_meant(gap_m, word, so):
     bench = box("bench_001", (-60 + 1 + gap_m + 0.5, 0, 0), (1, 1, 1), colour="green")
     wall = box("mailbox_002", (-60, 0, 0), (2, 2, 2), colour="red")
     geometry = SceneGeometry(dataclasses.replace(street(), instances=(*street().instances, bench, wall)))
-    from aerialdojo_gen.annotations.claims import Lexicon
+    from aerialdojo_gen.annotations.parsing import Lexicon
 
     lexicon = Lexicon(geometry, NAMES, {})
     i = geometry.index["bench_001"]

@@ -9,8 +9,8 @@ import pytest
 from support.annotation_scenes import box
 
 from aerialdojo_gen.annotations.appearance import false_phrases, repeats
-from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.ground import Surface
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks

@@ -13,10 +13,10 @@ import trimesh
 from support import foreign
 from support.command_line import said
 
-from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode, default_colours

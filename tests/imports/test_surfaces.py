@@ -13,7 +13,7 @@ from support import foreign
 from support.command_line import said
 from support.hills import hills, standing, write_hills
 
-from aerialdojo_gen.annotations.describing import Vocabulary
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support import maps
 
-from aerialdojo_gen.annotations.describing import Vocabulary
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.scenes.catalogue import load_catalogue

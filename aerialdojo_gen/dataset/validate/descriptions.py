@@ -19,8 +19,8 @@ import numpy as np
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
 from aerialdojo_gen.annotations.appearance import false_colours, false_phrases
 from aerialdojo_gen.annotations.check import make_ambiguity
-from aerialdojo_gen.annotations.claims import Lexicon
 from aerialdojo_gen.annotations.ground import Surface
+from aerialdojo_gen.annotations.parsing import Lexicon
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.ambiguity import nearest_landmark
 from aerialdojo_gen.annotations.appearance import Looks
+from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.describing import UNKNOWN
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import UNKNOWN
 from aerialdojo_gen.scenes.model import Scene
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")

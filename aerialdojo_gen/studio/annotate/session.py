@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.claims import spoken
 from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
+from aerialdojo_gen.annotations.phrases import spoken
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from aerialdojo_gen.annotations.ambiguity import nearest_landmark
+from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations
 from aerialdojo_gen.annotations.positions import Fault

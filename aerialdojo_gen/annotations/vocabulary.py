@@ -1,0 +1,77 @@
+"""Words and noun phrases of a scene's instances, and what is true of their looks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from aerialdojo_gen.annotations.appearance import false_colours, false_phrases, repeats, unsupported_colours
+from aerialdojo_gen.annotations.ground import Surface
+from aerialdojo_gen.annotations.head_noun import NounChecker
+from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
+from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.model import Instance, Scene
+
+# Categories of imported meshes that are never objects.
+NON_OBJECTS = frozenset({"ground", "clutter", "slab", "terrain"})
+# Category of imported nodes without a meaningful name; a person has to set it.
+UNKNOWN = "object"
+
+
+class Vocabulary:
+    """Words and noun phrases of a scene's instances."""
+
+    def __init__(self, scene: Scene, catalogue: Catalogue) -> None:
+        self.scene = scene
+        self.names = {category: catalogue[category].name for category in catalogue}
+        self.kinds = {category: catalogue[category].kind for category in catalogue}
+        self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._surface = Surface(scene)
+        targets = frozenset(catalogue.targets)
+        by_category: dict[str, Words] = {}
+        for i in scene.instances:
+            if scene.imported and i.category not in NON_OBJECTS:
+                # Imported meshes have categories of their own, all of which may be targets.
+                self.names.setdefault(i.category, spoken(i.category))
+                targets |= {i.category}
+            if i.category not in by_category:
+                name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
+                words = words_of(i.category, name, kind, (), i.category in targets)
+                if scene.imported and not words.group:
+                    words = replace(words, group=group_of(words.name))
+                by_category[i.category] = words
+        self.words = [by_category[i.category] for i in scene.instances]
+        self.nouns = [
+            noun_of(self._drop_false_colour(i), w) for i, w in zip(scene.instances, self.words, strict=True)
+        ]
+        self.noun_checker = NounChecker(self.names)
+
+    def _drop_false_colour(self, instance: Instance) -> Instance:
+        """Remove a colour attribute that the surface does not support."""
+        colour = instance.attributes.get("colour", "")
+        if not colour or self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials):
+            return instance
+        return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
+
+    def catalogue_looks(self, instance: Instance) -> tuple[Look, ...]:
+        """Phrases that the catalogue has for an instance's category."""
+        return self._looks.get(instance.category, ())
+
+    def looks(self, instance: Instance) -> tuple[str, ...]:
+        """Phrases that are true of an instance, visible, and not repeated by its attributes."""
+        looks = self._looks.get(instance.category, ())
+        true = valid_looks(looks, instance, self.scene.materials)
+        visible = tuple(look.phrase for look in true if self._surface.shows(look, instance))
+        new = tuple(say for say in visible if not repeats(say, instance))
+        return new if len(new) >= MIN_TRUE_LOOKS else visible
+
+    def faults(self, instance: Instance, text: str) -> list[str]:
+        """Return the false statements of a text about an instance's appearance."""
+        if self.scene.imported:
+            return []
+        return [
+            *self.noun_checker.contradictions(text, instance),
+            *false_phrases(text, instance, self._looks, self.scene.materials, self._surface),
+            *false_colours(text, instance, self.scene.materials),
+        ]
