@@ -17,6 +17,7 @@ RELATIONS = ("above", "below", "in front of", "behind", "beside", "inside", "aro
 PLACES = ("on top", "at the bottom", "in the middle")
 _SAYS = ("say", "also", "adjective", "clause")
 _KEYS = (*_SAYS, "has", "lacks", "count", "form", "colour", "material", "size", "order")
+_SUBJECTS = ("it", "its", "they", "their", "one")
 _TERM = r"(?:(?P<{0}p>[a-z0-9_|]+)\.)?(?P<{0}m>length|width|height)"
 _SIZE = re.compile(
     _TERM.format("a") + r"\s*(?P<sign>[<>])\s*(?P<factor>\d+(?:\.\d+)?)?(?:\s*\*\s*)?(?:" + _TERM.format("b") + r")?"
@@ -56,7 +57,7 @@ class Look:
     phrase: str  # A noun phrase that follows "with" or "it has"; its key in the catalogue
     also: tuple[str, ...] = ()  # Other such phrases, which claim no more
     adjectives: tuple[str, ...] = ()  # The same before the name: ``"slatted"``
-    clauses: tuple[str, ...] = ()  # The same as a clause about "it": ``"it lies on its roof"``
+    clauses: tuple[str, ...] = ()  # The same as a clause: ``"it lies on its roof"``
     has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
     lacks: tuple[str, ...] = ()
     count: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # Copies of a part
@@ -131,8 +132,8 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
 def _clauses(entry: Mapping[str, Any], where: str) -> tuple[str, ...]:
     clauses = _words(entry, "clause", where)
     for clause in clauses:
-        if clause.split(" ")[0] not in ("it", "its"):
-            raise AssetError(f'{where}: clause {clause!r} must begin with "it" or "its"')
+        if clause.split(" ")[0] not in _SUBJECTS:
+            raise AssetError(f"{where}: clause {clause!r} must begin with one of {', '.join(_SUBJECTS)}")
     return clauses
 
 

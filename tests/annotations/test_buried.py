@@ -16,8 +16,8 @@ from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
 from aerialdojo_gen.scenes.model import Scene
 
-WHEELS = "four wheels with pale hubs"
-ROOF = "a long roof over a compact body"
+WHEELS = "silvery hubcaps"
+ROOF = "a long roof down to the tailgate"
 
 
 @pytest.fixture(scope="module")
@@ -88,9 +88,9 @@ def test_a_deck_overhead_hides_nothing(catalogue):
 @pytest.mark.parametrize(
     ("category", "variant", "twice"),
     [
-        ("shipping_container", "white_short_open", "double doors that stand wide open"),
-        ("excavator", "orange_parked", "a bucket that rests on the ground"),
-        ("turnstile", "steel", "no roof over its cabinets"),
+        ("shipping_container", "white_short_open", "its doors wide open"),
+        ("excavator", "orange_parked", "its bucket resting on the ground"),
+        ("turnstile", "steel", "no roof"),
     ],
 )
 def test_a_phrase_that_says_an_attribute_again_is_not_used(catalogue, category, variant, twice):

@@ -109,7 +109,7 @@ def test_what_the_catalogue_cannot_bear_out_is_named(assets):
         ('say = "one arm"', 'say = "two arms"', "duplicate phrase 'two arms'"),
         ('say = "one arm"', 'say = "one arm", also = ["two arms"]', "duplicate phrase 'two arms'"),
         ('lacks = "hat"', 'adjective = "bare"', "'no hat' claims nothing that can be checked: add has"),
-        ('lacks = "hat"', 'lacks = "hat", clause = "a hat lacks"', "clause 'a hat lacks' must begin with \"it\" or"),
+        ('lacks = "hat"', 'lacks = "hat", clause = "a hat lacks"', "clause 'a hat lacks' must begin with one of it"),
         ('tag = "hat"', "tag = [3]", "tag must be a word or a list of words"),
     ],
 )
