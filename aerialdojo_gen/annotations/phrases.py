@@ -42,7 +42,6 @@ _PLACE = "place"
 _NAMING = frozenset({"called", "group"})
 _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
 _OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
-_LETTERED = frozenset({"sign", "billboard", "board", "arch", "banner"})
 _MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
 _PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
@@ -92,8 +91,8 @@ _KEYS = ("nouns", "plural_head", "collective", "verbs", "group", "reference", "t
 
 
 @cache
-def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, str], frozenset[str]]:
-    """Read the entries by category, the phrases of values, and the colours."""
+def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, Any], frozenset[str]]:
+    """Read the entries by category, the phrases of values (those of one category in a table), and the colours."""
     tables: dict[str, Any] = {}
     for path in sorted((Path(__file__).parent / "phrases").glob("*.toml")):
         for name, entry in read_toml(path, AnnotationError).items():
@@ -104,7 +103,7 @@ def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, str], frozenset[str]
                     raise AnnotationError(f"{path}: [{name}]: unknown key {key!r}{nearest(key, _KEYS)}")
             tables[name] = entry
     colours = frozenset(tables.pop("colours"))
-    values = {key: str(value) for key, value in tables.pop("values").items()}
+    values: dict[str, Any] = tables.pop("values")
     return tables, values, colours
 
 
@@ -168,9 +167,7 @@ def noun_of(instance: Instance, words: Words) -> Noun:
         others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE and k not in _NAMING]
         if not value or value in words.name.split() or any(value in v.split() for v in others):
             continue
-        phrase = _phrase_value(key, value)
-        if words.name.split()[-1] in _LETTERED:
-            phrase = phrase.replace("with a sign reading", "reading")
+        phrase = phrases_of_value(key, value, instance.category)[0]
         if phrase.startswith("+"):
             before.append(phrase[1:])
         else:
@@ -186,12 +183,25 @@ def place_of(instance: Instance) -> str:
     return instance.attributes.get(_PLACE, "")
 
 
-def _phrase_value(key: str, value: str) -> str:
-    """Phrase one value: with the prefix ``+`` if it goes before the noun, else after it."""
-    _, table, colours = _tables()
-    pattern = table.get(f"{key}={value}") or table.get(f"{key}=*", "")
-    if pattern:
-        return pattern.replace("{a}", _with_article(value)).replace("{up}", value.upper()).replace("{}", value)
+def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
+    """Phrase one value of a category, the usual way first; what begins with ``+`` goes before the noun, else after it."""
+    _, table, _ = _tables()
+    for patterns in (table.get(category, {}), table):
+        found = patterns.get(f"{key}={value}") or patterns.get(f"{key}=*")
+        if found:
+            forms = {"{a}": _with_article(value), "{up}": value.upper(), "{}": value}
+            return tuple(_filled(pattern, forms) for pattern in ([found] if isinstance(found, str) else found))
+    return (_phrase_by_rule(key, value),)
+
+
+def _filled(pattern: str, forms: dict[str, str]) -> str:
+    for slot, form in forms.items():
+        pattern = pattern.replace(slot, form)
+    return pattern
+
+
+def _phrase_by_rule(key: str, value: str) -> str:
+    colours = _tables()[2]
     words = value.split()
     if key in ("size", "material", "shape") or (key == "colour" and words[-1] in colours):
         return "+" + value
