@@ -184,7 +184,7 @@ def place_of(instance: Instance) -> str:
 
 
 def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
-    """Phrase one value of a category, the usual way first; what begins with ``+`` goes before the noun, else after it."""
+    """Phrase one value of a category, the usual way first: with the prefix ``+`` if it goes before the noun."""
     _, table, _ = _tables()
     for patterns in (table.get(category, {}), table):
         found = patterns.get(f"{key}={value}") or patterns.get(f"{key}=*")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -119,7 +120,8 @@ def _thing(catalogue, category: str, **attributes: str) -> str:
         ("hatchback", {"colour": "orange", "pattern": "black roof"}, "an orange hatchback with a black roof"),
         ("suv", {"colour": ""}, "an SUV"),
         ("bush", {"pattern": "red berries"}, "a bush with red berries"),
-        ("forklift", {"colour": "red", "state": "forks raised"}, "a red forklift with its forks raised"),
+        ("forklift", {"colour": "red", "state": "forks raised"}, "a red forklift with raised forks"),
+        ("a_board", {"colour": "green", "sign": "menu"}, "a green pavement sign reading “MENU”"),
         ("traffic_light", {"state": "showing red"}, "a traffic light showing red"),
         ("wildflowers", {"colour": "purple"}, "a patch of purple wildflowers"),
         ("deer", {"state": "with antlers", "place": "at the pond"}, "a deer with antlers"),
@@ -128,6 +130,17 @@ def _thing(catalogue, category: str, **attributes: str) -> str:
 )
 def test_noun_phrases(catalogue, category, attributes, said):
     assert _thing(catalogue, category, **attributes) == said
+
+
+def test_wordings_of_a_category_are_of_values_that_it_has(catalogue):
+    path = ROOT / "aerialdojo_gen" / "annotations" / "phrases" / "values.toml"
+    tables = {name: t for name, t in tomllib.loads(path.read_text("utf-8"))["values"].items() if isinstance(t, dict)}
+    for category, table in tables.items():
+        values = {item for variant in catalogue[category].variants for item in variant.attributes.items()}
+        for entry, said in table.items():
+            key, _, value = entry.partition("=")
+            assert any(key == k and value in (v, "*") for k, v in values), (category, entry)
+            assert isinstance(said, str) or 0 < len(said) == len(set(said)), (category, entry)
 
 
 def test_articles():
