@@ -113,12 +113,13 @@ def false_phrases(
     """Yield the catalogue's phrases in a text that are false for its instance, or about hidden parts."""
     normalized = _normalize(text)
     for look in looks.get(instance.category, ()):
-        if f" {_normalize(look.phrase).strip()} " in normalized:
+        said = [phrase for phrase in look.details if f" {_normalize(phrase).strip()} " in normalized]
+        if said:
             wrong = false_claims(look, instance, materials)[:1]
             if not wrong and surface is not None and not surface.shows(look, instance):
                 wrong = ["that is under the ground or under water"]
             for claim in wrong:
-                yield f"{look.phrase!r} is not so of {instance.node}: {claim}"
+                yield f"{said[0]!r} is not so of {instance.node}: {claim}"
 
 
 def false_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:

@@ -43,7 +43,7 @@ _NAMING = frozenset({"called", "group"})
 _AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
 _OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
 _MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
-_PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at"])
+_PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at", "near"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
 
 
@@ -238,7 +238,7 @@ def _join(parts: list[str]) -> str:
 def article(text: str) -> str:
     """Choose between a and an by the initial sound."""
     first = text.split()[0].lower() if text else ""
-    if first in ("suv", "atm", "led", "hour", "mp3", "x-shaped"):
+    if first in ("suv", "sos", "atm", "led", "hour", "mp3", "x-shaped"):
         return "an"
     if first.startswith(("uni", "use", "one", "eu")) and first != "uninviting":
         return "a"

@@ -17,7 +17,7 @@ RELATIONS = ("above", "below", "in front of", "behind", "beside", "inside", "aro
 PLACES = ("on top", "at the bottom", "in the middle")
 _SAYS = ("say", "also", "adjective", "clause")
 _KEYS = (*_SAYS, "has", "lacks", "count", "form", "colour", "material", "size", "order")
-_SUBJECTS = ("it", "its", "they", "their", "one")
+_SUBJECTS = ("it", "its", "they", "their", "one", "there")
 _TERM = r"(?:(?P<{0}p>[a-z0-9_|]+)\.)?(?P<{0}m>length|width|height)"
 _SIZE = re.compile(
     _TERM.format("a") + r"\s*(?P<sign>[<>])\s*(?P<factor>\d+(?:\.\d+)?)?(?:\s*\*\s*)?(?:" + _TERM.format("b") + r")?"
@@ -54,8 +54,8 @@ class Order:
 class Look:
     """A phrase and its claims."""
 
-    phrase: str  # A noun phrase that follows "with" or "it has"; its key in the catalogue
-    also: tuple[str, ...] = ()  # Other such phrases, which claim no more
+    phrase: str  # Its first wording, which is its key in the catalogue
+    also: tuple[str, ...] = ()  # More phrases like it, which assert no more
     adjectives: tuple[str, ...] = ()  # The same before the name: ``"slatted"``
     clauses: tuple[str, ...] = ()  # The same as a clause: ``"it lies on its roof"``
     has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
@@ -68,9 +68,14 @@ class Look:
     order: tuple[Order, ...] = ()
 
     @property
+    def details(self) -> tuple[str, ...]:
+        """Noun phrases that follow "with" or "it has"."""
+        return () if self.phrase in self.adjectives else (self.phrase, *self.also)
+
+    @property
     def wordings(self) -> tuple[str, ...]:
         """All ways to say it."""
-        return (self.phrase, *self.also, *self.adjectives, *self.clauses)
+        return (*self.details, *self.adjectives, *self.clauses)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -97,19 +102,29 @@ def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where:
 
 
 def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Look:
-    if not isinstance(entry, dict) or not isinstance(entry.get("say"), str) or not entry["say"].strip():
-        raise AssetError(f"{where}: must be a table with say: the phrase, and what it claims")
+    if not isinstance(entry, dict) or not {"say", "adjective"} & set(entry):
+        raise AssetError(f"{where}: must be a table with say or adjective: its words, and what they claim")
     for key in entry:
         if key not in _KEYS:
             raise AssetError(f"{where}: unknown key {key!r}{nearest(key, _KEYS)}")
+    if "also" in entry and "say" not in entry:
+        raise AssetError(f"{where}: also needs say")
+    say, also = _words(entry, "say", where), _words(entry, "also", where)
+    adjectives, clauses = _words(entry, "adjective", where), _words(entry, "clause", where)
+    said = (*say, *also, *adjectives, *clauses)
+    for clause in clauses:
+        if clause.split(" ")[0] not in _SUBJECTS:
+            raise AssetError(f"{where}: clause {clause!r} must begin with one of {', '.join(_SUBJECTS)}")
+    if not all(wording.strip() == wording != "" for wording in said):
+        raise AssetError(f"{where}: a wording is empty, or has blanks at its ends")
     if not set(entry) - set(_SAYS):
         claims = ", ".join(_KEYS[len(_SAYS) :])
-        raise AssetError(f"{where}: {entry['say']!r} claims nothing that can be checked: add {claims}")
+        raise AssetError(f"{where}: {said[0]!r} claims nothing that can be checked: add {claims}")
     look = Look(
-        entry["say"].strip(),
-        also=_words(entry, "also", where),
-        adjectives=_words(entry, "adjective", where),
-        clauses=_clauses(entry, where),
+        said[0],
+        also,
+        adjectives,
+        clauses,
         has=_words(entry, "has", where),
         lacks=_words(entry, "lacks", where),
         count={name: _range(n, f"{where} count {name}") for name, n in _table(entry, "count", where).items()},
@@ -127,14 +142,6 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
         if form not in FORMS:
             raise AssetError(f"{where}: unknown form {form!r}{nearest(form, FORMS)} (one of {', '.join(FORMS)})")
     return look
-
-
-def _clauses(entry: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    clauses = _words(entry, "clause", where)
-    for clause in clauses:
-        if clause.split(" ")[0] not in _SUBJECTS:
-            raise AssetError(f"{where}: clause {clause!r} must begin with one of {', '.join(_SUBJECTS)}")
-    return clauses
 
 
 def _table(entry: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:

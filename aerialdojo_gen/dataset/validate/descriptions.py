@@ -227,7 +227,7 @@ def _unlike(words: _Words, instance: Instance, text: str) -> str:
 
 def _looks(words: _Words, instance: Instance) -> set[str]:
     looks = words.catalogue[instance.category].looks if instance.category in words.catalogue else ()
-    return {word for look in looks for word in _split(look.phrase)}
+    return {word for look in looks for wording in look.wordings for word in _split(wording)}
 
 
 def _shades(words: _Words, instance: Instance) -> set[str]:
