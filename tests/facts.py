@@ -98,7 +98,8 @@ def of_routes(release: Path) -> dict[str, float]:
 def of_tasks(release: Path) -> dict[str, float]:
     """What the splits leave unseen, what a language model would be asked, and goals with another viewpoint."""
     folder = ds.dataset(release / "tasks", format="parquet", partitioning=["split"])
-    read = ["nav_id", "split", "setting", "action_budget", "modality", "target_seen_in_train", "start_seen_in_train"]
+    seen = [f"{what}_seen_in_train" for what in ("target", "start", "pair")]
+    read = ["nav_id", "split", "setting", "action_budget", "modality", *seen]
     tasks = folder.to_table(read).to_pandas()
     read = ["nav_id", "n_actions", "scene", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m"]
     routes = ds.dataset(release / "routes", format="parquet").to_table(read).to_pandas()
@@ -113,6 +114,7 @@ def of_tasks(release: Path) -> dict[str, float]:
         }
         facts[f"{subset}_unseen_targets_percent"] = share(~mine["target_seen_in_train"])
         facts[f"{subset}_unseen_starts_percent"] = share(~mine["start_seen_in_train"])
+        facts[f"{subset}_seen_pairs_percent"] = share(mine["pair_seen_in_train"])
     asked = tasks[tasks["split"].isin(tests) & (tasks["setting"] == "base")]
     # Without the Approach, which is no action of an agent.
     actions = asked.merge(routes[["nav_id", "n_actions"]], on="nav_id")["n_actions"] - 1

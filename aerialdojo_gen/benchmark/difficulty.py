@@ -73,6 +73,10 @@ _SPECS = (
         {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
     ),
     _BreakdownSpec(
+        SEEN, ("pair_seen_in_train",), "Pairs of start object and target that training shows",
+        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
+    ),
+    _BreakdownSpec(
         SEEN, ("target_split",), "The split by target",
         {"train": lambda side: side == "train", "test": lambda side: side == "test"}, "tasks",
     ),

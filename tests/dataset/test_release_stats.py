@@ -209,10 +209,11 @@ def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
 def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
     tasks = read_tasks(smoke, check_release(smoke))
     test = frame[frame["subset"] == "test"]
-    new = ~test["target_seen_in_train"], ~test["start_seen_in_train"]
+    new = [~test[f"{what}_seen_in_train"] for what in ("target", "start", "pair")]
     seen = {row.name: row.ours for row in seen_table(tasks).rows}["all"]
     assert seen == pytest.approx((
         len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
+        new[2].sum(), 100 * new[2].mean(),
     ))  # fmt: skip
     held = {row.name: row.ours for row in held_out_table(tasks).rows}
     for partition in ("ID", "OOD"):

@@ -51,8 +51,8 @@ def test_a_release_of_an_older_version_is_not_at_fault(planted):
         planted.edit_all(side, forget, lambda _: True)
     for side in ("tasks/train", "tasks/test"):
         planted.edit_all(side, lambda row: row.update(dict.fromkeys(
-            ("target_seen_in_train", "start_seen_in_train", "target_split", "target_held_out", "start_held_out"))),
-            lambda _: True)  # fmt: skip
+            ("target_seen_in_train", "start_seen_in_train", "pair_seen_in_train", "target_split", "target_held_out",
+             "start_held_out"))), lambda _: True)  # fmt: skip
     assert check(planted) == {}
 
 
@@ -60,6 +60,7 @@ def test_a_release_of_an_older_version_is_not_at_fault(planted):
 TASKS = (
     (lambda r: r.update(target_seen_in_train=not r["target_seen_in_train"]), lambda _: True, "seen_in_train"),
     (lambda r: r.update(start_seen_in_train=not r["start_seen_in_train"]), lambda _: True, "seen_in_train"),
+    (lambda r: r.update(pair_seen_in_train=not r["pair_seen_in_train"]), lambda _: True, "seen_in_train"),
     (lambda r: r.update(target_split="train"), lambda r: r["target_split"] == "test", "split_by_objects"),
     (lambda r: r.update(target_split="test"), lambda r: r["target_split"] == "train", "split_by_objects"),
     (lambda r: r.update(target_held_out=False, target_split="train"),

@@ -187,9 +187,13 @@ def test_what_training_has_seen_is_told_by_the_tables_alone(data):
     routes = routes.set_index("nav_id").loc[tasks.index]
     train = tasks["subset"] == "train"
     targets, starts = routes["target_object_id"], routes["start_object_id"] * 100 + routes["start_anchor_id"]
-    assert (tasks["target_seen_in_train"] == targets.isin(set(targets[train]))).all()
-    assert (tasks["start_seen_in_train"] == starts.isin(set(starts[train]))).all()
-    assert tasks.loc[train, ["target_seen_in_train", "start_seen_in_train"]].all(axis=None)
+    pairs = routes["start_object_id"] * 100 + targets
+    for name, own in {"target": targets, "start": starts, "pair": pairs}.items():
+        seen = tasks[f"{name}_seen_in_train"]
+        assert (seen == own.isin(set(own[train]))).all()
+        assert seen[train].all()
+    # A pair whose two objects training has, each with another one.
+    assert (~tasks["pair_seen_in_train"] & tasks["target_seen_in_train"]).any()
 
 
 def test_the_split_by_objects_keeps_both_ends_out_of_training(data):

@@ -115,10 +115,15 @@ def seen_table(tasks: pd.DataFrame) -> Comparison:
         Measure("new start", _count(("start_seen_in_train", 0.0))),
         Measure("start %", _share("start_seen_in_train", lambda seen: seen == 0.0), "%", 2),
         Measure("new both", _count(("target_seen_in_train", 0.0), ("start_seen_in_train", 0.0))),
+        Measure("new pair", _count(("pair_seen_in_train", 0.0))),
+        Measure("pair %", _share("pair_seen_in_train", lambda seen: seen == 0.0), "%", 2),
     )
     test = tasks[tasks["subset"] == "test"]
     groups = {f"{p} test": test[test["partition"] == p] for p in ("ID", "OOD")} | {"all": test}
-    notes = ("Test tasks by the paper's split; new: no training task of the partition has it.",)
+    notes = (
+        "Test tasks by the paper's split; new: no training task of the partition has it. both:",
+        "target and start pose. pair: start object and target, in this order.",
+    )
     return _table("What the paper's split leaves unseen", "split", measures, groups, notes)
 
 

@@ -181,12 +181,16 @@ def _in_picture(camera: Camera, pose: Floats, points: Floats) -> Mask:
 
 @check("tasks", needs=("routes",), after=_OF_TASK)
 def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """`target_seen_in_train` and `start_seen_in_train` are true where a training task has that target, that start."""
+    """`target_`, `start_` and `pair_seen_in_train` are true where a training task has that target, start, pair."""
     train = np.asarray(rows.texts("subset"), dtype=object) == "train"
-    target = np.append(data["routes"].ints("target_object_id"), -1)[data.route_of_task].tolist()
-    poses = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
-    for name, own in (("target_seen_in_train", target), ("start_seen_in_train", [tuple(pose) for pose in poses])):
+    start, target = (
+        np.append(data["routes"].ints(f"{end}_object_id"), -1)[data.route_of_task].tolist()
+        for end in ("start", "target")
+    )
+    poses = [tuple(pose) for pose in rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()]
+    for what, own in (("target", target), ("start", poses), ("pair", list(zip(start, target, strict=True)))):
         seen = {key for key, trains in zip(own, train, strict=True) if trains}
+        name = f"{what}_seen_in_train"
         stored = rows.floats(name)
         expected = np.fromiter((key in seen for key in own), dtype=np.float64, count=len(own))
         for row in np.flatnonzero(np.isfinite(stored) & (stored != expected)):

@@ -31,6 +31,9 @@ SPLITS = [
     column("start_seen_in_train", pa.bool_(),
            "whether a training task of the same partition starts from the same pose; by the paper's split",
            nullable=True),
+    column("pair_seen_in_train", pa.bool_(),
+           "whether a training task of the same partition leads from the same start object to the same target; by "
+           "the paper's split", nullable=True),
     column("target_split", pa.string(),
            "the split by objects: train where neither the target nor the object that the task starts from is held "
            "out, else test", nullable=True),

@@ -64,13 +64,14 @@ def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict
     (n,) columns of `SPLIT_COLUMNS`.
     """
     target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
-    # Object and anchor ids packed into one number.
-    pose = start.astype(np.int64) << 32 | routes.column("start_anchor_id").to_numpy()
+    # Two ids packed into one number.
+    pose, pair = (start.astype(np.int64) << 32 | ids for ids in (routes.column("start_anchor_id").to_numpy(), target))
     gone = np.fromiter(out, dtype=np.int64, count=len(out))
     target_out, start_out = np.isin(target, gone), np.isin(start, gone)
     return {
         "target_seen_in_train": pa.array(np.isin(target, target[train])),
         "start_seen_in_train": pa.array(np.isin(pose, pose[train])),
+        "pair_seen_in_train": pa.array(np.isin(pair, pair[train])),
         "target_split": pa.array(np.where(target_out | start_out, "test", "train").tolist(), pa.string()),
         "target_held_out": pa.array(target_out),
         "start_held_out": pa.array(start_out),
