@@ -156,6 +156,17 @@ def test_what_stands_between_hides_the_target(tmp_path):
     assert [(r["target_visible_at_start"], r["visible_view_at_start"]) for r in rows] == [(0.0, None)] * 2
 
 
+def test_what_shows_through_a_narrow_gap_is_seen(tmp_path):
+    """A centimetre between two fences: a fiftieth of what the ball would show."""
+    places = [(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)]
+    fences = [instance(name, box((9, y0, 0), (9.01, y1, 9))) for name, y0, y1 in (
+        ("south", -9, -1.655), ("north", -1.645, 9))]  # fmt: skip
+    out = pair(tmp_path, anchor_rows(places, variants=1), others=fences)
+    (row,) = [row for row in out.tables["pairs"].to_pylist() if row["start_object_id"] == 1]
+    assert 0.0 < row["target_visible_at_start"] < 0.04
+    assert row["visible_view_at_start"] == "front"
+
+
 def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
     rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
     pair(tmp_path, rows)

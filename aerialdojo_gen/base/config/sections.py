@@ -130,7 +130,7 @@ class PairObjectsConfig(Section):
     max_length_m: float = shared("task.long_horizon.max_length_m")
     max_approach_m: float = shared("task.max_approach_m")
     surface_points: int = Field(
-        64, ge=1, le=100_000, description="points of a target's surface that are looked for from the starts"
+        1024, ge=1, le=100_000, description="points of a target's surface that are looked for from the starts"
     )
 
 

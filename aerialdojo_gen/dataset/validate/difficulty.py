@@ -26,8 +26,8 @@ _SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
 # Where something is seen its view is known; 0 with the word, and a share without, are not.
 # Of a point: a share times the number of points is whole.
 _WHOLE = 1e-6
-# Rays to points of the object that meet its own edges.
-_EITHER_WAY = 2
+# Rays to points of the object that meet its own edges: so many at least, and one in so many.
+_EITHER_WAY, _ONE_IN = 2, 128
 _UNSEEN = "nothing is seen, and no view is named"
 _OF_ROUTE = (
     "list_lengths_differ", "action_order", "n_actions", "route_length", "euclidean_distance", "replay_differs",
@@ -164,9 +164,12 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
             }
             row = int(paths.rows[k])
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
-            whole = max(int(bare.sum()), 1)
-            counted = stored[row] * np.arange(max(whole - _EITHER_WAY, 1), whole + _EITHER_WAY + 1)
-            if abs(share - stored[row]) > 2.5 / whole or np.abs(counted - np.rint(counted)).min() > _WHOLE:
+            whole, either_way = max(int(bare.sum()), 1), max(_EITHER_WAY, n // _ONE_IN)
+            counted = stored[row] * np.arange(max(whole - either_way, 1), whole + either_way + 1)
+            if (
+                abs(share - stored[row]) > (either_way + 0.5) / whole
+                or np.abs(counted - np.rint(counted)).min() > _WHOLE
+            ):
                 yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
                 expected = " or ".join(sorted(best)) if share else _UNSEEN
