@@ -69,10 +69,10 @@ smoke: .venv/.installed  ## two small scenes through all stages, a rendered vide
 SAMPLE_AGENTS := oracle stop constant random explorer
 SAMPLE := --split id_test --split ood_test --setting base --setting standard --limit 64 $(foreach scene,U_Mall_0 U_Park_1 \
   N_Forest_0 N_Island_1 I_Harbor_0 I_Bridge_1 D_Flood_0 D_Earthquake_1,--scene $(scene))
-evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 64 tasks; print the paper's tables, ID and OOD
+evaluate: .venv/.installed  ## fly oracle, stop, constant, random, explorer on 64 tasks; print overall, the paper's tables, ID and OOD
 	@for agent in $(SAMPLE_AGENTS); do \
 	  $(RUN) evaluate --agent $$agent --run tables-$$agent $(SAMPLE) --data $(DATA) $(RUN_FLAGS) || exit 1; done
-	@$(RUN) report $(SAMPLE_AGENTS:%=tables-%) --table results --table partition --data $(DATA) --out $(DATA)/report
+	@$(RUN) report $(SAMPLE_AGENTS:%=tables-%) --table overall --table results --table partition --data $(DATA) --out $(DATA)/report
 
 POLICY := $(DATA)/policies/imitation/policy.safetensors
 policy: .venv/.train  ## train the learned baseline (2 h) and fly the row of it in README: 2,000 tasks of ID test, as many of OOD test

@@ -153,7 +153,7 @@ def evaluate_tables(data: Path) -> str:
         "--format",
         "markdown",
     ]
-    command += ["--table", "results", "--table", "partition"]
+    command += ["--table", "overall", "--table", "results", "--table", "partition"]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.strip() + "\n"
 

@@ -43,9 +43,30 @@ def _ranked(run: Run, group: str = "") -> str | None:
 def run_rows(request: ReportRequest) -> list[Row]:
     """Make a row a run, under its group's heading."""
     return [
-        Row(run.label, Cut(k), run.group, _ranked(run), (f"{len(run.episodes):,}",))
+        Row(run.label, Cut(k), run.group, _ranked(run), _leading(run, len(run.episodes)))
         for k, run in enumerate(request.runs)
     ]
+
+
+def _leading(run: Run, episodes: int) -> dict[str, str]:
+    return {"episodes": f"{episodes:,}", "hints": run.told or "none"}
+
+
+def _headline_rows(request: ReportRequest) -> list[Row]:
+    """Make the rows of all episodes, of those with a held-out object, and of those outside the two malls."""
+    rows, table = run_rows(request), request.broken_down
+    share = float(np.mean(table.columns["malls"] == "malls"))
+    for section, column, value in (
+        ("target or start object held out (target_split = test)", "target_split", "test"),
+        (f"without the two malls ({100 * share:.0f} % of the episodes)", "malls", "other scenes"),
+    ):
+        if column not in table.columns or len(table.values(column, Cut())) < 2:
+            continue
+        for k, run in enumerate(request.runs):
+            cut = Cut(k, where=((column, value),))
+            if n := int(table.mask(cut).sum()):
+                rows.append(Row(run.label, cut, section, _ranked(run, section), _leading(run, n)))
+    return rows
 
 
 def _setting_rows(request: ReportRequest) -> list[Row]:
@@ -189,8 +210,10 @@ def caveats(runs: Sequence[Run]) -> list[str]:
             f"No SR-view of {', '.join(blind)}: flown by an older version or on a release without viewpoints/. "
             "Flown again on a release that has them they have one."
         )
-    if told := [f"{run.label} ({run.told})" for run in runs if run.told]:
-        notes.append(f"Told more than the goal: {', '.join(told)}.")
+    notes.append(
+        "Goals name a compass direction, and agents have no compass: only the hint heading tells them which way they "
+        "face at the start."
+    )
     notes += _adapted_notes(runs)
     if len({frozenset(run.table["task_id"].to_pylist()) for run in runs}) > 1:
         notes.append("The runs flew different tasks: their scores are no comparison of agents.")
@@ -227,7 +250,7 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
             continue
         results = [result for result in request.paper_results if result.setting == setting]
         theirs = [
-            Row(r.model, Cut(), f"another simulator (Unreal Engine; {r.source}), {r.group}-source", "paper", (), r)
+            Row(r.model, Cut(), f"another simulator (Unreal Engine; {r.source}), {r.group}-source", "paper", result=r)
             for r in results
         ]
         rows = run_rows(replace(request, runs=runs)) + theirs
@@ -242,7 +265,7 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
             )
         spec = TableSpec(
             NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), lambda _, own=rows: own,  # type: ignore[misc]
-            partial(_by_profile, metrics=_FURTHER), spread=True, headed=False,
+            partial(_by_profile, metrics=_FURTHER), spread=True, leading=("hints",), headed=False,
         )  # fmt: skip
         table = make_table(spec, replace(request, runs=runs), intervals=request.intervals)
         if any(not label for label, _ in table.rows):
@@ -277,8 +300,8 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
 
 _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
     "overall": TableSpec(
-        "Overall", run_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes",), headed=False,
-        notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
+        "Overall", _headline_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes", "hints"),
+        headed=False, notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
     ),
     "results": result_tables,
     "partition": TableSpec(
@@ -286,7 +309,7 @@ _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTa
         notes=lambda r: _adapted_notes(r.runs),
     ),
     "family": TableSpec("By family", run_rows, _by("family")),
-    "averages": TableSpec("Two averages", run_rows, _by_average, notes=lambda _: [
+    "averages": TableSpec("Two averages", _headline_rows, _by_average, notes=lambda _: [
         "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
     ]),
     "setting": TableSpec("By setting", run_rows, _by("setting")),
@@ -317,14 +340,14 @@ _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTa
     "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),
 }  # fmt: skip
 NAMES = tuple(_TABLES)
-# As in the paper; the others are optional.
-DEFAULT = ("results",)
+# What the paper's split leaves out, and the paper's tables; the others are optional.
+DEFAULT = ("overall", "results")
 
 
 def _made(request: ReportRequest, name: str) -> list[TextTable]:
     spec = _TABLES[name]
     if isinstance(spec, TableSpec):
-        return [make_table(spec, request)]
+        return [make_table(spec, request, request.broken_down)]
     return [count_table(spec, request)] if isinstance(spec, CountSpec) else spec(request)
 
 

@@ -72,7 +72,7 @@ def _scores(request: ReportRequest, whole: Cut) -> Iterator[list[Any]]:
     yield known("overall", "overall", whole)
     yield ["task_weighted", "task_weighted", *data.score(whole | Cut(weighted=True)), *unknown]
     yield from (["family", name, *score, *unknown] for name, score in summary.families.items())
-    for column in ("partition", "scene_type"):
+    for column in ("partition", "scene_type", "malls"):
         for name in data.values(column, whole):
             yield [column, name, *data.score(whole | Cut(where=((column, name),))), *unknown]
     yield from (["scene", name, *score, *unknown] for name, score in summary.scenes.items())

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from aerialdojo_gen.base.paper_figures import PaperResult
@@ -65,7 +65,7 @@ class Row:
     cut: Cut
     section: str = ""  # Heading of its section; empty for none
     rank_group: str | None = ""  # Best values are marked among these; None for a row that is not compared
-    leading: tuple[str, ...] = ()  # Cells that are no measures
+    leading: Mapping[str, str] = field(default_factory=dict)  # Cells that are no measures, by their headings
     result: PaperResult | None = None  # Of the paper, in place of episodes
 
 
@@ -90,7 +90,7 @@ class TableSpec:
     stub: str = "agent"
     notes: Callable[[ReportRequest], Sequence[str]] = lambda _: ()
     spread: bool = False  # Whether deviations over scenes are shown
-    leading: tuple[str, ...] = ()
+    leading: tuple[str, ...] = ()  # Headings of columns that are no measures
     headed: bool = True  # Whether the title names the success rule
 
 
@@ -130,9 +130,10 @@ def make_table(
             if row.rank_group is not None and column.minus is None and not math.isnan(value):
                 figure = MEASURES[column.measure].direction * printed(column.measure, value)
                 group.setdefault(row.rank_group, []).append((figure, len(lines)))
-        lines.append((row.label, (*(row.leading if spec.leading else ()), *cells)))
+        lines.append((row.label, (*(row.leading.get(head, NONE) for head in spec.leading), *cells)))
         if intervals and row.result is None:
-            lines += _interval_line(data, base | row.cut, columns)
+            gap = ("",) * len(spec.leading)
+            lines += [(label, gap + ends) for label, ends in _interval_line(data, base | row.cut, columns)]
     shift = len(spec.leading)
     marks = {(i, shift + k): mark for k, groups in enumerate(ranked) for i, mark in _marks(groups).items()}
     heads = [Column(head) for head in spec.leading]
