@@ -106,7 +106,7 @@ def made(name: str, runs: list[Run], data: Path = Path("no-release"), **options:
 
 
 def cells(table: TextTable, label: str) -> tuple[str, ...]:
-    return dict(table.rows)[label]
+    return next(row for name, row in table.rows if name == label)
 
 
 def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, runs: list[Run]) -> None:
@@ -129,38 +129,40 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, r
 
 def test_tables_4_and_5(runs: list[Run]) -> None:
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
-    (table,) = registry.report_tables(request)
+    overall, table = registry.report_tables(request)
+    assert overall.title == "Overall"
     assert table.title.startswith("Base")
-    assert [head for head, _ in table.groups] == ["3 m", "5 m"]
+    assert [head for head, _ in table.groups] == ["", "3 m", "5 m"]
+    assert cells(table, "package:Alpha")[0] == "none"
     # alpha at 3 m: Urban (¼ + 0)/2, Natural (½ + 0)/2, Infrastructure (0 + 1)/2, Disaster 0: 21.875 % in the mean.
     # OSR: Urban (¼ + ½)/2, Natural (1 + 0)/2, Infrastructure (1 + 1)/2, Disaster (1 + 0)/2: 59.375 %.
     # SPL is 0.8 a success. DTS: Urban (6.5 + 9)/2, Natural (4 + 10)/2, (4.5 + 2)/2, (8 + 4)/2: 6 m.
     # CR: Urban (0 + ½)/2, Disaster (1 + 0)/2: 18.75 %. At 5 m: SR ¼, ¼, ½, ½; OSR ½, ¾, 1, 1.
-    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Alpha")]
+    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Alpha")[1:]]
     assert means == ["21.88", "59.38", "17.50", "6.00", "18.75", "37.50", "81.25"]
     # Scenes' SR: ¼, 0, ½, 0, 0, 1, 0, 0; squares 1.3125, less 8 · 0.21875², by 7: the square of 0.36443.
-    assert cells(table, "package:Alpha")[0] == "21.88 ± 36.44"
-    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Beta")]
+    assert cells(table, "package:Alpha")[1] == "21.88 ± 36.44"
+    means = [cell.split(" ± ")[0] for cell in cells(table, "package:Beta")[1:]]
     # DTS: Urban 4, Natural 6, Infrastructure (10 + 7)/2, Disaster 10.
     assert means == ["12.50", "12.50", "10.00", "7.12", "0.00", "43.75", "43.75"]
-    assert cells(table, "stop")[3] == "9.00 ± 0.00"
+    assert cells(table, "stop")[4] == "9.00 ± 0.00"
     rows = [label for label, _ in table.rows]
     order = [rows.index(name) for name in ("package:Alpha", "package:Beta", "stop")]
     assert table.sections[order[0]] == "agents"
     assert table.sections[order[2]] == "floors"
-    marks = [[table.marks.get((row, k)) for k in range(7)] for row in order]
+    marks = [[table.marks.get((row, k)) for k in range(1, 8)] for row in order]
     assert marks[0] == [BEST, BEST, BEST, BEST, None, SECOND, BEST]
     assert marks[1] == [SECOND, SECOND, SECOND, SECOND, BEST, BEST, SECOND]
     assert marks[2] == [None, None, None, None, BEST, None, None]
     # Below ours, the paper's: ranked among themselves, named as another simulator's.
     opus = rows.index("Claude Opus 5")
-    assert table.rows[opus][1][0] == "3.20 ± 2.04"
-    assert table.marks[opus, 0] == BEST
+    assert table.rows[opus][1][:2] == ("–", "3.20 ± 2.04")
+    assert table.marks[opus, 1] == BEST
     assert "Unreal Engine" in table.sections[rows.index("Qwen3-VL-4B")]
     assert any("ranked among themselves" in note for note in table.notes)
     # One line more each has the intervals, but for the paper's.
     assert [rows[row + 1] for row in order] == ["", "", ""]
-    assert table.rows[order[2] + 1][1][0] == "0.00–0.00"
+    assert table.rows[order[2] + 1][1][:2] == ("", "0.00–0.00")
     assert made("results", runs, intervals=False).rows[1][0] == "package:Beta"
     text = as_text(table, 120)
     assert max(map(len, text.splitlines())) <= 120
