@@ -187,7 +187,8 @@ def test_what_training_has_seen_is_told_by_the_tables_alone(data):
     # So few training tasks that some pairs have none.
     tables = split.run(job, SplitConfig(id_train_fraction=0.2)).tables
     tasks, routes = (
-        pd.concat([tables[f"{name}/{side}"].to_pandas() for side in ("train", "test")]) for name in ("tasks", "routes")
+        pd.concat([tables[f"{name}/{side}"].to_pandas() for side in ("train", "test")])
+        for name in ("tasks", "routes")
     )
     tasks = tasks.drop_duplicates("nav_id").set_index("nav_id")
     routes = routes.set_index("nav_id").loc[tasks.index]
