@@ -74,8 +74,8 @@ class Look:
 
     @property
     def wordings(self) -> tuple[str, ...]:
-        """All ways to say it."""
-        return (*self.details, *self.adjectives, *self.clauses)
+        """Ways to say it that a text can be searched for: it may give an adjective to another thing."""
+        return (*self.details, *self.clauses)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where:
     looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
     said: set[str] = set()
     for k, look in enumerate(looks):
-        for wording in look.wordings:
+        for wording in (*look.wordings, *look.adjectives):
             if wording in said:
                 raise AssetError(f"{where} looks[{k}]: duplicate phrase {wording!r}")
             said.add(wording)

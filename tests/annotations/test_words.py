@@ -64,7 +64,7 @@ def test_no_wording_of_a_look_says_a_colour_or_a_number_that_is_not_checked(cata
             colours = {name for names in look.colour.values() for name in names}
             materials = " ".join(name for names in look.material.values() for name in names)
             counts = {n for least, most in look.count.values() for n in range(least, most + 1)}
-            for wording in look.wordings:
+            for wording in (*look.wordings, *look.adjectives):
                 text = wording.replace("ice cream", "").lower()
                 words = re.findall(r"[a-z]+", text)
                 said = [w for w in words if w in SHADES and w[:4] not in materials]
