@@ -53,7 +53,11 @@ BY_NAME: dict[str, tuple[str, ...]] = {
 }
 
 # Files that modules read, relative to the package. Files outside it are sources of stages.
-DATA_FILES = {"annotations.phrases": "annotations/phrases/*.toml", "annotations.places": "annotations/places/*.toml"}
+DATA_FILES = {
+    "annotations.phrases": "annotations/phrases/*.toml",
+    "annotations.places": "annotations/places/*.toml",
+    "scenes.colours": "scenes/colour_names.toml",
+}
 
 # Distributions that provide an import of another name.
 _DISTRIBUTIONS = {

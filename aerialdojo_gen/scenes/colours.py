@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import colorsys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
 _SAMPLES = 4096
 # A second colour is named from this share of the surface, and of the first colour's share.
 _SECOND, _OF_FIRST = 0.2, 0.35
+# Two colours of a surface are this far apart in CIELAB.
+_APART = 25.0
 _NEUTRAL, _AS_MUCH = ("white", "grey", "black"), 1.5
 
 
@@ -70,11 +75,19 @@ def texel(uv: NDArray[np.float64], rows: int, columns: int) -> tuple[NDArray[np.
 
 def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> str:
     """Name the colour of a surface, or the two that it has most of, e.g. ``"blue and white"``."""
-    shares = named_shares(colours, weights)
+    means: dict[str, NDArray[np.float64]] = {}
+    shares: dict[str, float] = {}
+    for rgb, weight in _distinct(colours, weights):
+        word = colour_name(rgb)
+        shares[word] = shares.get(word, 0.0) + weight
+        means[word] = means.get(word, np.zeros(3)) + weight * rgb
     ranked = sorted(shares, key=lambda word: (-shares[word], word))
     if not ranked:
         return ""
-    first, second = ranked[0], ranked[1] if len(ranked) > 1 else ""
+    # Shades of one colour, as of a wall in light and shade, are none of two.
+    at = {word: _lab((mean / max(shares[word], 1e-300))[None])[0] for word, mean in means.items()}
+    others = [word for word in ranked[1:] if np.linalg.norm(at[word] - at[ranked[0]]) >= _APART]
+    first, second = ranked[0], others[0] if others else ""
     # Neutral colours come second if both are about equal: "blue and white".
     if first in _NEUTRAL and second not in _NEUTRAL and second and shares[first] < _AS_MUCH * shares[second]:
         first, second = second, first
@@ -84,50 +97,48 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
     return f"{first} and {second}" if both else first
 
 
-def named_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> dict[str, float]:
-    """Sum weights (k,) by colour name of colours (k, 3)."""
+def _distinct(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.int64], float]]:
+    """Yield the different colours of colours (k, 3), and the sums of their weights (k,)."""
     reduced = colours.astype(np.int64) // 4 * 4 + 2 if len(colours) > 256 else colours.astype(np.int64)
     found, index = np.unique(reduced, axis=0, return_inverse=True)
-    summed = np.bincount(index.reshape(-1), weights=weights, minlength=len(found))
-    shares: dict[str, float] = {}
-    for rgb, weight in zip(found, summed.tolist(), strict=True):
-        word = colour_name(rgb)
-        shares[word] = shares.get(word, 0.0) + weight
-    return shares
+    yield from zip(found, np.bincount(index.reshape(-1), weights=weights, minlength=len(found)).tolist(), strict=True)
 
 
-# Upper ends of the hues, degrees.
-_HUES = (
-    (15, "red"),
-    (42, "orange"),
-    (68, "yellow"),
-    (165, "green"),
-    (195, "turquoise"),
-    (255, "blue"),
-    (290, "purple"),
-    (335, "pink"),
-    (361, "red"),
-)
 # Every word that a colour can have.
 COLOURS = (
     "white", "black", "grey", "brown", "beige", "red", "orange", "yellow", "green", "turquoise", "blue", "purple",
     "pink",
 )  # fmt: skip
+_SURVEY = Path(__file__).with_name("colour_names.toml")
 
 
 def colour_name(rgb: ArrayLike) -> str:
-    """Name an sRGB colour by one of about a dozen everyday words, e.g. ``"brown"``."""
-    red, green, blue = (float(c) / 255.0 for c in np.asarray(rgb, dtype=np.float64))
-    hue, light, saturation = colorsys.rgb_to_hls(red, green, blue)
-    if light > 0.9:
-        return "white"
-    if light < 0.12:
-        return "black"
-    if saturation < 0.16:
-        return "grey" if light < 0.82 else "white"
-    word = next(name for end, name in _HUES if hue * 360 < end)
-    if word in ("red", "orange", "yellow") and light < 0.42 and saturation < 0.75:
-        return "brown"
-    if word in ("orange", "yellow") and light > 0.68:
-        return "beige"
-    return word
+    """Name an sRGB colour by the basic term that people use for it, e.g. ``"brown"``."""
+    red, green, blue = np.asarray(rgb).tolist()
+    return _nearest_term(red, green, blue)
+
+
+@lru_cache(1 << 16)
+def _nearest_term(red: float, green: float, blue: float) -> str:
+    terms, places = _survey()
+    return terms[int(np.argmin(np.linalg.norm(places - _lab(np.array([[red, green, blue]])), axis=1)))]
+
+
+@cache
+def _survey() -> tuple[list[str], NDArray[np.float64]]:
+    """Return the terms of the survey's colours, and their places in CIELAB, (k, 3)."""
+    rows = [(term, bytes.fromhex(code)) for term, codes in read_toml(_SURVEY).items() for code in codes.split()]
+    return [term for term, _ in rows], _lab(np.array([list(code) for _, code in rows]))
+
+
+# Linear sRGB to XYZ over that of the white point D65.
+_XYZ = np.array([[0.4339, 0.3762, 0.1899], [0.2126, 0.7152, 0.0722], [0.0177, 0.1095, 0.8728]])
+
+
+def _lab(rgb: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert sRGB colours (k, 3) of 0 to 255 to CIELAB."""
+    v = np.asarray(rgb, dtype=np.float64) / 255.0
+    linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+    xyz = linear @ _XYZ.T
+    x, y, z = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116).T
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)

@@ -266,7 +266,8 @@ def test_the_monastery_up_to_planned_tasks(tmp_path):
 @pytest.mark.parametrize(
     ("rgb", "word"),
     [((200, 30, 30), "red"), ((250, 250, 250), "white"), ((20, 20, 20), "black"), ((130, 130, 130), "grey"),
-     ((40, 80, 200), "blue"), ((60, 150, 60), "green"), ((120, 80, 50), "brown"), ((230, 210, 170), "beige")],
+     ((40, 80, 200), "blue"), ((60, 150, 60), "green"), ((120, 80, 50), "brown"), ((230, 210, 170), "beige"),
+     ((160, 60, 160), "purple"), ((165, 99, 60), "brown"), ((230, 230, 226), "white"), ((45, 45, 48), "grey")],
 )  # fmt: skip
 def test_colours_have_everyday_names(rgb, word):
     assert colour_name(rgb) == word
