@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, Vocabulary
+from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN, Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.scenes.model import Instance
 
@@ -76,9 +76,9 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
 
 
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
-    """The things of an imported mesh, highest first."""
+    """The things of an imported mesh, highest first, those without a name last."""
     things = [i for i in vocabulary.scene.instances if i.category not in NON_OBJECTS]
-    return sorted(things, key=lambda i: (-float(i.bounds[1, 2]), i.node))
+    return sorted(things, key=lambda i: (i.category == UNKNOWN, -float(i.bounds[1, 2]), i.node))
 
 
 def _is_large(instance: Instance) -> bool:

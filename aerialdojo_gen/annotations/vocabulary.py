@@ -33,13 +33,15 @@ class Vocabulary:
         for i in scene.instances:
             if scene.imported and i.category not in NON_OBJECTS:
                 # Imported meshes have categories of their own, all of which may be targets.
-                self.names.setdefault(i.category, spoken(i.category))
+                self.names[i.category] = spoken(i.category)
                 targets |= {i.category}
             if i.category not in by_category:
                 name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
                 words = words_of(i.category, name, kind, (), i.category in targets)
-                if scene.imported and not words.group:
-                    words = replace(words, group=group_of(words.name))
+                if scene.imported and (words.plural_heads or not words.group):
+                    # What is a row of things in the catalogue is one of them here.
+                    group = group_of(words.name)
+                    words = replace(words, nouns=(), plural_heads=(), collectives=(), group=group)
                 by_category[i.category] = words
         self.words = [by_category[i.category] for i in scene.instances]
         self.nouns = [

@@ -19,11 +19,12 @@ from aerialdojo_gen.annotations.draft import (
 )
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
-from aerialdojo_gen.annotations.vocabulary import UNKNOWN, Vocabulary
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.imports.forms import is_unnamed
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
@@ -98,7 +99,7 @@ def draft_scene(
         objects = drafter.objects(proposed, bar.advance)
     _check_enough(name, len(objects), proposed, drafter.rejection_summary(), exact=exact)
     write_annotations(Annotations(name, chosen_landmarks, objects), path)
-    unknown = sum(entry.category == UNKNOWN for entry in objects)
+    unknown = sum(is_unnamed(entry.node, entry.category) for entry in objects)
     if unknown:
         log.warning(
             "%s: needs review: only colour and shape are known of %d of %d objects; name them: %s",

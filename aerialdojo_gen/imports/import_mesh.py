@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import shapely
 import trimesh
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.vocabulary import UNKNOWN
+from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region, connected_bodies, unique_rows
+from aerialdojo_gen.imports.forms import FORMS, colour_of, form_of, grown, is_unnamed, material_shares, size_words
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
@@ -27,7 +27,6 @@ from aerialdojo_gen.imports.surfaces import (
     ground_cover,
     ground_plane,
 )
-from aerialdojo_gen.scenes.colours import colour_words, shown_colours
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -118,8 +117,10 @@ class SourceMesh:
             raise AssetError("no triangles are left after repair: the mesh is empty or degenerate")
         # The repair lines must not depend on the reader's order of nodes.
         repairs.lines.sort()
+        labels = {label for b in bodies for label in (b.name, *(s.name for s in b.surfaces))}
+        repairs.lines += options.naming.unused(labels)
         bodies = sort_by_position(bodies)
-        domes = find_domes(bodies, [options.naming.from_table(b.name).category for b in bodies])
+        domes = find_domes(bodies, [options.naming.from_table(b.name, material_shares(b)).category for b in bodies])
         rest = [b for k, b in enumerate(bodies) if k not in domes]
         return cls(rest, [bodies[k] for k in domes], repairs)
 
@@ -226,6 +227,12 @@ def make_scene(
         Scene(name, tuple(instances), parts, bounds, imported=True, backdrop=backdrop), source_names
     )
     repairs.lines += describe_surfaces(scene)
+    things = [i for i in scene.instances if i.category not in NON_OBJECTS]
+    if things and all(is_unnamed(i.node, i.category) for i in things):
+        repairs.lines.append(
+            "no thing has a name, all are told by colour and form: name them by a table of patterns of nodes or "
+            "materials (--names names.csv), or on the page of annotate"
+        )
     return replace(scene, imported=False), repairs
 
 
@@ -322,22 +329,33 @@ def _report_textures(bodies: Sequence[RawNode], builder: MaterialBuilder, light:
 def _make_instances(
     bodies: Sequence[tuple[RawNode, tuple[Part, ...]]], naming: Naming, materials: dict[str, Material]
 ) -> list[Instance]:
-    """Give each body a node name, a category, and attributes of colour, size and shape."""
-    counts: dict[str, int] = {}
-    heights = [float(b.vertices[:, 2].max() - b.vertices[:, 2].min()) for b, parts in bodies if parts]
-    tall, low = (float(np.quantile(heights, q)) for q in (0.8, 0.2)) if heights else (0.0, 0.0)
+    """Give each body a node name, a category, and attributes of colour, size and material."""
     least, most = _bounds([body for body, _ in bodies]) if bodies else (np.zeros(3), np.zeros(3))
+    names = [naming.name_of(body.name, material_shares(body)) for body, _ in bodies]
+    colours = [
+        colour_of(parts, materials, name.attributes.get("colour", ""))
+        for (_, parts), name in zip(bodies, names, strict=True)
+    ]
+    sizes = [np.ptp(body.vertices, axis=0) for body, _ in bodies]
+    categories = []
+    for (body, _), name, colour, size in zip(bodies, names, colours, sizes, strict=True):
+        ground = len(bodies) > 1 and body.name != "clutter" and _is_terrain(body, most - least)
+        own = name.category or ("terrain" if ground else _category(body))
+        categories.append(own if name.category else grown(own, colour, float(size[2])))
+    words = [""] * len(bodies)
+    for category in {*categories} - {UNKNOWN}:
+        rows = [k for k, own in enumerate(categories) if own == category]
+        for k, word in zip(rows, size_words([sizes[k] for k in rows]), strict=True):
+            words[k] = word
+    counts: dict[str, int] = {}
     out = []
-    for body, parts in bodies:
-        if not parts:
-            continue
-        name = naming.name_of(body.name)
-        ground = len(bodies) > 1 and _is_terrain(body, most - least)
-        category = name.category or ("terrain" if ground and body.name != "clutter" else _category(body))
-        appearance = _appearance(body, parts, materials, tall, low)
-        appearance |= (_shape_attributes(body, appearance) if category == UNKNOWN else {}) | name.attributes
-        k = counts[category] = counts.get(category, -1) + 1
-        out.append(Instance(f"{category}_{k:04d}", category, "", appearance, parts))
+    for (_, parts), name, category, colour, word in zip(bodies, names, categories, colours, words, strict=True):
+        # A thing without a name has its form for a category, and no number of its own.
+        stem = category if name.category or category not in FORMS else UNKNOWN
+        k = counts[stem] = counts.get(stem, -1) + 1
+        look = {"size": word, **name.attributes, "colour": colour}
+        look = {key: value for key, value in look.items() if value}
+        out.append(Instance(f"{stem}_{k:04d}", category, "", look, parts))
     return out
 
 
@@ -354,40 +372,6 @@ def _is_terrain(body: RawNode, extent: Floats) -> bool:
 
 def _category(body: RawNode) -> str:
     """Category of a body without a meaningful name: flat and wide ones are never targets."""
-    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
+    size = np.ptp(body.vertices, axis=0)
     flat = size[2] < 0.05 * max(size[0], size[1]) or (size[2] < 1.0 and max(size[:2]) > 10.0)
-    return "clutter" if body.name == "clutter" else "slab" if flat else UNKNOWN
-
-
-def _shape_attributes(body: RawNode, appearance: dict[str, str]) -> dict[str, str]:
-    """Describe the shape of an unnamed body, which has no other distinction."""
-    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    outline = shapely.convex_hull(shapely.multipoints(body.vertices[:, :2]))
-    if outline.area < 1e-6:
-        return {}
-    rectangle = shapely.minimum_rotated_rectangle(outline)
-    filled = outline.area / rectangle.area
-    short, long = sorted(math.dist(rectangle.exterior.coords[k], rectangle.exterior.coords[k + 1]) for k in (0, 1))
-    if long > 3.0 * short:
-        plan = "long"
-    elif long > 1.15 * short:
-        plan = "oblong" if filled > 0.9 else "irregular"
-    else:
-        # A disc fills 0.785 of its bounding square, an octagon 0.828.
-        plan = "square" if filled > 0.95 else "round" if 0.76 < filled < 0.84 else "irregular"
-    rise = "flat " if size[2] < 0.25 * short else "upright " if size[2] > 2.0 * long else ""
-    return {"size": appearance.get("size", "medium-sized"), "shape": f"{rise}{plan}"}
-
-
-def _appearance(
-    body: RawNode, parts: Sequence[Part], materials: dict[str, Material], tall: float, low: float
-) -> dict[str, str]:
-    size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-    appearance = {"colour": colour_words(*shown_colours(parts, materials))}
-    if tall > 1.2 * low:
-        appearance |= {"size": "tall"} if size[2] >= tall else {"size": "low"} if size[2] <= low else {}
-    flat = body.vertices[:, :2] - body.vertices[:, :2].mean(axis=0)
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(flat.T) + 1e-9 * np.eye(2)), 0.0))
-    if spread[1] > 3.0 * spread[0]:
-        appearance["shape"] = "long"
-    return appearance
+    return "clutter" if body.name == "clutter" else "slab" if flat else form_of(body.vertices)

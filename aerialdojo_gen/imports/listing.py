@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.imports.cutting import connected_bodies
+from aerialdojo_gen.imports.forms import material_shares
 from aerialdojo_gen.imports.import_mesh import LARGEST_M, MeshOptions, SourceMesh, describe_extent, size_text
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
@@ -116,7 +117,7 @@ def describe_mesh(
     largest = sorted(bodies, key=lambda row: -float(areas(row[0].vertices, row[0].faces.astype(np.int32)).sum()))
     rows = []
     for body, label, closed in largest[:_SHOWN]:
-        name = naming.name_of(body.name).category.replace("_", " ")
+        name = naming.name_of(body.name, material_shares(body)).category.replace("_", " ")
         west, east = body.vertices.min(axis=0) + 0.0, body.vertices.max(axis=0) + 0.0  # no minus before a zero
         ranges = [f"{a:.1f} to {b:.1f}" for a, b in zip(west, east, strict=True)]
         cells = [name[:20] or "-", f"{len(body.faces):,}", f"{int(label.max()) + 1:,}", f"{closed.mean():.0%}"]

@@ -46,9 +46,14 @@ def decode_surfaces(
     decoded: dict[bytes, tuple[NDArray[Any] | None, str]] = {}
     made = [_surface(material, decoded) for material in materials]
     made = _limit_sizes(made, texture_px)
-    surfaces = {s.digest: s for s in reversed(made)}
+    names: dict[str, set[str]] = {}
+    for s in made:
+        names.setdefault(s.digest, set()).add(s.name)
+    # A picture of several materials is kept once, without a name: it is not told which of them it shows.
+    made = [s if s.texture is None or len(names[s.digest]) == 1 else replace(s, name="") for s in made]
+    surfaces = {(s.digest, s.name): s for s in reversed(made)}
     order = sorted(surfaces)
-    return tuple(surfaces[d] for d in order), [order.index(s.digest) for s in made]
+    return tuple(surfaces[key] for key in order), [order.index((s.digest, s.name)) for s in made]
 
 
 def _surface(material: SourceMaterial, decoded: dict[bytes, tuple[NDArray[Any] | None, str]]) -> RawSurface:

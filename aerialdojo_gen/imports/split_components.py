@@ -200,7 +200,10 @@ def _is_thing(body: RawNode, rows: Ints) -> bool:
 
 
 def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
-    """Assign pieces within the box of a larger one, and above or at it, to the smallest such piece."""
+    """Assign pieces within the box of a larger one, and above or at it, to the smallest such piece.
+
+    What carries a wider piece is a part of it: a trunk of its crown, walls of their roof.
+    """
     if not pieces:
         return []
     low = np.array([p.vertices.min(axis=0) for p in pieces])
@@ -217,8 +220,20 @@ def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
             if _lies_over(pieces, int(j), int(k), maps):
                 owner[k] = j
                 break
-    for k in order[::-1]:
-        owner[k] = owner[owner[k]]
+    flat_low, flat_high = low[:, :2] - _TOUCH_M, high[:, :2] + _TOUCH_M
+    for k in order:
+        wider = (flat_low <= low[k, :2]).all(axis=1) & (flat_high >= high[k, :2]).all(axis=1)
+        top = high[k, 2]
+        above = (low[:, 2] > low[k, 2]) & (low[:, 2] <= top + _TOUCH_M) & (high[:, 2] >= top - _TOUCH_M)
+        carried = np.flatnonzero(wider & above & (np.arange(len(pieces)) != k)).tolist()
+        # Of several, the lowest: the beam of a roof before the roof.
+        j = min(carried, key=lambda j: (float(low[j, 2]), j), default=k)
+        if j != k and owner[k] == k and _lies_over(pieces, j, int(k), maps):
+            owner[k] = j
+    for _ in range(len(pieces)):
+        if (owner == owner[owner]).all():
+            break
+        owner = owner[owner]
     groups: dict[int, list[RawNode]] = {}
     for k, piece in enumerate(pieces):
         groups.setdefault(int(owner[k]), []).append(piece)

@@ -17,13 +17,11 @@ from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.imports.forms import form_of, grown, is_unnamed
 from aerialdojo_gen.imports.import_mesh import import_mesh
-from aerialdojo_gen.imports.naming import words_in
+from aerialdojo_gen.imports.naming import Naming, words_in
 from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-
-# What stands there without a name: a drum and a box.
-FORMS = ("round", "square")
 
 
 def pasted(text: str, begin: str) -> list[str]:
@@ -175,9 +173,10 @@ def test_drafts_are_true_or_silent(place, capsys):
     assert not re.search(r"\b(mesh|c3e0b|ceb|c e b|a3f9c|afc|a f c|\d+)\b", told), told
     assert not re.search(r"\ba (low |tall |long )*(green )?leaves", told), told
     by_node = {entry["node"]: entry for entry in made["objects"]}
-    assert {entry["category"] for entry in made["objects"]} >= {"truck", "object"}
-    shapes = {entry["name"] for entry in made["objects"] if entry["category"] == "object"}
-    assert shapes <= {f"{size} {form} grey object" for size in ("low", "medium-sized", "tall") for form in FORMS}
+    assert {entry["category"] for entry in made["objects"]} >= {"truck", "cylinder", "box"}
+    assert {entry["name"] for entry in made["objects"] if is_unnamed(entry["node"], entry["category"])} == {
+        "grey cylinder", "grey box",
+    }  # fmt: skip
     assert "needs review" in err
     for name in (mark["name"] for mark in made["landmarks"]):
         assert name not in ("truck", "grey truck", "object"), name
@@ -225,6 +224,11 @@ def test_a_table_says_what_nodes_are_called(place, capsys):
     assert not any("fountain" in name for name in names)
     if "hedges" in said_of:
         assert "a row of" in said_of["hedges"]["description"].lower()
+    # The same table as TOML; a row that fits nothing is told.
+    (place / "names.toml").write_text('"mesh_0*" = {name = "shed"}\n"Tower*" = "red tower"\n')
+    told = said(capsys, "add-scene", "Two", "Garden.glb", "--up", "z", "--names", "names.toml")[1]
+    assert "'Tower*' fits no node and no material of the file" in told
+    assert "mesh_0" not in told
     (place / "names.csv").write_text("pattern,name\n*,mesh_7\n")
     code, _, err = said(
         capsys, "add-scene", "Other", "Garden.glb", "--up", "z", "--project", "our scenes", "--names", "names.csv"
@@ -240,11 +244,44 @@ def test_a_table_says_what_nodes_are_called(place, capsys):
         ("House03", "house"), ("City_c3e0b", "city"), ("Mesh_012", ""), ("Object.003", ""), ("a3f9c", ""),
         ("deadbeef", ""), ("Cube.001", ""), ("geometry_0", ""), ("way/123456", ""), ("node_x2y", ""), ("grp_mdl", ""),
         ("Cafe_LOD0", "cafe"), ("3f2504e0-4f89-11d3-9a0c-0305e82c3301", ""), ("Bus.Mesh", "bus"), ("", ""),
-        ("tree_tree_7", "tree"), ("オブジェクト", ""),
+        ("tree_tree_7", "tree"), ("オブジェクト", ""), ("TrafficCone_2", "traffic cone"), ("Cone.004", ""),
+        ("Mülltonne.001", "mülltonne"), ("SM_Bench_03a", "bench"),
     ],
 )  # fmt: skip
 def test_words_are_read_out_of_node_names_and_nothing_else(node, words):
     assert " ".join(words_in(node)) == words
+
+
+@pytest.mark.parametrize(
+    ("node", "materials", "category", "attributes"),
+    [
+        ("DeliveryVan_Blue", {}, "delivery_van", {"colour": "blue"}),
+        ("DeliveryVan_Red", {"Metal": 0.9}, "delivery_van", {"colour": "red", "material": "metal"}),
+        ("Tree_Oak_LOD0", {"Wood": 0.9}, "oak_tree", {}), ("SM_Rock_Large_01", {}, "rock", {"size": "large"}),
+        ("old_rusty_barrel_3", {}, "barrel", {"state": "rusty"}), ("Haus_3", {}, "haus", {}),
+        ("Mülltonne.001", {}, "mulltonne", {"called": "mülltonne"}), ("Street_Furniture", {}, "street_furniture", {}),
+        ("", {"Leaves_01": 0.8, "Bark": 0.2}, "tree", {}), ("", {"M_Concrete": 1.0}, "", {"material": "concrete"}),
+        ("", {"Wall_Plaster": 0.6, "RoofTiles": 0.4}, "house", {}), ("Mesh_1", {"Wall": 1.0}, "", {}),
+        ("Prop_Chair", {"Leather": 0.4}, "chair", {}), ("leaves", {}, "leaves", {}),
+    ],
+)  # fmt: skip
+def test_names_of_nodes_and_materials_are_a_noun_and_attributes(node, materials, category, attributes):
+    name = Naming().name_of(node, materials)
+    assert (name.category, name.attributes) == (category, attributes)
+
+
+@pytest.mark.parametrize(
+    ("body", "form"),
+    [(box(1, 1, 2), "box"), (box(8, 6, 4), "building"), (box(8, 3, 2), "block"),
+     (box(6, 0.3, 2), "wall"), (box(0.2, 0.2, 1.2), "post"),
+     (box(0.2, 0.2, 4), "pole"), (trimesh.creation.cylinder(0.4, 1), "drum"), (trimesh.creation.icosphere(2), "ball"),
+     (trimesh.creation.icosphere(3, 4).slice_plane((0, 0, 1), (0, 0, 1)), "mound"), (box(2, 2, 12), "tower"),
+     (trimesh.creation.annulus(2, 4, 9).slice_plane((0, 0, 0), (1, 0, 0)), "object")],
+)  # fmt: skip
+def test_what_has_no_name_has_a_form_that_it_has(body, form):
+    assert form_of(np.asarray(body.vertices)) == form
+    assert grown(form, "grey and brown", 3.0) == form
+    assert grown(form, "green", 3.0) == {"ball": "tree", "mound": "tree", "wall": "hedge"}.get(form, form)
 
 
 @pytest.mark.parametrize(

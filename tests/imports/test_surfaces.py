@@ -20,7 +20,7 @@ from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
-from aerialdojo_gen.imports.naming import Naming, NodeName
+from aerialdojo_gen.imports.naming import Naming, NodeName, Row
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, empty_corners
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -79,7 +79,7 @@ def test_what_encloses_and_is_no_sky_stays():
         scene, _ = import_mesh("Yard", [*yard(), raw(body, name)])
         assert not scene.backdrop
     # A table has the last word, either way.
-    sky, shed = (Naming((("X*", NodeName(category, {})),)) for category in ("sky", "greenhouse"))
+    sky, shed = (Naming((Row("X*", NodeName(category, {})),)) for category in ("sky", "greenhouse"))
     assert import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], MeshOptions(naming=sky))[0].backdrop
     assert not import_mesh("Yard", [*yard(), raw(greenhouse, "X1")], MeshOptions(naming=shed))[0].backdrop
 

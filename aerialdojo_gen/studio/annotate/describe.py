@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.annotations.vocabulary import UNKNOWN
+from aerialdojo_gen.imports.forms import is_unnamed
 from aerialdojo_gen.scenes.model import Scene
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
@@ -57,7 +57,7 @@ class Describer:
 
     def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
         lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
-        lacks += ["person"] if entry.category == UNKNOWN else []
+        lacks += ["person"] if is_unnamed(entry.node, entry.category) else []
         lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
         return {
             **entry.model_dump(),
