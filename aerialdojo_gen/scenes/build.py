@@ -8,6 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb
@@ -56,7 +57,7 @@ def _imported(path: Path, imported: Imported) -> Scene:
     scene = read_glb(path.with_suffix(".glb"))
     bounds = scene.bounds.copy()
     bounds[1, 2] = imported.ceiling_m
-    sun = np.asarray(imported.sun) / np.linalg.norm(imported.sun)
+    sun = unit(np.array(imported.sun))
     red, green, blue = (int(imported.sky[k : k + 2], 16) for k in (1, 3, 5))
     whole = Scene(
         path.stem, scene.instances, scene.materials, bounds, (red, green, blue),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
@@ -208,7 +209,7 @@ def _placed(
     offset = np.asarray(position, dtype=np.float64)
     out, kept_faces = [], []
     for p in parts:
-        vertices = single(p.vertices * scale @ turn + offset)
+        vertices = single(product(p.vertices * scale, turn) + offset)
         # Far from the origin float32 may flatten a sliver to nothing.
         solid = areas(vertices, p.faces) > 0.0
         kept_faces.append(solid)

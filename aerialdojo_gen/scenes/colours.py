@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.geometry.portable import dot, norm
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
@@ -57,9 +58,9 @@ def _sampled(part: Part, material: Material, size: NDArray[np.float64], n: int) 
     a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
     share = np.stack([1.0 - a - b, a, b], axis=1)
     if part.colours is not None:
-        return np.rint(np.einsum("nk,nkc->nc", share, part.colours[face].astype(np.float64))).astype(np.uint8)
+        return np.rint(dot(share[:, None], np.moveaxis(part.colours[face], 1, 2))).astype(np.uint8)
     assert material.texture is not None
-    uv = np.einsum("nk,nkc->nc", share, part.uv[face].astype(np.float64))
+    uv = dot(share[:, None], np.moveaxis(part.uv[face], 1, 2))
     row, column = texel(uv, material.texture.shape[0], material.texture.shape[1])
     if material.mask is None:
         return np.asarray(material.texture[row, column])
@@ -86,7 +87,7 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
         return ""
     # Shades of one colour, as of a wall in light and shade, are none of two.
     at = {word: _lab((mean / max(shares[word], 1e-300))[None])[0] for word, mean in means.items()}
-    others = [word for word in ranked[1:] if np.linalg.norm(at[word] - at[ranked[0]]) >= _APART]
+    others = [word for word in ranked[1:] if norm(at[word] - at[ranked[0]]) >= _APART]
     first, second = ranked[0], others[0] if others else ""
     # Neutral colours come second if both are about equal: "blue and white".
     if first in _NEUTRAL and second not in _NEUTRAL and second and shares[first] < _AS_MUCH * shares[second]:
@@ -121,7 +122,7 @@ def colour_name(rgb: ArrayLike) -> str:
 @lru_cache(1 << 16)
 def _nearest_term(red: float, green: float, blue: float) -> str:
     terms, places = _survey()
-    return terms[int(np.argmin(np.linalg.norm(places - _lab(np.array([[red, green, blue]])), axis=1)))]
+    return terms[int(np.argmin(norm(places - _lab(np.array([[red, green, blue]])))))]
 
 
 @cache
@@ -139,6 +140,6 @@ def _lab(rgb: NDArray[Any]) -> NDArray[np.float64]:
     """Convert sRGB colours (k, 3) of 0 to 255 to CIELAB."""
     v = np.asarray(rgb, dtype=np.float64) / 255.0
     linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
-    xyz = linear @ _XYZ.T
+    xyz = dot(linear[:, None], _XYZ)
     x, y, z = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116).T
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import ShapeError
+from aerialdojo_gen.geometry.portable import atan2, exp, power
 
 Floats = NDArray[np.float64]
 
@@ -46,10 +47,10 @@ def eased(t: Floats | float, start: Floats | float, end: Floats | float) -> Floa
 
 
 _OF_ARRAYS: dict[str, Callable[..., Any]] = {
-    "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt, "exp": np.exp, "pow": np.power,
+    "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt, "exp": exp, "pow": power,
     "hypot": np.hypot, "clip": np.clip, "eased": eased, "choose": lambda t, a, b: np.where(t > 0.0, a, b),
     "sin": lambda d: np.sin(np.radians(d)), "cos": lambda d: np.cos(np.radians(d)),
-    "atan2": lambda y, x: np.degrees(np.arctan2(y, x)),
+    "atan2": lambda y, x: np.degrees(atan2(y, x)),
 }  # fmt: skip
 # Minimum and maximum number of arguments, where it is not one.
 _ARITY = {"min": (2, 99), "max": (2, 99), "round": (1, 2), "atan2": (2, 2)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -106,7 +107,7 @@ def srgb_colours(stored: NDArray[np.uint16]) -> NDArray[np.uint8]:
 def _linear(channel: int) -> float:
     """Convert an sRGB channel, 0-255, to glTF's linear factor, 0-1."""
     c = channel / 255.0
-    return round(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4, 6)
+    return round(c / 12.92 if c <= 0.04045 else math.pow((c + 0.055) / 1.055, 2.4), 6)
 
 
 _TABLE = np.array([round(65535 * _linear(c)) for c in range(256)], dtype="<u2")

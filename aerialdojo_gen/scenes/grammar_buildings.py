@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -10,6 +11,7 @@ from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
@@ -136,7 +138,7 @@ def wall_with_openings(
         u, v, w = flat.vertices.T
         # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
         bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
-    yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
     return translated(rotated(merge(bodies), rotation(0.0, 0.0, yaw)), (*a, z0_m))
 
 
@@ -148,7 +150,7 @@ def before_walls(plan: Polygon, spacing_m: float, offset_m: float, inset_m: floa
     for p, q in pairwise(xy):
         leg = LineString([p, q])
         count = int((leg.length - 2 * inset_m) // spacing_m) + 1 if leg.length > 2 * inset_m else 0
-        yaw = float(np.degrees(np.arctan2(q[1] - p[1], q[0] - p[0]))) - 90.0
+        yaw = math.degrees(math.atan2(q[1] - p[1], q[0] - p[0])) - 90.0
         c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
         for k in range(count):
             at = leg.interpolate((leg.length - (count - 1) * spacing_m) / 2 + k * spacing_m)
@@ -160,9 +162,9 @@ def oriented_rectangle(plan: Polygon) -> tuple[tuple[float, float], float, float
     """Give the least rectangle about a plan: centre, length, width (metres), and yaw of its length (degrees)."""
     corners = np.array(plan.minimum_rotated_rectangle.exterior.coords)[:4]
     legs = np.diff(corners[:3], axis=0)
-    lengths = np.linalg.norm(legs, axis=1)
+    lengths = norm(legs)
     long = int(lengths[1] > lengths[0])
-    yaw = float(np.degrees(np.arctan2(legs[long, 1], legs[long, 0])))
+    yaw = math.degrees(math.atan2(legs[long, 1], legs[long, 0]))
     x, y = corners.mean(axis=0)
     return (float(x), float(y)), float(lengths[long]), float(lengths[1 - long]), yaw
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -34,7 +35,7 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
             parts.append((body, sweep(path=[(x, y, z + level) for x, y in path], section=(0.05, 0.08))))
         for a, b in pairwise(path):
             length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-            yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+            yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
             count = max(round(length / step), 1)
             bars = [
                 translated(box(size=(width, thickness, height), taper=(0.6, 1.0)), ((k + 0.5) * length / count, 0, 0))

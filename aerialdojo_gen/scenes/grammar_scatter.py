@@ -72,7 +72,7 @@ def along(
     for k in range(count + 1):
         s = start_m + length * k / count
         before, after = line.interpolate(max(s - 0.05, 0.0)), line.interpolate(min(s + 0.05, line.length))
-        yaw = float(np.arctan2(after.y - before.y, after.x - before.x))
+        yaw = math.atan2(after.y - before.y, after.x - before.x)
         p = line.interpolate(s)
         x, y = p.x - offset_m * np.sin(yaw), p.y + offset_m * np.cos(yaw)
         poses.append(Pose(float(x), float(y), float(np.degrees(yaw)) + turn_deg))
@@ -90,7 +90,7 @@ def stretches(path: Polyline, spacing_m: float) -> list[Pose]:
         count = round(float(np.hypot(dx, dy)) / spacing_m)
         for k in range(count):
             t = (k + 0.5) / count
-            out.append(Pose(a[0] + dx * t, a[1] + dy * t, float(np.degrees(np.arctan2(dy, dx)))))
+            out.append(Pose(a[0] + dx * t, a[1] + dy * t, math.degrees(math.atan2(dy, dx))))
     return out
 
 

@@ -18,6 +18,7 @@ from shapely import STRtree
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mesh
 from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -131,12 +132,11 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
         flat, whose, cut_faces = triangulate_all([piece for some in seen for piece in some])
         tile = np.repeat(cut, [len(some) for some in seen])
         z = np.empty(len(flat))
-        # Product by product: the scenes' digests depend on the processor's rounding of this product.
         for k, some in zip(
             tile.tolist(), np.split(np.arange(len(flat)), np.flatnonzero(np.diff(whose)) + 1), strict=True
         ):
             a, normal = corners[faces[k, 0]], tiles.normals[k]
-            z[some] = a[2] - ((flat[some] - a[:2]) @ normal[:2]) / normal[2]
+            z[some] = a[2] - dot(flat[some] - a[:2], normal[:2]) / normal[2]
         pieces.append(Mesh(np.column_stack([flat, z]), cut_faces))
     if not pieces:
         return mesh([], [])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.portable import dot, norm, product
 from aerialdojo_gen.scenes.model import Part
 
 Floats = NDArray[np.float64]
@@ -36,7 +37,7 @@ class Mesh:
     def volume_m3(self) -> float:
         """Signed volume: positive for a closed mesh whose faces are wound outwards."""
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return float(np.einsum("ij,ij->i", a, _cross(b, c)).sum() / 6.0)
+        return float(dot(a, _cross(b, c)).sum() / 6.0)
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
@@ -84,13 +85,13 @@ def rotation(x_deg: float, y_deg: float, z_deg: float) -> Floats:
     out = np.eye(3)
     for axis, angle in enumerate((x_deg, y_deg, z_deg)):
         if angle:
-            out = _axis_rotation(axis, angle) @ out
+            out = product(_axis_rotation(axis, angle), out)
     return out
 
 
 def rotated(m: Mesh, matrix: Floats) -> Mesh:
     """Apply a rotation matrix (3, 3)."""
-    return replace(m, vertices=m.vertices @ matrix.T)
+    return replace(m, vertices=product(m.vertices, matrix.T))
 
 
 def mirrored(m: Mesh, axis: int) -> Mesh:
@@ -152,14 +153,14 @@ def _cross(u: Floats, w: Floats) -> Floats:
 def _projected_uv(m: Mesh) -> Floats:
     corners = m.vertices[m.faces]
     normals = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals /= np.maximum(norm(normals)[:, None], 1e-300)
     flat = np.abs(normals[:, 2]) > _FLAT_COSINE
     along = np.column_stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))])
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    along /= np.maximum(norm(along)[:, None], 1e-12)
     along[flat] = (1.0, 0.0, 0.0)
     up = _cross(normals, along)
     up[flat] = (0.0, 1.0, 0.0)
-    return np.stack([np.einsum("fkj,fj->fk", corners, along), np.einsum("fkj,fj->fk", corners, up)], axis=2)
+    return np.stack([dot(corners, along[:, None]), dot(corners, up[:, None])], axis=2)
 
 
 def _axis_rotation(axis: int, angle_deg: float) -> Floats:

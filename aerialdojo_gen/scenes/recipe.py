@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
+from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -89,7 +90,7 @@ class SceneHead(BaseModel):
     @property
     def sun_direction(self) -> tuple[float, float, float]:
         """Unit vector towards the sun, world frame."""
-        x, y, z = np.array(self.sun) / np.linalg.norm(self.sun)
+        x, y, z = unit(np.array(self.sun))
         return float(x), float(y), float(z)
 
 

@@ -16,6 +16,7 @@ import trimesh
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.portable import distances_along, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 Numbers = Sequence[float]
@@ -103,7 +104,7 @@ def lathe(*, points: Sequence[Numbers], segments: float = 12) -> Mesh:
     closed = len(profile) > 3 and bool(np.all(profile[0] == profile[-1]))
     rows = profile[:-1] if closed else profile
     vertices, rings = _ring_vertices(rows, n)
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
+    length = distances_along(profile)
     around = 2 * np.pi * float(rows[:, 0].max()) / n
     faces: list[tuple[int, int, int]] = []
     uvs: list[tuple[tuple[float, float], ...]] = []
@@ -147,7 +148,7 @@ def crown(
     waves = rng.normal(size=(10, 3)) * np.repeat([2.0, 4.0], 5)[:, None]
     phases = rng.uniform(0, 2 * np.pi, size=10)
     weights = np.repeat([1.0, 0.6], 5)
-    lumps = (np.cos(vertices @ waves.T + phases) * weights).sum(axis=1) / weights.sum() * 1.6
+    lumps = (np.cos(product(vertices, waves.T) + phases) * weights).sum(axis=1) / weights.sum() * 1.6
     rough = rng.uniform(-0.5, 0.5, size=len(vertices))
     factor = 1.0 + noise * np.clip(lumps + rough, -1.0, 1.0)
     return mesh(vertices * factor[:, None] * scale, faces)
@@ -171,7 +172,12 @@ def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, list[list[int]]]:
 
 @lru_cache(maxsize=8)
 def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
-    ball = trimesh.creation.icosphere(subdivisions=subdivisions)
+    # That of trimesh multiplies matrices.
+    ball = trimesh.creation.icosahedron()
+    ball.vertices = unit(np.array(ball.vertices))
+    for _ in range(subdivisions):
+        ball = ball.subdivide()
+        ball.vertices = unit(np.array(ball.vertices))
     return np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)
 
 

@@ -14,6 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
+from aerialdojo_gen.geometry.portable import dot, norm, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, number, rows_of, whole
 
@@ -73,7 +74,7 @@ def sweep(
 ) -> Mesh:
     """Sweep a round or rectangular section along a path in metres; closed, mitred at corners."""
     line = np.array(rows_of("path", path, 3, 1))
-    line = line[np.concatenate([[True], np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9])]
+    line = line[np.concatenate([[True], norm(np.diff(line, axis=0)) > 1e-9])]
     if len(line) < (3 if closed else 2):
         raise ShapeError("a sweep needs a path of two distinct points, three where it is closed")
     if (radius is None) == (section is None):
@@ -105,7 +106,7 @@ def extrude(plan: Polygon, height: float) -> Mesh:
         count = len(ring.coords) - 1
         a = start + np.arange(count)
         b = start + (np.arange(count) + 1) % count
-        lengths = np.linalg.norm(flat[b] - flat[a], axis=1)
+        lengths = norm(flat[b] - flat[a])
         u1 = np.cumsum(lengths)
         u0 = u1 - lengths
         faces += [np.column_stack([a, b, b + n]), np.column_stack([a, b + n, a + n])]
@@ -153,7 +154,7 @@ def _without_straight_corners(plan: Polygon) -> Polygon:
         xy = np.array(ring.coords)[:-1, :2]
         a, b = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
         turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-        corners = xy[np.abs(turn) > 1e-9 * (1.0 + np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))]
+        corners = xy[np.abs(turn) > 1e-9 * (1.0 + norm(a) * norm(b))]
         if len(corners) < 3:
             raise ShapeError("the outline has no area")
         rings.append(corners)
@@ -170,7 +171,7 @@ def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
     ahead = np.roll(line, -1, axis=0) - line
     if not closed:
         ahead[-1] = line[-1] - line[-2]
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    ahead = unit(ahead)
     behind = np.roll(ahead, 1, axis=0)
     if not closed:
         behind[0] = ahead[0]
@@ -178,21 +179,21 @@ def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
     right = np.array([0.0, -1.0, 0.0])
     for p, t0, t1 in zip(line, behind, ahead, strict=True):
         middle = t0 + t1
-        if np.linalg.norm(middle) < 1e-6:
+        if norm(middle) < 1e-6:
             raise ShapeError("the path turns back on itself")
-        middle /= np.linalg.norm(middle)
+        middle = unit(middle)
         level = np.cross(middle, (0.0, 0.0, 1.0))
         # Nearly vertical stretches have no level direction of their own: carry the last one on.
-        right = level if np.linalg.norm(level) > 0.1 else right - middle * (right @ middle)
-        right = right / np.linalg.norm(right)
+        right = level if norm(level) > 0.1 else right - middle * dot(right, middle)
+        right = unit(right)
         up = np.cross(right, middle)
         offsets = ring[:, :1] * right + ring[:, 1:] * up
         bend = t1 - t0
-        bend = bend - middle * (bend @ middle)
-        if np.linalg.norm(bend) > 1e-9:
-            bend /= np.linalg.norm(bend)
-            stretch = min(1.0 / max(float(middle @ t1), 0.1), 2.5) - 1.0
-            offsets = offsets + stretch * (offsets @ bend)[:, None] * bend
+        bend = bend - middle * dot(bend, middle)
+        if norm(bend) > 1e-9:
+            bend = unit(bend)
+            stretch = min(1.0 / max(float(dot(middle, t1)), 0.1), 2.5) - 1.0
+            offsets = offsets + stretch * dot(offsets, bend)[:, None] * bend
         rings.append(p + offsets)
     return np.array(rings)
 
@@ -200,9 +201,9 @@ def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
 def _skin(rings: Floats, closed: bool) -> Mesh:
     rows, n = rings.shape[:2]
     middle = rings.mean(axis=1)
-    steps = np.linalg.norm(np.roll(middle, -1, axis=0) - middle, axis=1)
+    steps = norm(np.roll(middle, -1, axis=0) - middle)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    edges = np.linalg.norm(np.roll(rings[0], -1, axis=0) - rings[0], axis=1)
+    edges = norm(np.roll(rings[0], -1, axis=0) - rings[0])
     around = np.concatenate([[0.0], np.cumsum(edges)])
     faces, uvs = [], []
     for r in range(rows if closed else rows - 1):

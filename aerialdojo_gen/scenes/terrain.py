@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import exp
 from aerialdojo_gen.scenes.mesh import Floats, Ints
 
 
@@ -89,8 +90,8 @@ class Terrain:
         s = np.linspace(0.0, line.length, max(int(line.length / 0.5), 2) + 1)
         points = shapely.get_coordinates(line.interpolate(s))
         profile = self.z(points[:, 0], points[:, 1])
-        weights = np.exp(-(((s[:, None] - s[None, :]) / (smooth_m / 2)) ** 2))
-        profile = weights @ profile / weights.sum(axis=1)
+        weights = exp(-(((s[:, None] - s[None, :]) / (smooth_m / 2)) ** 2))
+        profile = (weights * profile).sum(axis=1) / weights.sum(axis=1)
         corners = self.corners()
         at = line.project(shapely.points(corners[:, :2]))
         target = np.interp(at, s, profile).reshape(self.heights_m.shape)

@@ -42,7 +42,7 @@ def cobbles(colour: Floats) -> Floats:
     up = y + 0.1 * value_noise(256, 8, rng)
     column, row = np.floor(across).astype(int) % 8, np.floor(up).astype(int) % 8
     tone = rng.uniform(0.82, 1.15, size=(8, 8))[row, column]
-    dome = ((across % 1.0 - 0.5) ** 4 + (up % 1.0 - 0.5) ** 4) * 16.0
+    dome = (((across % 1.0 - 0.5) ** 2) ** 2 + ((up % 1.0 - 0.5) ** 2) ** 2) * 16.0
     return shade(colour, tone * np.clip(1.08 - 0.7 * dome, 0.5, 1.08) * (1 + 0.04 * fractal(256, 16, 3, rng)))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
+from aerialdojo_gen.geometry.portable import distances_along, dot, norm, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -21,16 +22,16 @@ def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
     tip = radii[-1] == 0.0
     rings = len(line) - 1 if tip else len(line)
     ahead = np.gradient(line, axis=0)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    ahead = unit(ahead)
     angles = (np.arange(sides) + 0.5) * 2 * np.pi / sides
     side = np.array([1.0, 0.0, 0.0]) if abs(ahead[0, 0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     vertices = []
     for p, t, r in zip(line[:rings], ahead[:rings], radii[:rings], strict=True):
-        side = side - t * (side @ t)
-        side /= np.linalg.norm(side)
+        side = side - t * dot(side, t)
+        side = unit(side)
         other = np.cross(t, side)
         vertices.append(p + r * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other))
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    along = distances_along(line)
     width = 2 * np.pi * max(radii) / sides
     # Two triangles a side of every stretch, ends of caps and tip after them.
     k = np.arange(sides)
@@ -65,14 +66,14 @@ def clump(
     directions, faces = _ball()
     turn = rng.uniform(0, 2 * np.pi)
     c, s = np.cos(turn), np.sin(turn)
-    v = directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    v = product(directions, np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
     v = v * (1.0 - ragged * rng.uniform(0.0, 0.9, size=(len(v), 1)))
     # Every other face carries a spray: a low pyramid whose tip stands out from the clump.
     bare, sprayed = faces[::2], faces[1::2]
     a, b, c3 = (v[sprayed[:, k]] for k in range(3))
     weights = rng.dirichlet((3.0, 3.0, 3.0), size=len(sprayed))
     tips = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c3
-    tips = tips / np.linalg.norm(tips, axis=1, keepdims=True)
+    tips = unit(tips)
     tips = tips * (1.0 + ragged * rng.uniform(-0.1, 0.9, size=(len(tips), 1)))
     k = np.arange(len(v), len(v) + len(tips))
     corner = [np.column_stack([sprayed[:, i], sprayed[:, (i + 1) % 3], k]) for i in range(3)]
@@ -98,7 +99,7 @@ def _hull(points: Floats) -> tuple[Floats, Ints]:
     index[used] = np.arange(len(used))
     v, faces = points[used], index[hull.simplices]
     normals = np.cross(v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]])
-    inward = np.einsum("ij,ij->i", normals, v[faces].mean(axis=1) - v.mean(axis=0)) < 0
+    inward = dot(normals, v[faces].mean(axis=1) - v.mean(axis=0)) < 0
     faces[inward] = faces[inward][:, ::-1]
     order = np.lexsort(faces.T[::-1])
     return v, faces[order]
@@ -133,7 +134,7 @@ def blade(root: ArrayLike, bend: ArrayLike, tip: ArrayLike, width: float) -> Mes
     """Make a frond or leaf: two long facets a side from a root over a bend to a tip, 1 cm thick at the bend."""
     a, b, c = (np.asarray(p, dtype=np.float64) for p in (root, bend, tip))
     across = np.cross(c - a, (0.0, 0.0, 1.0))
-    length = float(np.linalg.norm(across))
+    length = float(norm(across))
     across = np.array([1.0, 0.0, 0.0]) if length < 1e-6 else across / length
     w = across * width / 2
     lift = np.array([0.0, 0.0, 0.01])
@@ -148,7 +149,7 @@ def stone(rng: np.random.Generator, radii: ArrayLike, corners: int = 22, sunk: f
     Few `corners` make it blocky.
     """
     p = rng.normal(size=(corners, 3))
-    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    p = unit(p)
     p *= rng.uniform(0.82, 1.05, size=(corners, 1))
     v, faces = _hull(p)
     v = v * np.asarray(radii)
@@ -160,7 +161,7 @@ def split_by_slope(m: Mesh, cosine: float) -> tuple[Mesh, Mesh]:
     """Part a mesh into what faces up (normal's z above `cosine`), where moss lies, and the rest."""
     a, b, c = (m.vertices[m.faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
-    up = normals[:, 2] > cosine * np.linalg.norm(normals, axis=1)
+    up = normals[:, 2] > cosine * norm(normals)
     return mesh(m.vertices, m.faces[up]), mesh(m.vertices, m.faces[~up])
 
 

@@ -6,10 +6,12 @@ below it so that no slope shows a gap.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from aerialdojo_gen.geometry.portable import norm, power
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import clump, limb, split_by_slope, vec, whorl
 from aerialdojo_gen.scenes.mesh import Floats, Mesh
@@ -22,7 +24,7 @@ def _stem(rng: np.random.Generator, height: float, lean: float, points: int = 5)
     """Middle line of a trunk from below the ground to `height`, wandering sideways by about `lean` metres."""
     t = np.linspace(0.0, 1.0, points)
     drift = rng.uniform(-1.0, 1.0, size=(2, 2)) * lean
-    xy = t[:, None] ** 1.5 * drift[0] + np.sin(t * np.pi)[:, None] * drift[1] * 0.5
+    xy = power(t[:, None], 1.5) * drift[0] + np.sin(t * np.pi)[:, None] * drift[1] * 0.5
     line = np.column_stack([xy, t * height])
     return np.concatenate([[[0.0, 0.0, -_ROOT_M]], line])
 
@@ -34,7 +36,7 @@ def _at(line: Floats, z: float) -> Floats:
 
 def _trunk(line: Floats, girth: float, top: float, sides: int = 7) -> Mesh:
     t = np.clip(line[:, 2] / line[-1, 2], 0.0, 1.0)
-    radii = girth * (1.0 - t) ** 0.8 + top
+    radii = girth * power(1.0 - t, 0.8) + top
     radii[0] = radii[1] = girth * 1.35
     if len(radii) > 2:
         radii[2] = max(float(radii[2]), girth * 0.8)
@@ -42,7 +44,7 @@ def _trunk(line: Floats, girth: float, top: float, sides: int = 7) -> Mesh:
 
 
 def _branch(rng: np.random.Generator, start: Floats, end: Floats, radius: float, sag: float = 0.0) -> Mesh:
-    middle = (start + end) / 2 + rng.uniform(-0.12, 0.12, size=3) * float(np.linalg.norm(end - start))
+    middle = (start + end) / 2 + rng.uniform(-0.12, 0.12, size=3) * float(norm(end - start))
     middle[2] -= sag
     return limb([start, middle, end], [radius, radius * 0.7, radius * 0.3], 4)
 
@@ -57,8 +59,8 @@ def spruce(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     out: Parts = [("bark", _trunk(line, girth, 0.02, 6))]
     for k in range(tiers):
         t = k / (tiers - 1)
-        z = clear + (height * 0.94 - clear) * t**0.9
-        reach = spread * (1.0 - t) ** 0.85 + 0.28
+        z = clear + (height * 0.94 - clear) * math.pow(t, 0.9)
+        reach = spread * math.pow(1.0 - t, 0.85) + 0.28
         if k == 0:
             reach *= 0.85
         core = _at(line, min(z, height * 0.92))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated
@@ -11,6 +12,7 @@ from pydantic import Field
 from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
+from aerialdojo_gen.geometry.portable import dot, norm
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
@@ -76,8 +78,8 @@ def _portal(hall: Hall, x: float, rng: np.random.Generator) -> list[np.ndarray]:
     out = []
     for py, pz in [*((-v, z) for v, z in half), (0.0, r), *half[::-1]]:
         away = np.array([x - hall.blast[0], py - hall.blast[1]])
-        distance = float(np.linalg.norm(away))
-        push = 2.4 * float(np.exp(-((distance / (0.8 * hall.reach_m)) ** 2))) * min(max(pz, 0.0) / e, 1.3)
+        distance = float(norm(away))
+        push = 2.4 * math.exp(-((distance / (0.8 * hall.reach_m)) ** 2)) * min(max(pz, 0.0) / e, 1.3)
         shift = away / max(distance, 1e-6) * push + rng.uniform(-0.12, 0.12, size=2) * min(push, 1.0)
         sag = -0.55 * push if pz > e * 0.9 else 0.0
         out.append(np.array([x + shift[0], py + shift[1], pz + sag]))
@@ -93,16 +95,16 @@ def _sheet(hall: Hall, quad: tuple[np.ndarray, ...], rng: np.random.Generator) -
     if distance < gone:
         if distance > 0.7 * gone and rng.uniform() < 0.5:
             # It still hangs by its upper edge.
-            width = float(np.linalg.norm(b - a)) * 0.8
+            width = float(norm(b - a)) * 0.8
             top = d if not high else a
-            yaw = float(np.degrees(np.arctan2((b - a)[1], (b - a)[0])))
+            yaw = math.degrees(math.atan2((b - a)[1], (b - a)[0]))
             body = translated(box(size=[width, 0.04, 2.2]), (width / 2, 0, -2.2))
             turn = rotation(float(rng.uniform(-35, 35)), float(rng.uniform(-12, 12)), yaw)
             return [translated(rotated(body, turn), top)]
         return []
     normal = np.cross(b - a, d - a)
-    normal /= max(float(np.linalg.norm(normal)), 1e-9)
-    if normal @ (middle - np.array([middle[0], 0.0, hall.eaves_m * 0.5])) < 0:
+    normal /= max(float(norm(normal)), 1e-9)
+    if dot(normal, middle - np.array([middle[0], 0.0, hall.eaves_m * 0.5])) < 0:
         normal = -normal
     u, v = b - a, d - a
     fray = 0.14 if distance < 1.6 * gone else 0.0
@@ -132,7 +134,7 @@ def burst_tank(
     x, y = at
     base = site.ground_z(x, y)
     n = 26
-    toward = float(np.arctan2(blast[1] - y, blast[0] - x))
+    toward = math.atan2(blast[1] - y, blast[0] - x)
     parts: Parts = [("concrete", translated(cylinder(radius=radius_m + 0.5, height=0.7, segments=n), (0, 0, -0.4)))]
     for k in range(n):
         a0, a1 = (2 * np.pi * (k + j) / n for j in (0, 1))
@@ -313,7 +315,7 @@ def bent_lamps(site: Site, *, feet: Annotated[list[At], Field(min_length=1)], bl
     for x, y in feet:
         away = np.array([x - blast[0], y - blast[1]])
         d = float(np.hypot(*away))
-        lean = 5.5 * float(np.exp(-((d / 12.0) ** 2)))
+        lean = 5.5 * math.exp(-((d / 12.0) ** 2))
         u = away / max(d, 0.1)
         z = site.ground_z(x, y) - 0.2
         path = [(x, y, z), (x + 0.1 * lean * u[0], y + 0.1 * lean * u[1], z + 3.0),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from aerialdojo_gen.geometry.portable import norm, unit
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.mesh import translated
@@ -34,9 +36,9 @@ def cableway(
     parts: Parts = []
     hung = 0
     for a, b in pairwise(np.array(heads)):
-        along = (b - a)[:2] / np.linalg.norm((b - a)[:2])
+        along = unit((b - a)[:2])
         side = np.array([-along[1], along[0], 0.0]) * gauge_m / 2
-        length = float(np.linalg.norm((b - a)[:2]))
+        length = float(norm((b - a)[:2]))
         t = np.linspace(0.0, 1.0, 9)
         sag = -_SAG * length * 4 * t * (1 - t)
         for way in (-1.0, 1.0):
@@ -47,7 +49,7 @@ def cableway(
                 s = (k + 0.5 + 0.22 * way) / count
                 p = a + (b - a) * s + side * way
                 z = float(p[2] - _SAG * length * 4 * s * (1 - s))
-                yaw_deg = float(np.degrees(np.arctan2(along[1], along[0])))
+                yaw_deg = math.degrees(math.atan2(along[1], along[0]))
                 parts += _cabin(Frame(float(p[0]), float(p[1]), yaw_deg), z, paints[hung % len(paints)])
                 hung += 1
     for x, y, z in (heads[0], heads[-1]):

@@ -5,6 +5,7 @@ Things may stand on the slabs, whose floor stays free between the columns.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -189,7 +190,7 @@ def scaffold(
         for j in range(lifts):
             p, q = (us[k], us[k + 1]) if j % 2 else (us[k + 1], us[k])
             braces.append(((p, depth_m, high * j / lifts), (q, depth_m, high * (j + 1) / lifts)))
-    turn = rotation(0.0, 0.0, float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0]))))
+    turn = rotation(0.0, 0.0, math.degrees(math.atan2(b[1] - a[1], b[0] - a[0])))
     raw: Parts = [("metal", merge([*steel, bars(braces, 0.05)])), ("planks:#b08d58", merge(decks))]
     raw += [] if net is None else [(net, merge(nets))]
     parts = [(material, translated(rotated(body, turn), (*a, z[0]))) for material, body in raw]

@@ -10,6 +10,7 @@ from pydantic import Field
 from shapely.geometry import LineString, Point
 from shapely.ops import unary_union
 
+from aerialdojo_gen.geometry.portable import distances_along
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import smooth_path
 from aerialdojo_gen.scenes.ground import rectangle
@@ -193,13 +194,13 @@ def flume(
             raise ValueError("the path of a flume bends too sharply, or crosses itself")
         rim = np.array(offset.coords)
         s = [flat.project(Point(x, y)) for x, y in rim]
-        z = np.interp(s, _stations(line), line[:, 2])
+        z = np.interp(s, distances_along(line[:, :2]), line[:, 2])
         edge = np.column_stack([rim, z + 0.45])
         parts.append((trough, sweep(path=edge.tolist(), section=(0.14, 0.7))))
     legs = []
     for d in np.arange(1.0, flat.length, 3.2):
         p = flat.interpolate(d)
-        z = float(np.interp(d, _stations(line), line[:, 2]))
+        z = float(np.interp(d, distances_along(line[:, :2]), line[:, 2]))
         ground = site.ground_z(p.x, p.y) - 0.2
         if z - ground > 0.4:
             legs += [block(p.x - 0.14, p.y - 0.14, p.x + 0.14, p.y + 0.14, ground, z + 0.02)]
@@ -207,7 +208,3 @@ def flume(
         parts.append((leg, merge(legs)))
     site.add(node, "log_flume", parts, {"material": "metal"})
     site.occupy(flat.buffer(free_m))
-
-
-def _stations(line: np.ndarray) -> np.ndarray:
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -110,7 +111,7 @@ def washing_lines(
         line = _sagging((x0, y0), (x1, y1), z_m, 0.35)
         parts: Parts = [("#d8d4c8", sweep(path=line, radius=0.02, sides=4))]
         length = float(np.hypot(x1 - x0, y1 - y0))
-        yaw = float(np.degrees(np.arctan2(y1 - y0, x1 - x0)))
+        yaw = math.degrees(math.atan2(y1 - y0, x1 - x0))
         at = 0.5
         while at < length - 1.0:
             width, drop = float(rng.uniform(0.45, 0.95)), float(rng.uniform(0.6, 1.1))

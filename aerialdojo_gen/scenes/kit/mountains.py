@@ -11,6 +11,7 @@ from pydantic import Field
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.geometry.portable import distances_along, power
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
@@ -63,11 +64,11 @@ def massif(
             crest = np.full(len(corners), line[0, 2])
         else:
             path = LineString(line[:, :2])
-            stations = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1))])
+            stations = distances_along(line[:, :2])
             crest = np.interp(shapely.line_locate_point(path, places), stations, line[:, 2])
             away = shapely.distance(path, places)
-        total += (crest * np.clip(1.0 - away / ridge.width_m, 0.0, 1.0) ** ridge.hollow) ** _SMOOTH_MAX
-    height = total ** (1.0 / _SMOOTH_MAX)
+        total += power(crest * power(np.clip(1.0 - away / ridge.width_m, 0.0, 1.0), ridge.hollow), _SMOOTH_MAX)
+    height = power(total, 1.0 / _SMOOTH_MAX)
     share = height / max(float(height.max()), 1e-9)
     folds = rolling_terrain(size_m, cell_m, seed, rough_m, 26.0, octaves=3, ridged=True).heights_m.ravel()
     height = height + folds * np.clip(share * 1.6, 0.12, 1.0)

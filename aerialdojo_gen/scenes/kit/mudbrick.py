@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
@@ -11,6 +12,7 @@ import shapely
 from pydantic import Field
 from shapely.geometry import LineString
 
+from aerialdojo_gen.geometry.portable import power
 from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
@@ -108,7 +110,7 @@ def _crumbling_wall(site: Site, wall: CrumblingWall, material: str, rng: np.rand
     for (ax, ay), (bx, by) in pairwise(wall.line):
         length = float(np.hypot(bx - ax, by - ay))
         n = max(int(length / 1.1), 2)
-        left = wall.height_m * (1.0 - wall.decay * rng.random(n + 1) ** 1.5)
+        left = wall.height_m * (1.0 - wall.decay * power(rng.random(n + 1), 1.5))
         foot = min(site.ground_z(ax + (bx - ax) * t, ay + (by - ay) * t) for t in np.linspace(0, 1, n + 1)) - 0.5
         base = [site.ground_z(ax + (bx - ax) * t, ay + (by - ay) * t) for t in np.linspace(0, 1, n + 1)]
         crest: list[tuple[float, float]] = []
@@ -117,7 +119,7 @@ def _crumbling_wall(site: Site, wall: CrumblingWall, material: str, rng: np.rand
             crest += [(length * k / n, h), (length * (k + 0.96) / n, h)]
         outline = [(0.0, 0.0), (length, 0.0), (length, crest[-1][1]), *crest[::-1]]
         body = profile(points=outline, width=wall.thickness_m)
-        yaw = float(np.degrees(np.arctan2(by - ay, bx - ax)))
+        yaw = math.degrees(math.atan2(by - ay, bx - ax))
         parts.append((material, translated(rotated(body, rotation(0.0, 0.0, yaw)), (ax, ay, foot))))
     area = LineString(wall.line).buffer(wall.thickness_m / 2 + 0.2, cap_style="flat")
     site.add(None, "ruin_wall", parts, footprint=area)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 from shapely.geometry import LinearRing, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.site import Site
 
@@ -31,7 +34,7 @@ def downhill_deg(site: Site, x: float, y: float, reach_m: float = 1.5) -> float:
     """Give the direction in which the ground falls, degrees counter-clockwise from +x."""
     east = site.ground_z(x + reach_m, y) - site.ground_z(x - reach_m, y)
     north = site.ground_z(x, y + reach_m) - site.ground_z(x, y - reach_m)
-    return float(np.degrees(np.arctan2(-north, -east)))
+    return math.degrees(math.atan2(-north, -east))
 
 
 def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, corners: int = 28) -> Polygon:
@@ -49,7 +52,7 @@ def ragged_outline(ring: LinearRing, seed: int, amplitude_m: float, step_m: floa
     at = shapely.get_coordinates([ring.interpolate(k / count, normalized=True) for k in range(count)])
     before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
     along = after - before
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = unit(along)
     noise, angles = OpenSimplex(seed=seed), np.arange(count) / count * 2 * np.pi
     bends = ring.length / (2 * np.pi * 14.0)
     wave = [noise.noise2(bends * float(np.cos(t)), bends * float(np.sin(t))) for t in angles]

@@ -5,6 +5,7 @@ The water is the ground itself, level at z = 0; quays are painted with a rise, s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -47,7 +48,7 @@ def fenders(site: Site, *, edges: list[Line], spacing_m: Number = 7.0) -> None:
         for k in range(count):
             s = whole.length * (k + 0.5) / count
             a, b = whole.interpolate(s - 0.1), whole.interpolate(s + 0.1)
-            yaw = float(np.degrees(np.arctan2(b.y - a.y, b.x - a.x))) - 90.0
+            yaw = math.degrees(math.atan2(b.y - a.y, b.x - a.x)) - 90.0
             turn = rotation(0.0, 0.0, yaw)
             if k % 4 == 2:
                 parts = [translated(box(size=(0.08, 0.08, 2.2)), (0.06, v, 0.0)) for v in (-0.25, 0.25)]

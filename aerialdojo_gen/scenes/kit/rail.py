@@ -5,6 +5,7 @@ Rolling stock of the catalogue has z = 0 at the top of the rail, `RAIL_M` above 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated
@@ -115,7 +116,7 @@ def butterfly_roof(
         raise AssetError(f"box is [x0, y0, x1, y1] with x0 < x1 and y0 < y1, got {list(box)}")
     middle, rise = (y0 + y1) / 2, 0.55
     half = (y1 - y0) / 2
-    pitch = float(np.degrees(np.arctan2(rise, half)))
+    pitch = math.degrees(math.atan2(rise, half))
     leaf = cuboid(size=(x1 - x0, float(np.hypot(half, rise)), 0.14))
     wing = [
         translated(

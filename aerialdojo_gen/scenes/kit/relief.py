@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely.geometry import Point, Polygon
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.wreckage import Parts
@@ -59,8 +60,8 @@ def leaning_poles(site: Site, poles: list[tuple[Number, Number, Number, Number]]
         site.occupy(Point(x, y).buffer(0.4))
     for k, (head, axis) in enumerate(heads):
         other = heads[min(k + 1, len(heads) - 1)][0] - heads[max(k - 1, 0)][0]
-        arm = np.cross(other / max(float(np.linalg.norm(other)), 1e-6), axis)
-        arm /= max(float(np.linalg.norm(arm)), 1e-6)
+        arm = np.cross(other / max(float(norm(other)), 1e-6), axis)
+        arm /= max(float(norm(arm)), 1e-6)
         ends = [tuple(head - 0.35 * axis + s * 0.9 * arm) for s in (-1, 1)]
         wood.append(("wood", sweep(path=ends, section=(0.1, 0.12))))
         if k + 1 < len(heads):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -13,6 +14,7 @@ from shapely.affinity import rotate, scale, translate
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import atan2, power
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.wreckage import Parts, bars, chunk, tilted_plate
@@ -59,10 +61,10 @@ def crater(site: Site, terrain: Terrain, at: At, radius_m: Breadth, depth_m: Num
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
     corners = terrain.corners()[:, :2] - at
     noise = OpenSimplex(seed=site.head.seed)
-    angle = np.arctan2(corners[:, 1], corners[:, 0])
+    angle = atan2(corners[:, 1], corners[:, 0])
     wave = np.array([noise.noise2(1.5 * float(np.cos(a)), 1.5 * float(np.sin(a))) for a in angle])
     r = np.hypot(corners[:, 0], corners[:, 1]) / (radius_m * (1.0 + 0.14 * wave))
-    bowl = -depth_m + (depth_m + rim_m) * np.clip(r, 0.0, 1.0) ** 2.2
+    bowl = -depth_m + (depth_m + rim_m) * power(np.clip(r, 0.0, 1.0), 2.2)
     slope = rim_m * np.clip(2.0 - r, 0.0, 1.0) ** 2
     change = np.where(r < 1.0, bowl, slope).reshape(terrain.heights_m.shape)
     return replace(terrain, heights_m=terrain.heights_m + change)
@@ -79,7 +81,7 @@ def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int)
     lumps = np.array(
         [noise.noise2(x / 2.3, y / 2.3) if d > 0 else 0.0 for (x, y), d in zip(corners, inside, strict=True)]
     )
-    t = np.clip(inside / reach, 0.0, 1.0) ** 0.8
+    t = power(np.clip(inside / reach, 0.0, 1.0), 0.8)
     rise = height_m * t * (1.0 + 0.35 * lumps)
     return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
 
@@ -191,7 +193,7 @@ def slab_pile(
             body = chunk("slab" if rng.uniform() < 0.6 else "brick", float(rng.uniform(1.0, 2.2)), rng)
             material = (wall, floor, "rubble")[int(rng.integers(3))]
             parts.append((material, translated(body, (float(px), float(py), z - gap_m * 0.75))))
-            out = float(np.degrees(np.arctan2(py - y, px - x)))
+            out = math.degrees(math.atan2(py - y, px - x))
             if rng.uniform() < 0.5:
                 parts.append(("rust", bars((float(px), float(py)), z - 0.13, out, rng, 1.3)))
     u, v = size_m[0] / 2, size_m[1] / 2

@@ -5,6 +5,7 @@ Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated
@@ -194,7 +195,7 @@ def _windows(
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     along = (np.array(b) - a) / length
     out = np.array([along[1], -along[0]])
-    yaw = float(np.degrees(np.arctan2(along[1], along[0])))
+    yaw = math.degrees(math.atan2(along[1], along[0]))
     panes, trims, plumes = [], [], []
     for u0, u1, sill, head in openings:
         at = np.array(a) + along * (u0 + u1) / 2
@@ -297,7 +298,7 @@ def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
             if hole and rng.uniform() < 0.6:
                 length = float(np.hypot(y, rise)) * float(rng.uniform(0.5, 1.0))
                 beam = box(size=[0.12, length, 0.16])
-                slope = rotation(float(np.degrees(np.arctan2(rise, y))), 0.0, 0.0 if side < 0 else 180.0)
+                slope = rotation(math.degrees(math.atan2(rise, y)), 0.0, 0.0 if side < 0 else 180.0)
                 beam = rotated(translated(beam, (0, length / 2, 0)), slope)
                 rafters.append(translated(beam, (float(u), side * (y - 0.15), wreck.height_m - 0.1)))
     found = ((style.roof, covers), ("wood", rafters))

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import power
 from aerialdojo_gen.scenes.kit import ground_builder
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.plans.values import Line, Number
@@ -39,7 +40,7 @@ def dunes(
     swell = _noise(seed + 2, along / (1.1 * wavelength_m), across / (0.9 * wavelength_m))
     phase = along / wavelength_m + 0.55 * bend
     s01 = phase - np.floor(phase)
-    rise = np.clip(s01 / _WINDWARD, 0.0, 1.0) ** 1.25
+    rise = power(np.clip(s01 / _WINDWARD, 0.0, 1.0), 1.25)
     fall = np.clip((s01 - _WINDWARD) / (1.0 - _WINDWARD), 0.0, 1.0)
     ridge = rise * (1.0 - fall * fall * (3.0 - 2.0 * fall))
     high = height_m * (0.75 + 0.4 * swell) * ridge

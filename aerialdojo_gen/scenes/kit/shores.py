@@ -10,6 +10,7 @@ import shapely
 from pydantic import Field
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import blob
@@ -103,7 +104,7 @@ def steep_area(terrain: Terrain, degrees: float, over_m: float = 0.7) -> BaseGeo
     corners, faces = terrain.corners(), terrain.triangles()
     a, b, c = (corners[faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
-    steep = normal[:, 2] < np.cos(np.radians(degrees)) * np.linalg.norm(normal, axis=1)
+    steep = normal[:, 2] < np.cos(np.radians(degrees)) * norm(normal)
     tiles = shapely.polygons(corners[faces[steep]][:, :, :2])
     return shapely.union_all(tiles).buffer(2 * over_m, quad_segs=2).buffer(-over_m, quad_segs=2)
 

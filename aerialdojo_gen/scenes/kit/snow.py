@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.geometry.portable import exp
 from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import rotated, rotation, translated
@@ -40,7 +41,7 @@ def profile_slope(
 def banks_beside(_site: Site, terrain: Terrain, *, line: Line, width_m: Number, height_m: Number) -> Terrain:
     """Pile snow along both sides of a way, where ploughs and groomers leave it."""
     d = shapely.distance(LineString(line), shapely.points(terrain.corners()[:, :2]))
-    bump = np.exp(-(((d - width_m / 2 - 1.4) / 1.1) ** 2))
+    bump = exp(-(((d - width_m / 2 - 1.4) / 1.1) ** 2))
     return replace(terrain, heights_m=terrain.heights_m + height_m * bump.reshape(terrain.heights_m.shape))
 
 

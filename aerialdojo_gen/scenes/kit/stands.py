@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -118,7 +119,7 @@ def gangways(tier: Tier, spacing_m: float) -> list[Pose]:
     for k in range(count):
         s = line.length * (k + 0.5) / count
         p, q = line.interpolate(s - 0.05), line.interpolate(s + 0.05)
-        yaw = float(np.degrees(np.arctan2(q.y - p.y, q.x - p.x))) + 90.0
+        yaw = math.degrees(math.atan2(q.y - p.y, q.x - p.x)) + 90.0
         ahead = (p.x + 0.3 * np.cos(np.radians(yaw)), p.y + 0.3 * np.sin(np.radians(yaw)))
         if ring.contains(ShapelyPoint(ahead)):
             yaw += 180.0
@@ -199,7 +200,7 @@ def _seats(
             if shapely.contains_xy(low if tier.is_cut(row) else shut, p.x, p.y):
                 continue
             q = line.interpolate((s + 0.1) % line.length)
-            yaw = float(np.arctan2(q.y - p.y, q.x - p.x))
+            yaw = math.atan2(q.y - p.y, q.x - p.x)
             places.setdefault(seat(p.x, p.y, row), []).append((p.x, p.y, tier.level_m(row), yaw))
     # Shapely's outlines run clockwise, so that outwards lies to the left of the way.
     return [(material, _copies(_seat(), np.array(where))) for material, where in sorted(places.items())]

@@ -5,6 +5,7 @@ Every function returns meshes in world coordinates with their materials, to be g
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated
@@ -33,7 +34,7 @@ _Spacing = Annotated[Number, Field(ge=0.5)]
 def leg(a: Point, b: Point) -> tuple[float, float]:
     """Give the length of a leg, metres, and its direction, degrees."""
     dx, dy = b[0] - a[0], b[1] - a[1]
-    return float(np.hypot(dx, dy)), float(np.degrees(np.arctan2(dy, dx)))
+    return float(np.hypot(dx, dy)), math.degrees(math.atan2(dy, dx))
 
 
 def rail_legs(path: Sequence[Point], spacing_m: float) -> Iterator[tuple[float, np.ndarray, Point, list[Point]]]:

@@ -6,6 +6,7 @@ is hidden.
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -79,7 +80,7 @@ def streaks(site: Site, paths: list[Line], width_m: Number) -> None:
             s, v = float(rng.uniform(0, line.length)), float(rng.uniform(-width_m / 2, width_m / 2))
             long, thin = float(rng.uniform(1.2, 4.0)), float(rng.uniform(0.05, 0.16))
             a, b = line.interpolate(s), line.interpolate(min(s + 0.5, line.length))
-            yaw = float(np.degrees(np.arctan2(b.y - a.y, b.x - a.x)))
+            yaw = math.degrees(math.atan2(b.y - a.y, b.x - a.x))
             x, y = a.x - v * np.sin(np.radians(yaw)), a.y + v * np.cos(np.radians(yaw))
             lens = Polygon([(-long, 0), (-long / 3, thin), (long / 2, thin), (long, 0), (0, -thin)])
             site.paint(translate(rotate(lens, yaw, origin=(0, 0)), x, y), site.material("foam", "water:#a8947a"))

@@ -5,6 +5,7 @@ Buildings are made in a frame of their own, z = 0 at their ground floor; see `ru
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -103,7 +104,7 @@ def torn_wall(
         face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
     for bite in bites:
         face = face.difference(bite.tear(a, b, top, rng))
-    yaw = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
     bodies = []
     # Tears and openings that all but touch leave slivers that cannot be triangulated.
     for piece in polygons_of(shapely.set_precision(face, _GRID_M)):
@@ -143,7 +144,7 @@ def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite], spacing_m: flo
             for line in getattr(edge, "geoms", [edge]):
                 for s in np.arange(spacing_m / 2, line.length, spacing_m):
                     p = line.interpolate(s)
-                    yaw = float(np.degrees(np.arctan2(bite.y - p.y, bite.x - p.x)))
+                    yaw = math.degrees(math.atan2(bite.y - p.y, bite.x - p.x))
                     out.append(((float(p.x), float(p.y)), yaw))
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -32,7 +33,7 @@ class Field:
 def patches(seed: int, wavelength_m: float, sharpness: float = 2.5) -> PointFunction:
     """Make a field of patches, about 1 on average, that rises to exp(sharpness) in the middle of some."""
     noise = OpenSimplex(seed=seed)
-    return lambda x, y: float(np.exp(sharpness * noise.noise2(x / wavelength_m, y / wavelength_m)))
+    return lambda x, y: math.exp(sharpness * noise.noise2(x / wavelength_m, y / wavelength_m))
 
 
 def near(area: BaseGeometry, reach_m: float) -> PointFunction:
