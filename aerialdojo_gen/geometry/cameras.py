@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import FOV_DEG
+from aerialdojo_gen.geometry.portable import norm, product
 
 Floats = NDArray[np.float64]
 
@@ -97,7 +98,7 @@ def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     world_from_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pose = np.eye(4)
-    pose[:3, :3] = world_from_body @ _BODY_FROM_CAMERA[view]
+    pose[:3, :3] = product(world_from_body, _BODY_FROM_CAMERA[view])
     pose[:3, 3] = np.asarray(position, dtype=np.float64)
     return pose
 
@@ -121,17 +122,17 @@ def look_at_pose(eye: ArrayLike, target: ArrayLike) -> Floats:
         If the two points coincide.
     """
     e, t = np.asarray(eye, dtype=np.float64), np.asarray(target, dtype=np.float64)
-    distance = float(np.linalg.norm(t - e))
+    distance = float(norm(t - e))
     if distance < 1e-9:
         raise ValueError("a camera cannot look at the point that it stands in")
     forward = (t - e) / distance
     right = np.array([forward[1], -forward[0], 0.0])
-    if np.linalg.norm(right) < 1e-6:
+    if norm(right) < 1e-6:
         right = np.array([1.0, 0.0, 0.0])
         forward = np.array([0.0, 0.0, math.copysign(1.0, forward[2])])
         if forward[2] > 0:
             right = -right
-    right /= np.linalg.norm(right)
+    right /= norm(right)
     pose = np.eye(4)
     pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
     pose[:3, 3] = e
@@ -156,7 +157,7 @@ def project(camera: Camera, world_from_camera: Floats, points: ArrayLike) -> tup
         Planar depth.
     """
     p = np.asarray(points, dtype=np.float64)
-    local = (p - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
+    local = product(p - world_from_camera[:3, 3], world_from_camera[:3, :3])
     depth = local[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         uv = camera.focal_px * local[..., :2] / depth[..., None]

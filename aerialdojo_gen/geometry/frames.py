@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.geometry.portable import atan2
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,7 @@ def yaw_to_quaternion_xyzw(yaw_rad: ArrayLike) -> Floats:
 def quaternion_xyzw_to_yaw(quaternion: ArrayLike) -> Floats:
     """Yaw in radians, in (-π, π], of orientations (..., 4) xyzw: where the body's x axis points in the plane."""
     x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
-    return wrap_angle_rad(np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+    return wrap_angle_rad(atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
 
 
 def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
@@ -73,7 +74,7 @@ def yaw_towards(position: ArrayLike, target: ArrayLike) -> Floats:
     0 where the two stand on one vertical line.
     """
     p, q = np.asarray(position, dtype=np.float64), np.asarray(target, dtype=np.float64)
-    yaw = np.arctan2(q[..., 1] - p[..., 1], q[..., 0] - p[..., 0])
+    yaw = atan2(q[..., 1] - p[..., 1], q[..., 0] - p[..., 0])
     # A difference of -0.0 makes arctan2 answer -π for due west.
     return np.asarray(np.where(yaw <= -math.pi, math.pi, yaw))
 

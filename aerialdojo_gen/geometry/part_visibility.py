@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.geometry.portable import atan2, dot, norm
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
 
@@ -35,7 +36,7 @@ def in_picture(positions: Floats, yaw_rad: Floats, points: Floats, fov_deg: floa
 def off_front_rad(positions: Floats, centroid: ArrayLike, fronts_rad: Sequence[float]) -> Floats:
     """Angle in the plan, (n,) in [0, π], between viewpoints (n, 3), seen from the centroid, and the nearest front."""
     away = positions - np.asarray(centroid)
-    azimuth = np.arctan2(away[:, 1], away[:, 0])
+    azimuth = atan2(away[:, 1], away[:, 0])
     return np.asarray(np.min([np.abs(wrap_angle_rad(azimuth - front)) for front in fronts_rad], axis=0))
 
 
@@ -53,7 +54,7 @@ class Patch:
         """Draw n points by area from a part's surface and find which are in the sun."""
         points, normals = surface.sample_normals(n, rng)
         towards = np.asarray(sun, dtype=np.float64)
-        facing = normals @ towards
+        facing = dot(normals, towards)
         start = points + normals * np.where(facing > 0.0, _OFF_SURFACE_M, -_OFF_SURFACE_M)[:, None]
         reached = np.isinf(scene.first_hit(start, np.broadcast_to(towards, start.shape))[0])
         lit = np.column_stack([reached & (facing > 0.0), reached & (facing < 0.0)])
@@ -75,7 +76,7 @@ def visible_shares(
         seen = scene.visible(positions[pose], patch.points[point])
         pose, point = pose[seen], point[seen]
         ray = positions[pose] - patch.points[point]
-        cosine = (ray * patch.normals[point]).sum(axis=1) / np.linalg.norm(ray, axis=1)
+        cosine = (ray * patch.normals[point]).sum(axis=1) / norm(ray)
         lit = np.where(cosine > 0.0, patch.lit[point, 0], patch.lit[point, 1])
         weight = np.abs(cosine) * np.where(lit, 1.0, _SHADE)
         out[:, k] = np.bincount(pose, weight, minlength=len(positions)) / len(patch.points)

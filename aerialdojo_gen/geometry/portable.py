@@ -39,8 +39,10 @@ def distances_along(line: Floats) -> Floats:
 
 
 def product(a: Floats, b: Floats) -> Floats:
-    """Matrix product of (n, k) and (k, m)."""
-    return np.asarray(_product(np.ascontiguousarray(a, np.float64), np.ascontiguousarray(b, np.float64)))
+    """Matrix product of (..., k) and (k, m)."""
+    rows = np.ascontiguousarray(a, np.float64).reshape(-1, a.shape[-1])
+    out = _product(rows, np.ascontiguousarray(b, np.float64))
+    return np.asarray(out.reshape(*a.shape[:-1], b.shape[1]))
 
 
 def exp(x: ArrayLike) -> Floats:

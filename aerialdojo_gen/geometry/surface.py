@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.geometry.soup import Body
 from aerialdojo_gen.geometry.triangles import closest_point_d2
 
@@ -138,9 +139,9 @@ def _closest_on_triangle(p: Floats, t: Floats) -> Floats:
     """Nearest point of a triangle: inside it, else on one of its edges."""
     a, b, c = t
     n = np.cross(b - a, c - a)
-    q = p - n * (np.dot(p - a, n) / np.dot(n, n))
-    if all(np.dot(np.cross(v - u, q - u), n) >= 0.0 for u, v in ((a, b), (b, c), (c, a))):
+    q = p - n * (dot(p - a, n) / dot(n, n))
+    if all(dot(np.cross(v - u, q - u), n) >= 0.0 for u, v in ((a, b), (b, c), (c, a))):
         return np.asarray(q)
-    ends = [u + (v - u) * np.clip(np.dot(p - u, v - u) / np.dot(v - u, v - u), 0.0, 1.0)
+    ends = [u + (v - u) * np.clip(dot(p - u, v - u) / dot(v - u, v - u), 0.0, 1.0)
             for u, v in ((a, b), (b, c), (c, a))]  # fmt: skip
-    return np.asarray(min(ends, key=lambda e: float(np.dot(p - e, p - e))))
+    return np.asarray(min(ends, key=lambda e: float(dot(p - e, p - e))))

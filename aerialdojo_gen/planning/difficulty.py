@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.constants import APPROACH
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import TURN_RAD
+from aerialdojo_gen.geometry.portable import atan2
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
@@ -100,7 +101,7 @@ def free_lengths_m(starts: ArrayLike, goals: ArrayLike, max_approach_m: float) -
     s, g = np.asarray(starts, np.float64).reshape(-1, 4), np.asarray(goals, np.float64)
     way = (g - s[:, :3]) / max_approach_m
     flat, lift = np.hypot(way[:, 0], way[:, 1]), np.abs(way[:, 2])
-    bearing = np.arctan2(way[:, 1], way[:, 0]) - s[:, 3]
+    bearing = atan2(way[:, 1], way[:, 0]) - s[:, 3]
     # Components along the nearest heading and across it; a side of the dual 24-gon is perpendicular to a heading.
     off = np.abs(bearing - np.rint(bearing / TURN_RAD) * TURN_RAD)
     along, across = flat * np.cos(off), flat * np.sin(off)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import RENDERERS, RendererName
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.picture import Picture
@@ -90,7 +91,7 @@ class PyBulletRenderer:
         picture = self._world.render(camera, world_from_camera)
         if not instances:
             return picture
-        rays = camera.rays().reshape(-1, 3) @ world_from_camera[:3, :3].T
+        rays = product(camera.rays().reshape(-1, 3), world_from_camera[:3, :3].T)
         owner = ray_caster(self._scene).first_hit(world_from_camera[:3, 3], rays)[1]
         return Picture(picture.rgb, picture.depth_m, owner.reshape(camera.height, camera.width))
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
@@ -74,7 +75,7 @@ class RayRenderer:
         """Take a picture, always with its instance id map."""
         local, length = pixel_rays(camera)
         shape = (camera.height, camera.width)
-        directions = local @ world_from_camera[:3, :3].T
+        directions = product(local, world_from_camera[:3, :3].T)
         distance, face = self._rays.first_hit(world_from_camera[:3, 3], directions)
         albedo, depth, surface, owner = _hit_attributes(
             np.ascontiguousarray(world_from_camera[:3, 3]), directions, distance, length, face, self._corners,

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import cv2
 import numpy as np
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
 from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score, front_score, part_score, recognisability
@@ -130,7 +131,7 @@ def _terms(view: AnchorView) -> dict[str, Any]:
     # An object that fills the picture has no outline in it.
     if ring.any():
         lab = cv2.cvtColor(view.rgb.astype(np.float32) / 255.0, cv2.COLOR_RGB2LAB)
-        difference = np.linalg.norm(lab[view.visible].mean(axis=0) - lab[ring].mean(axis=0))
+        difference = norm(lab[view.visible].mean(axis=0) - lab[ring].mean(axis=0))
         contrast, sky = min(float(difference) / _FULL_CONTRAST, 1.0), float(view.sky[ring].mean())
     foreground = 0.0
     if view.nearer is not None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import Body
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
@@ -54,7 +55,7 @@ def take_view(
     # Whether the object is behind what is nearer: where it is seen there is nothing to ask.
     hidden = np.flatnonzero(~visible & (picture.instance >= 0) & boxed(camera, pose, thing.vertices))
     silhouette = visible.copy()
-    directions = pixel_rays(camera)[0][hidden] @ pose[:3, :3].T
+    directions = product(pixel_rays(camera)[0][hidden], pose[:3, :3].T)
     if len(hidden):
         silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
     shares = part_shares(alone, thing, tells, camera, pose, visible)
@@ -191,7 +192,7 @@ def part_shares(
         pixels = np.flatnonzero(np.any([around[k] for k in left], axis=0) & some) if left else np.zeros(0, np.int64)
         if not len(pixels):
             continue
-        directions = pixel_rays(camera)[0][pixels] @ world_from_camera[:3, :3].T
+        directions = product(pixel_rays(camera)[0][pixels], world_from_camera[:3, :3].T)
         face = alone.first_hit(world_from_camera[:3, 3], directions)[1]
         for k in left:
             own = np.zeros(len(thing.faces) + 1, dtype=np.bool_)

@@ -16,6 +16,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.frames import yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, off_front_rad
+from aerialdojo_gen.geometry.portable import atan2
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import ring, shortlist
 from aerialdojo_gen.pipeline.scoring.geometric import judge
@@ -114,7 +115,7 @@ def shortlisted(
     radius = job.embodiment.radius_m
     seen = found.seeing(config.min_visible_fraction)
     away = found.positions_m - world.scene.instances[found.instance].centroid
-    azimuth = np.arctan2(away[:, 1], away[:, 0])
+    azimuth = atan2(away[:, 1], away[:, 0])
     front = found.before_front
     separation_rad = math.radians(config.separation_deg)
     pictured = max(config.pictured, config.shortlist)

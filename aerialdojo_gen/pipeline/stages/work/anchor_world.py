@@ -12,6 +12,7 @@ from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, off_front_rad, visible_shares
+from aerialdojo_gen.geometry.portable import atan2
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import PointVisibility, Views, informativeness
@@ -103,7 +104,7 @@ class Candidates:
         thing = world.scene.instances[instance]
         views = sight.views()
         away = positions_m - thing.centroid
-        elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+        elevation = np.degrees(atan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
         rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
         part_visibility = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
         off_front = None

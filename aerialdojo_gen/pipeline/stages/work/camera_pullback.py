@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.part_visibility import Patch, in_picture
+from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 
 Floats = NDArray[np.float64]
@@ -50,7 +51,7 @@ def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_ra
     most = math.inf
     ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
     for patch, share in zip(patches, seen.tolist(), strict=True):
-        away = max(float(((patch.points - position_m) @ ahead).mean()), 0.1)
+        away = max(float(dot(patch.points - position_m, ahead).mean()), 0.1)
         taken = patch.area_m2 * share / (2.0 * away * math.tan(math.radians(fov_deg) / 2.0)) ** 2
         if taken > 0.0:
             floor = min(_TOLD, max(_BARELY_TOLD, taken / 2.0))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import QuotaConfig
 from aerialdojo_gen.base.constants import DETOUR, SETTINGS
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
+from aerialdojo_gen.geometry.portable import exp
 from aerialdojo_gen.pipeline.stages.work.quota import (
     Kept,
     difficulty_level,
@@ -194,7 +195,7 @@ class PaperQuota:
 
     def _rank(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats) -> dict[str, Integers]:
         # A difficulty level counts by its probability.
-        likely = 1.0 / (1.0 + np.exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
+        likely = 1.0 / (1.0 + exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
         levels = likely + (self._candidates.visible[rows] == 0.0)
         kept = self._kept(rows, setting, length_m, levels)
         return {name: rows[place] for name, place in rank_candidates(kept, *self._rules).items()}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
+from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
 from aerialdojo_gen.pipeline.scoring.views import box_px, part_shares
 from aerialdojo_gen.pipeline.stage import Job, Output
@@ -108,7 +109,7 @@ def instance_mask(
         if drawn is None:
             mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
         else:
-            directions = _local_rays(camera)[v0:v1, u0:u1] @ world_from_camera[:3, :3].T
+            directions = product(_local_rays(camera)[v0:v1, u0:u1], world_from_camera[:3, :3].T)
             mask[v0:v1, u0:u1] = _mended(rays, instance, drawn[v0:v1, u0:u1], world_from_camera[:3, 3], directions)
     return mask
 
@@ -138,7 +139,7 @@ def _window(
     rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64], u0: int, v0: int, u1: int, v1: int
 ) -> NDArray[np.int32]:
     local = _local_rays(camera)[v0:v1, u0:u1]
-    directions = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
+    directions = product(local.reshape(-1, 3), world_from_camera[:3, :3].T)
     return rays.first_hit(world_from_camera[:3, 3], directions)[1].reshape(local.shape[:2])
 
 
