@@ -1,8 +1,9 @@
-"""Products and functions of floats whose last bit is the same on every x86-64 machine.
+"""Products and functions of floats whose last bit does not depend on the processor.
 
 NumPy leaves products of matrices and lengths of vectors to OpenBLAS, and exp, powers and arctan2 of arrays to vector
 code: both take other instructions on other processors, and these round otherwise. Here sums have a fixed order, and
-functions are those of the C library, as in `math`. `np.sin`, `np.cos` and `np.hypot` are these too.
+functions are those of the C library, as in `math`; `np.sin`, `np.cos` and `np.hypot` are these too. The C library has
+one variant for processors with FMA, which is in all since 2013, and one for older ones.
 """
 
 from __future__ import annotations
