@@ -20,6 +20,7 @@ class PlanHead(SceneHead):
     """Everything of a plan; its ground and its entries are read when their turn comes."""
 
     plan: Literal[1]  # Version of the format
+    world: _Table  # Of a plan that `vary` wrote: type, seed, generator version and what was drawn
     floor_m: _Table  # Named heights, metres; also in expressions
     lines: _Table
     areas: _Table

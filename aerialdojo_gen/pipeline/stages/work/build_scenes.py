@@ -18,8 +18,7 @@ from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.store.layout import partition as store_partition
 from aerialdojo_gen.store.schemas import FAMILIES, SCENES
 
-_NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)_([01])")
-_PARTITIONS = {"0": "ID", "1": "OOD"}
+_NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)(?:_[01]|-h?\d+)")
 
 
 def run(job: Job, config: BuildScenesConfig) -> Output:
@@ -62,11 +61,10 @@ def scene_row(scene: Scene, mesh_path: str, mesh_sha256: str) -> dict[str, objec
 def parse_name(scene: str) -> tuple[str, str, str]:
     """Split a scene's name into family, type and partition.
 
-    ``U_Mall_0`` is ``("Urban", "Mall", "ID")``; a name of another form is of the family Custom, and in the ID
-    partition unless it ends in ``_1``.
+    ``U_Mall_0`` and the world ``U_Mall-1000`` are ``("Urban", "Mall", "ID")``; a name of another form is of the family
+    Custom, and in the ID partition unless it ends in ``_1``.
     """
-    match = _NAME.fullmatch(scene)
+    match, side = _NAME.fullmatch(scene), store_partition(scene).upper()
     if match is None:
-        return "Custom", re.sub(r"_[01]$", "", check_scene_name(scene)), store_partition(scene).upper()
-    family, scene_type, suffix = match.groups()
-    return FAMILIES[family], scene_type, _PARTITIONS[suffix]
+        return "Custom", re.sub(r"_[01]$", "", check_scene_name(scene)), side
+    return FAMILIES[match[1]], match[2], side

@@ -1,0 +1,258 @@
+"""A plan under construction: random streams by part and place, sections of entries, slots and what is dealt to them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.rng import generator, rank
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.plans.text import plan_text
+from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
+from aerialdojo_gen.scenes.worlds.paints import repainted
+from aerialdojo_gen.scenes.worlds.sizes import extents_m
+from aerialdojo_gen.scenes.worlds.world import World
+
+STAGE = "vary"
+T = TypeVar("T")
+Entry = dict[str, Any]
+
+
+class NoRoom(Exception):
+    """This draw makes no world; the message is the reason that is counted."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place for one thing."""
+
+    kind: str
+    x: float
+    y: float
+    yaw_deg: float  # Where the front of what stands there looks
+    room_m: tuple[float, float]  # Room along the front's direction, and across it
+    on: float | str | None  # Height, or its name; the ground where None
+    settle_m: float | None  # On a slope: see `Site.place`
+
+
+class Draft:
+    """What a generator writes a world's plan with; x east, y north, metres, the origin in the middle."""
+
+    def __init__(self, world: World, kind: SceneType, catalogue: Catalogue, trial: int = 0) -> None:
+        self.world, self.kind, self.catalogue, self._trial = world, kind, catalogue, trial
+        self._unknown_knobs()
+        self.topology = self._one_of({name: t.held_out for name, t in kind.topologies.items()}, "topology")
+        self.palette_name = self._one_of({name: p.held_out for name, p in kind.palettes.items()}, "palette")
+        spans = kind.topologies[self.topology].size_m or kind.size_m
+        self.width_m, self.depth_m = (self.whole(*span, "size", axis) for axis, span in zip("xy", spans, strict=True))
+        self.head: Entry = {}
+        self.lines: dict[str, Any] = {}
+        self.areas: dict[str, Any] = {}
+        self.floors: dict[str, float] = {}
+        self.ground: Entry = {"material": self.material("ground")}
+        self._site: list[Entry] = []
+        self._sections: dict[int, str] = {}
+        self._title = ""
+        self._slots: list[Slot] = []
+        self._taken: list[BaseGeometry] = []
+        self.landmarks: list[str] = []
+
+    # Random streams
+
+    def rng(self, *key: object) -> np.random.Generator:
+        """Make the stream of one part of the world, at one place: adding another part changes none of its draws."""
+        world = self.world
+        return generator(world.seed, STAGE, world.version, world.type, world.held_out, self._trial, *key)
+
+    def number(self, low: float, high: float, *key: object) -> float:
+        """Draw a number, to a tenth."""
+        return round(float(self.rng(*key).uniform(low, high)), 1)
+
+    def whole(self, low: float, high: float, *key: object) -> int:
+        """Draw an integer from `low` to `high`, both included."""
+        return int(self.rng(*key).integers(round(low), round(high) + 1))
+
+    def chance(self, share: float, *key: object) -> bool:
+        """Whether a thing happens that does in this share of the cases."""
+        return bool(self.rng(*key).random() < share)
+
+    def pick(self, options: Sequence[T], *key: object) -> T:
+        """Draw one of several, all alike likely."""
+        return options[int(self.rng(*key).integers(len(options)))]
+
+    def shuffled(self, options: Iterable[T], *key: object) -> list[T]:
+        """Return all of several in a drawn order."""
+        given = list(options)
+        return [given[k] for k in self.rng(*key).permutation(len(given))]
+
+    def knob(self, name: str) -> float:
+        """Value of a knob: the user's, or drawn."""
+        knob = self.kind.knobs[name]
+        if name in self.world.knobs:
+            return self.world.knobs[name]
+        return self.whole(knob.low, knob.high, "knob", name) if knob.whole else self.number(knob.low, knob.high, "knob", name)
+
+    def _unknown_knobs(self) -> None:
+        for name, value in self.world.knobs.items():
+            if name not in self.kind.knobs:
+                raise AssetError(f"--knob {name}: {unknown(f'{self.world.type} has no knob', name, self.kind.knobs)}")
+            knob = self.kind.knobs[name]
+            if not knob.low <= value <= knob.high or (knob.whole and value != int(value)):
+                form = "an integer" if knob.whole else "a number"
+                raise AssetError(f"--knob {name}={value:g}: {form} from {knob.low:g} to {knob.high:g} is wanted")
+
+    def _one_of(self, held_out: Mapping[str, bool], key: str) -> str:
+        return self.pick([name for name, held in held_out.items() if held == self.world.held_out], key)
+
+    @property
+    def palette(self) -> Palette:
+        """The palette that was drawn."""
+        return self.kind.palettes[self.palette_name]
+
+    def material(self, role: str, *key: object) -> str:
+        """Material of a role of the palette; of several one, drawn for the key."""
+        found = self.palette.materials[role]
+        return found if isinstance(found, str) else self.pick(found, "material", role, *key)
+
+    # Entries
+
+    def section(self, title: str) -> None:
+        """Begin a section: the comment above its first entry."""
+        self._title = title
+
+    def add(self, entry: Entry) -> None:
+        """Add an entry of a plan."""
+        if self._title:
+            self._sections[len(self._site)] = self._title
+            self._title = ""
+        self._site.append(entry)
+
+    def paint(self, area: Any, material: str, **more: Any) -> None:
+        """Paint an area."""
+        self.add({"paint": area, "material": material, **more})
+
+    def make(self, builder: str, **arguments: Any) -> None:
+        """Call a builder of the kit."""
+        self.add({"make": builder, **arguments})
+
+    def place(self, *things: Sequence[Any], **keys: Any) -> None:
+        """Place things where there is room; ``fit="must"`` for what the world cannot do without."""
+        self.add({"place": [list(thing) for thing in things], "fit": "skip", **keys})
+
+    # Ground that is taken
+
+    def take(self, area: BaseGeometry) -> None:
+        """Take ground, so that `is_free` says so."""
+        self._taken.append(area)
+
+    def is_free(self, area: BaseGeometry) -> bool:
+        """Whether an area lies on the site and on no ground that is taken."""
+        inside = shapely.box(-self.width_m / 2, -self.depth_m / 2, self.width_m / 2, self.depth_m / 2).contains(area)
+        return bool(inside) and not any(taken.intersects(area) for taken in self._taken)
+
+    def landmark(self, spots: Iterable[tuple[float, float, float]]) -> None:
+        """Place the type's landmarks at the first free of some poses (x, y, yaw), each another category."""
+        low, high = self.kind.n_landmarks
+        wanted = self.whole(low, high, "n_landmarks")
+        weights = self.kind.landmarks
+        order = sorted(weights, key=lambda c: -np.log(self.rng("landmark", c).random()) / weights[c])
+        for x, y, yaw in spots:
+            if not order or len(self.landmarks) == wanted:
+                return
+            what = next((c for c in order if self.is_free(_box(x, y, *extents_m(self.catalogue, c), yaw, 0.5))), None)
+            if what is None:
+                continue
+            order.remove(what)
+            self.take(_box(x, y, *extents_m(self.catalogue, what), yaw, 0.5))
+            self.landmarks.append(what)
+            self.add({"place": [[f"{what}:*" if ":" not in what else what, x, y, yaw]], "fit": "must", "margin_m": 0.4})
+
+    # Slots
+
+    def slot(
+        self, kind: str, x: float, y: float, yaw_deg: float = 0.0, room_m: tuple[float, float] = (2.4, 2.4),
+        on: float | str | None = None, settle_m: float | None = None,
+    ) -> None:  # fmt: skip
+        """Offer a place for one thing; `kind` is one of the type's slots."""
+        self._slots.append(Slot(kind, round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1), room_m, on, settle_m))
+
+    def furnish(self) -> None:
+        """Deal the type's things to the slots, and write them: what has no room when the plan is built is left out."""
+        used: Counter[tuple[str, str]] = Counter()
+        rows: dict[tuple[str, float | str | None, float | None], list[Any]] = {}
+        for kind in self.kind.slots:
+            slots = [slot for slot in self._slots if slot.kind == kind]
+            slots.sort(key=lambda s: rank(self.world.seed, STAGE, self._trial, kind, s.x, s.y, s.on))
+            share = self.number(*self.kind.slots[kind].share, "share", kind) if slots else 0.0
+            for slot in slots[: round(share * len(slots))]:
+                what = self._dealt(self.kind.slots[kind], slot, used)
+                if what is not None:
+                    rows.setdefault((kind, slot.on, slot.settle_m), []).append(self._thing(what, slot))
+        unknown_kinds = {slot.kind for slot in self._slots} - set(self.kind.slots)
+        assert not unknown_kinds, f"{self.world.type}: no slots {unknown_kinds} in its table"
+        for (kind, on, settle_m), things in rows.items():
+            self.section(f"Things: {kind}{'' if on is None else f', on {on}'}")
+            keys: Entry = {"fit": "skip", "margin_m": 0.25}
+            keys |= {} if on is None else {"on": on}
+            keys |= {} if settle_m is None else {"settle_m": settle_m}
+            self.add({"place": sorted(things, key=_pose), **keys})
+        self._slots.clear()
+
+    def _dealt(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
+        """Draw what stands at a slot; None where nothing that is left has room."""
+        weights = {
+            what: weight for what, weight in slots.of.items()
+            if used[slot.kind, what] < slots.most and (what not in slots.held_out or self.world.held_out)
+            and all(e <= r for e, r in zip(extents_m(self.catalogue, what), slot.room_m, strict=True))
+        }  # fmt: skip
+        if not weights:
+            return None
+        rng = self.rng("slot", slot.kind, slot.x, slot.y, slot.on)
+        what = list(weights)[int(rng.choice(len(weights), p=np.array([*weights.values()]) / sum(weights.values())))]
+        used[slot.kind, what] += 1
+        return what
+
+    def _thing(self, what: str, slot: Slot) -> Any:
+        """Give a thing its variant, and where it can have one a colour of its own."""
+        rng = self.rng("thing", slot.kind, slot.x, slot.y, slot.on)
+        return repainted(self.catalogue, what, (slot.x, slot.y, slot.yaw_deg), rng)
+
+    # The plan
+
+    def tables(self) -> Entry:
+        """Return the plan."""
+        low, high = self.kind.ceiling_m
+        world = {
+            "type": self.world.type, "seed": self.world.seed, "version": self.world.version, "draw": self._trial,
+            "topology": self.topology, "palette": self.palette_name, "held_out": self.world.held_out,
+            "knobs": {name: self.knob(name) for name in self.kind.knobs},
+        }  # fmt: skip
+        return {
+            "plan": 1, "seed": rank(self.world.seed, STAGE, self._trial) % 2**31,
+            "size_m": [self.width_m, self.depth_m], "ceiling_m": self.whole(low, high, "ceiling"), **self.head,
+            "world": world, "floor_m": self.floors, "lines": self.lines, "areas": self.areas,
+            "ground": self.ground, "site": self._site,
+        }  # fmt: skip
+
+    def text(self) -> str:
+        """Return the plan as TOML."""
+        name, about = self.world.name, self.kind.topologies[self.topology].about
+        return plan_text(self.tables(), f"{name}: {about}", self._sections)
+
+
+def _pose(thing: Any) -> tuple[float, float]:
+    return (thing[1], thing[2]) if isinstance(thing, list) else tuple(thing["at"])
+
+
+def _box(x: float, y: float, along: float, across: float, yaw_deg: float, margin_m: float) -> BaseGeometry:
+    half_u, half_v = along / 2 + margin_m, across / 2 + margin_m
+    box = shapely.affinity.rotate(shapely.box(-half_u, -half_v, half_u, half_v), yaw_deg, origin=(0, 0))
+    return shapely.affinity.translate(box, x, y)

@@ -1,0 +1,107 @@
+"""What a scene type may hold, as data: `scene_assets/types/<type>.toml`."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.recipe import validated
+
+Range = tuple[float, float]
+Weights = Annotated[dict[str, Annotated[float, Field(gt=0)]], Field(min_length=1)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Knob(_Strict):
+    """A quantity of a world that a seed draws and a user may set."""
+
+    low: float
+    high: float
+    whole: bool = False  # Whether it is an integer
+    about: str  # One line for the page of worlds
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Knob:
+        if self.low > self.high:
+            raise ValueError("low must not be above high")
+        return self
+
+
+class Topology(_Strict):
+    """One arrangement of a type."""
+
+    about: str
+    held_out: bool = False  # Used by worlds of ``--held-out`` alone
+    size_m: tuple[Range, Range] | None = None  # In place of the type's
+
+
+class Palette(_Strict):
+    """Colours and materials of one look of a type, its season among them."""
+
+    held_out: bool = False
+    materials: dict[str, str | list[str]]  # By role; of several, a world or a house draws one
+
+
+class Slots(_Strict):
+    """What may stand at the places of one kind."""
+
+    of: Weights  # Categories, ``category`` or ``category:variant``, and how often they come
+    held_out: list[str] = []  # Of these, those of ``--held-out`` alone
+    most: Annotated[int, Field(ge=1)] = 3  # Instances of a category at these slots of a world
+    share: Range = (0.6, 1.0)  # Of the slots, how many are filled
+
+
+class SceneType(_Strict):
+    """A scene type."""
+
+    about: str  # One line for the page of worlds
+    size_m: tuple[Range, Range]
+    ceiling_m: Range
+    topologies: Annotated[dict[str, Topology], Field(min_length=4)]
+    knobs: dict[str, Knob] = {}
+    palettes: Annotated[dict[str, Palette], Field(min_length=2)]
+    landmarks: Weights
+    n_landmarks: tuple[int, int] = (1, 3)
+    slots: dict[str, Slots]
+
+    @model_validator(mode="after")
+    def _something_on_both_sides(self) -> SceneType:
+        for kind, some in (("topologies", self.topologies), ("palettes", self.palettes)):
+            if len({one.held_out for one in some.values()}) != 2:
+                raise ValueError(f"{kind}: some must be held out, and some not")
+        return self
+
+
+def type_names(scene_assets: Path) -> list[str]:
+    """List the types that have a table."""
+    return sorted(path.stem for path in (scene_assets / "types").glob("*.toml"))
+
+
+@cache
+def load_type(name: str, scene_assets: Path, catalogue: Catalogue) -> SceneType:
+    """Read a type's table; an `AssetError` names the file and the key."""
+    path = scene_assets / "types" / f"{name}.toml"
+    if not path.is_file():
+        raise AssetError(unknown("no generator of the type", name, type_names(scene_assets)))
+    kind = validated(SceneType, read_toml(path, AssetError), str(path))
+    for where, weights in [("landmarks", kind.landmarks), *((f"slots {k}", s.of) for k, s in kind.slots.items())]:
+        for what in weights:
+            category, _, variant = what.partition(":")
+            if category not in catalogue:
+                raise AssetError(f"{path}: {where}: {unknown('no category', category, catalogue)}")
+            if variant:
+                catalogue[category].variant(variant)
+    for name_, slots in kind.slots.items():
+        if stray := sorted(set(slots.held_out) - set(slots.of)):
+            raise AssetError(f"{path}: slots {name_}: held_out: {stray[0]!r} is not in 'of'")
+    return kind

@@ -1,0 +1,46 @@
+"""A world: generator version, type, seed and knobs, and the side of the splits that its seed is on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aerialdojo_gen.base.errors import AssetError
+
+# Raised when a generator gives another plan for a seed: plans of older versions are refused by name.
+VERSION = 1
+# Seeds of the test and of the validation worlds; all that follow are for training.
+TEST_SEEDS, VALIDATION_SEEDS = range(200), range(200, 1000)
+MAX_SEED = 2**31 - 1
+_NAME = re.compile(r"(?P<type>[UNID]_[A-Za-z]+)-(?P<held>h?)(?P<seed>\d{1,10})")
+
+
+@dataclass(frozen=True)
+class World:
+    """What a world is made from."""
+
+    type: str  # ``"U_Mall"``
+    seed: int
+    knobs: Mapping[str, float] = field(default_factory=dict)  # Those that a user set; the others are drawn
+    held_out: bool = False  # Topologies, palettes and props that no other world has
+    version: int = VERSION
+
+    @property
+    def name(self) -> str:
+        """Name of its scene: ``U_Mall-1000``, or ``U_Mall-h1000`` of one that is held out."""
+        return f"{self.type}-{'h' if self.held_out else ''}{self.seed}"
+
+    @property
+    def side(self) -> Literal["test", "validation", "train"]:
+        """Side of the splits, by the seed alone."""
+        return "test" if self.seed in TEST_SEEDS else "validation" if self.seed in VALIDATION_SEEDS else "train"
+
+
+def world_of(name: str) -> World:
+    """Read a world's name."""
+    found = _NAME.fullmatch(name)
+    if found is None or int(found["seed"]) > MAX_SEED:
+        raise AssetError(f"{name!r} names no world: the form is U_Mall-1000, or U_Mall-h1000 of one that is held out")
+    return World(found["type"], int(found["seed"]), held_out=bool(found["held"]))
