@@ -46,8 +46,8 @@ def _listed(names: Sequence[str]) -> str:
     return f"there {'is' if len(names) == 1 else 'are'} {shown}"
 
 
-def choose_scenes(patterns: Sequence[str] | None, known: Sequence[str]) -> list[str]:
-    """Resolve names and globs to scenes."""
+def choose_scenes(patterns: Sequence[str] | None, known: Sequence[str], what: str = "scene") -> list[str]:
+    """Resolve names and globs to scenes, or to what else has names."""
     if not known:
         raise UsageError("there are no scenes: the folder of recipes is empty")
     chosen: set[str] = set()
@@ -55,6 +55,6 @@ def choose_scenes(patterns: Sequence[str] | None, known: Sequence[str]) -> list[
         # Not `filter`, which folds case and slashes on some systems.
         matches = [name for name in known if fnmatch.fnmatchcase(name, pattern)]
         if not matches:
-            raise UsageError(unknown("no scene", pattern, known, most=3))
+            raise UsageError(unknown(f"no {what}", pattern, known, most=3))
         chosen.update(matches)
     return [name for name in known if name in chosen]

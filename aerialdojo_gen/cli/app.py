@@ -32,7 +32,7 @@ from aerialdojo_gen.cli import (
 _HEADINGS = {
     "Look at a dataset": ("stats", "show", "view", "gallery", "validate"),
     "Evaluate and train agents": ("evaluate", "fly", "report", "train", "score", "leaderboard"),
-    "Add your own scenes": ("add-scene", "add-map", "add-terrain", "annotate-draft", "annotate"),
+    "Add your own scenes": ("vary", "add-scene", "add-map", "add-terrain", "annotate-draft", "annotate"),
     "Exchange and share": ("export", "import-benchmark", "push-to-hub", "pull"),
 }
 

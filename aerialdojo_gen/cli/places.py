@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.base import cli_context
+from aerialdojo_gen.cli.common import Quiet, Workers
 
 if TYPE_CHECKING:
     from aerialdojo_gen.imports.places import AddedPlace
@@ -83,6 +84,57 @@ def add_terrain(
     box = None if bbox is None else _box(bbox)
     options = ReliefOptions(box, size, cell, water, sand, snow, bare, seed, ceiling, attribution)
     _print_scenes([places.add_terrain(name, dem, project, options, force=force)], project)
+
+
+@app.command("vary")
+def vary(
+    types: Annotated[list[str], typer.Argument(help="Scene types or globs: U_ParkingLot, 'U_*'.")],
+    seeds: Annotated[
+        str, typer.Option(help="FIRST:END; 0 to 199 are test worlds, 200 to 999 validation, from 1000 training.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for the plans, annotations and pipeline.")],
+    knob: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Set a quantity that is drawn otherwise; repeatable."),
+    ] = None,
+    held_out: Annotated[
+        bool, typer.Option("--held-out", help="Use the topologies, palettes and things that no other world has.")
+    ] = False,
+    objects: Annotated[int, typer.Option(min=2, max=500, help="Maximum annotated objects of a world.")] = 40,
+    workers: Workers = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make worlds of a scene type from seeds: plans to read and edit, with annotations."""
+    from aerialdojo_gen.dataset.build import default_workers
+    from aerialdojo_gen.imports import worlds
+    from aerialdojo_gen.pipeline.progress import Reporter
+
+    options = worlds.VaryOptions(dict(_knob(one) for one in knob or ()), held_out, objects)
+    chosen = _seeds(seeds)
+    reporter = Reporter(quiet=quiet)
+    with reporter.bar("vary", worlds.count(types, chosen), unit="worlds") as bar:
+        done = worlds.vary(
+            types, chosen, out, options, workers=workers or default_workers(), on_done=lambda _: bar.advance()
+        )
+    made, refused = sum(one.made for one in done), sum(len(one.refused) for one in done)
+    kept = f", {len(done) - made:,} there already" if made < len(done) else ""
+    print(f"{out}: {made:,} worlds made{kept}, {refused:,} draws refused ({out / worlds.DRAWS})")
+    print(f"next: {cli_context.command('run', out / 'pipeline.toml', data=out / 'data')}")
+
+
+def _seeds(text: str) -> range:
+    first, _, end = text.partition(":")
+    if not (first.isdecimal() and (end or first).isdecimal()):
+        raise typer.BadParameter(f"--seeds {text[:60]!r}: FIRST:END is wanted, two whole numbers: 1000:1010")
+    return range(int(first), int(end) if end else int(first) + 1)
+
+
+def _knob(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise typer.BadParameter(f"--knob {text[:60]!r}: NAME=VALUE is wanted, a number: storeys=3") from None
 
 
 def _box(text: str) -> tuple[float, float, float, float]:

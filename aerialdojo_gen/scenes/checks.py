@@ -17,7 +17,9 @@ from aerialdojo_gen.scenes.site import footprint
 # They hang on walls.
 HUNG = frozenset({"dock_door", "shop_sign", "storefront", "wall_banner", "wall_clock"})
 # They bear or span what stands in their outline; trees grow out of hedges.
-SPANNING = frozenset({"container_crane", "fire_tower", "freighter", "gantry_crane", "hedge_block", "shipping_container"})
+SPANNING = frozenset(
+    {"container_crane", "fire_tower", "freighter", "gantry_crane", "hedge_block", "shipping_container"}
+)
 _MIN_TRIANGLES, _MAX_TRIANGLES = 10_000, 220_000
 _MIN_THINGS = 30  # that tasks may ask for
 _MIN_SEEN = 1 / 3  # of the free volume, by each landmark
@@ -53,7 +55,11 @@ def targets_of(scene: Scene, catalogue: Catalogue) -> list[Instance]:
 
 
 def floating(
-    scene: Scene, catalogue: Catalogue, hung: Collection[str] = (), reach_m: float = 0.9, bearers: Collection[str] = ()
+    scene: Scene,
+    catalogue: Catalogue,
+    hung: Collection[str] = (),
+    reach_m: float = 0.9,
+    bearers: Collection[str] = (),
 ) -> list[str]:
     """List the props that nothing bears: no surface of structure or ground under their feet.
 

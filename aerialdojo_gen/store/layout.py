@@ -60,7 +60,7 @@ _HELD_OUT = re.compile(r"[UNID]_[A-Za-z]+-h\d+")
 
 
 def partition(scene: str) -> str:
-    """Return the partition of a scene: ``"ood"`` for the suffix ``_1`` and for worlds that are held out, else ``"id"``."""
+    """Return a scene's partition: ``"ood"`` for the suffix ``_1`` and worlds that are held out, else ``"id"``."""
     return "ood" if scene.endswith("_1") or _HELD_OUT.fullmatch(scene) else "id"
 
 

@@ -47,7 +47,19 @@ def _listed(entry: Mapping[str, Any]) -> list[str]:
     return [*lines, f"{end},"]
 
 
-_TABLES = ("world", "palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "placing", "ground")
+_TABLES = (
+    "world",
+    "palette",
+    "inventory",
+    "origin",
+    "moves",
+    "floor_m",
+    "lines",
+    "areas",
+    "fields",
+    "placing",
+    "ground",
+)
 
 
 def _pair(key: str, value: Any) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A plan under construction: random streams by part and place, sections of entries, slots and what is dealt to them."""
+"""A plan under construction: random streams by part and place, sections, slots and what is dealt to them."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ T = TypeVar("T")
 Entry = dict[str, Any]
 
 
-class NoRoom(Exception):
-    """This draw makes no world; the message is the reason that is counted."""
+class NoRoomError(Exception):
+    """A draw makes no world; the message is the reason that is counted."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,11 @@ class Draft:
         knob = self.kind.knobs[name]
         if name in self.world.knobs:
             return self.world.knobs[name]
-        return self.whole(knob.low, knob.high, "knob", name) if knob.whole else self.number(knob.low, knob.high, "knob", name)
+        return (
+            self.whole(knob.low, knob.high, "knob", name)
+            if knob.whole
+            else self.number(knob.low, knob.high, "knob", name)
+        )
 
     def _unknown_knobs(self) -> None:
         for name, value in self.world.knobs.items():
@@ -173,7 +177,9 @@ class Draft:
             order.remove(what)
             self.take(_box(x, y, *extents_m(self.catalogue, what), yaw, 0.5))
             self.landmarks.append(what)
-            self.add({"place": [[f"{what}:*" if ":" not in what else what, x, y, yaw]], "fit": "must", "margin_m": 0.4})
+            self.add(
+                {"place": [[f"{what}:*" if ":" not in what else what, x, y, yaw]], "fit": "must", "margin_m": 0.4}
+            )
 
     # Slots
 
@@ -185,7 +191,7 @@ class Draft:
         self._slots.append(Slot(kind, round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1), room_m, on, settle_m))
 
     def furnish(self) -> None:
-        """Deal the type's things to the slots, and write them: what has no room when the plan is built is left out."""
+        """Deal the type's things to the slots, and write them: what has no room in the built scene is left out."""
         used: Counter[tuple[str, str]] = Counter()
         rows: dict[tuple[str, float | str | None, float | None], list[Any]] = {}
         for kind in self.kind.slots:

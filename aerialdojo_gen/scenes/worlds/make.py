@@ -11,7 +11,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.checks import faults
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.build import build_tables
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoom
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.kinds import load_type
 from aerialdojo_gen.scenes.worlds.types import generator_of
 from aerialdojo_gen.scenes.worlds.world import VERSION, World
@@ -47,7 +47,7 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
         draft = Draft(world, kind, catalogue, trial)
         try:
             generator_of(world.type)(draft)
-        except NoRoom as error:
+        except NoRoomError as error:
             refused.append((str(error), ""))
             continue
         text = draft.text()

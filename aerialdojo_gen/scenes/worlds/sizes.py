@@ -13,7 +13,7 @@ from aerialdojo_gen.scenes.site import footprint
 
 @cache
 def extents_m(catalogue: Catalogue, what: str) -> tuple[float, float]:
-    """Extents of the ground that a category's variants take at most, along their front's direction and across, metres."""
+    """Largest extents on the ground of a category's variants, along their front's direction and across it, metres."""
     category, _, variant = what.partition(":")
     names = [variant] if variant else [one.name for one in catalogue[category].variants]
     sizes = []

@@ -81,10 +81,14 @@ def block_building(draft: Draft, box: Box, name: str, *, storeys: int, street_de
     flat = box.width * box.depth > 120 or draft.chance(0.5, name, "flat")
     arguments = {
         "outline": box.rounded(), "wall": draft.material("wall", name), "roof": draft.material("roof", name),
-        "storeys": storeys, "storey_m": draft.number(2.9, 3.6, name, "storey"), "category": category, "as": f"{name}_top",
+        "storeys": storeys, "storey_m": draft.number(2.9, 3.6, name, "storey"), "category": category,
+        "as": f"{name}_top",
     }  # fmt: skip
     if not flat:
-        arguments |= {"roof_kind": draft.pick(["gable", "hip"], name, "roof_kind"), "roof_m": draft.number(1.8, 3.0, name, "roof_m")}
+        arguments |= {
+            "roof_kind": draft.pick(["gable", "hip"], name, "roof_kind"),
+            "roof_m": draft.number(1.8, 3.0, name, "roof_m"),
+        }
     draft.make("building", **arguments)
     draft.take(box.shape())
     front_slots(draft, box, street_deg)
@@ -109,7 +113,9 @@ def grid(box: Box, step_m: float) -> list[Point]:
     """Points over a box, evenly, at least that far apart."""
     nx, ny = max(int(box.width // step_m), 0), max(int(box.depth // step_m), 0)
     return [
-        (box.x0 + (i + 0.5) * box.width / nx, box.y0 + (j + 0.5) * box.depth / ny) for i in range(nx) for j in range(ny)
+        (box.x0 + (i + 0.5) * box.width / nx, box.y0 + (j + 0.5) * box.depth / ny)
+        for i in range(nx)
+        for j in range(ny)
     ]
 
 

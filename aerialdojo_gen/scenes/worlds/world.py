@@ -38,6 +38,11 @@ class World:
         return "test" if self.seed in TEST_SEEDS else "validation" if self.seed in VALIDATION_SEEDS else "train"
 
 
+def is_world(name: str) -> bool:
+    """Whether a scene's name is a world's."""
+    return _NAME.fullmatch(name) is not None
+
+
 def world_of(name: str) -> World:
     """Read a world's name."""
     found = _NAME.fullmatch(name)

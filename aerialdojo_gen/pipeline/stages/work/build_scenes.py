@@ -61,8 +61,8 @@ def scene_row(scene: Scene, mesh_path: str, mesh_sha256: str) -> dict[str, objec
 def parse_name(scene: str) -> tuple[str, str, str]:
     """Split a scene's name into family, type and partition.
 
-    ``U_Mall_0`` and the world ``U_Mall-1000`` are ``("Urban", "Mall", "ID")``; a name of another form is of the family
-    Custom, and in the ID partition unless it ends in ``_1``.
+    ``U_Mall_0`` and the world ``U_Mall-1000`` are ``("Urban", "Mall", "ID")``; a name of another form is of the
+    family Custom, and in the ID partition unless it ends in ``_1``.
     """
     match, side = _NAME.fullmatch(scene), store_partition(scene).upper()
     if match is None:

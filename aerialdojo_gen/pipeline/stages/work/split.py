@@ -14,10 +14,18 @@ from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
 from aerialdojo_gen.pipeline.stages.work.quota import Kept, difficulty_level, sampling_key, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
+from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+
+
+def _train_fraction(scene: str, out_of_distribution: bool, config: SplitConfig) -> float:
+    """Share of a scene's tasks that train: all or none of a world's, whose seed decides."""
+    if is_world(scene):
+        return 1.0 if world_of(scene).side == "train" else 0.0
+    return config.ood_train_fraction if out_of_distribution else config.id_train_fraction
 
 
 def _constant(value: str, n: int) -> pa.Array:
@@ -149,7 +157,7 @@ def run(job: Job, config: SplitConfig) -> Output:
     )
     policy = policy_of(job.scene, config.quota, job.seed)
     routes = routes.filter(pa.array(policy.release(_kept(routes))))
-    fraction = config.ood_train_fraction if scene["partition"] == "OOD" else config.id_train_fraction
+    fraction = _train_fraction(job.scene, scene["partition"] == "OOD", config)
     trains = policy.train_counts(routes.column("setting").to_pylist(), fraction)
     train = train_mask(
         routes.column("sampling_key").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoom
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid, street_along
 
 _BAY_M, _DEPTH_M, _AISLE_M = 2.6, 5.2, 6.4
@@ -20,18 +20,28 @@ def write(draft: Draft) -> None:
     draft.section("The lot")
     draft.paint(lot.rounded(), draft.material("lot"))
     entry_x = draft.number(lot.x0 + 6, lot.x1 - 6, "entry")
-    draft.paint([round(entry_x - 3.3, 2), round(-d + 5.6 + 3.25, 2), round(entry_x + 3.3, 2), round(lot.y0 + 0.1, 2)], draft.material("lot"))
-    draft.make("arrows", at=[[entry_x - 1.5, round(lot.y0 - 1.6, 2), 90.0], [entry_x + 1.5, round(lot.y0 - 1.6, 2), 270.0]])
+    draft.paint(
+        [round(entry_x - 3.3, 2), round(-d + 5.6 + 3.25, 2), round(entry_x + 3.3, 2), round(lot.y0 + 0.1, 2)],
+        draft.material("lot"),
+    )
+    draft.make(
+        "arrows", at=[[entry_x - 1.5, round(lot.y0 - 1.6, 2), 90.0], [entry_x + 1.5, round(lot.y0 - 1.6, 2), 270.0]]
+    )
     draft.slot("entrance", entry_x - 4.6, lot.y0 - 0.4, 270.0, (3.0, 3.0))
     draft.slot("entrance", entry_x + 4.6, lot.y0 - 0.4, 270.0, (3.0, 3.0))
     _TOPOLOGIES[draft.topology](draft, lot)
     edge_slots(draft, "verge", lot.grown(-1.6), 5.2, (3.2, 3.2))
     edge_slots(draft, "tree", lot.grown(1.4), 6.5, (2.0, 2.0))
-    spots = [(x, y, 180.0) for x, y in draft.shuffled([*grid(lot.grown(-3), 9.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)], "landmarks")]
+    spots = [
+        (x, y, 180.0)
+        for x, y in draft.shuffled(
+            [*grid(lot.grown(-3), 9.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)], "landmarks"
+        )
+    ]
     draft.section("Landmarks")
     draft.landmark(spots)
     if not draft.landmarks:
-        raise NoRoom("no room for a landmark")
+        raise NoRoomError("no room for a landmark")
     draft.furnish()
 
 
@@ -61,7 +71,9 @@ def _buildings(draft: Draft, lot: Box) -> Box:
     draft.paint(strip.grown(0.4).rounded(), "paving:#b8afa0", rise_m=0.1)
     if side == "north":
         return Box(lot.x0, lot.y0, lot.x1, strip.y0 - 3.0)
-    return Box(strip.x1 + 3.0, lot.y0, lot.x1, lot.y1) if side == "west" else Box(lot.x0, lot.y0, strip.x0 - 3.0, lot.y1)
+    return (
+        Box(strip.x1 + 3.0, lot.y0, lot.x1, lot.y1) if side == "west" else Box(lot.x0, lot.y0, strip.x0 - 3.0, lot.y1)
+    )
 
 
 def _rows(draft: Draft, lot: Box) -> None:
@@ -84,7 +96,7 @@ def _rows(draft: Draft, lot: Box) -> None:
         draft.take(Box(x - count * _BAY_M / 2, y - _DEPTH_M, x + count * _BAY_M / 2, y + _DEPTH_M).shape())
         y += 2 * _DEPTH_M + _AISLE_M
     if not rows:
-        raise NoRoom("no room for a row of bays")
+        raise NoRoomError("no room for a row of bays")
     draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
     for x, y, yaw, n in rows:
         for k in range(int(n)):
@@ -100,15 +112,24 @@ def _fishbone(draft: Draft, lot: Box) -> None:
         for north, at in ((False, y + 5.2), (True, y + 10.0)):
             rows.append([round(inner.x0 + 2.0, 2), round(at, 2), north, count])
         middle = y + 7.6
-        draft.make("arrows", at=[[round(inner.x0 + 8 + 14 * k, 1), round(middle, 1), 0.0] for k in range(int(inner.width // 16))])
+        draft.make(
+            "arrows",
+            at=[[round(inner.x0 + 8 + 14 * k, 1), round(middle, 1), 0.0] for k in range(int(inner.width // 16))],
+        )
         strip = Box(inner.x0 + 1.0, y + 15.2, inner.x1 - 1.0, y + 17.2)
         draft.paint(strip.rounded(), draft.material("island"), rise_m=0.12)
         for k in range(int(strip.width // 7)):
-            draft.slot(draft.pick(["tree", "island", "machines"], "strip", round(y), k), strip.x0 + 3 + 7 * k, strip.middle[1], 90.0, (1.8, 3.0))
+            draft.slot(
+                draft.pick(["tree", "island", "machines"], "strip", round(y), k),
+                strip.x0 + 3 + 7 * k,
+                strip.middle[1],
+                90.0,
+                (1.8, 3.0),
+            )
         draft.take(Box(inner.x0, y, inner.x1, y + 17.2).shape())
         y += 17.6
     if not rows:
-        raise NoRoom("no room for a row of bays")
+        raise NoRoomError("no room for a row of bays")
     draft.make("slanted_bays", rows=rows, occupancy=draft.knob("occupancy"))
 
 
@@ -116,7 +137,7 @@ def _deck(draft: Draft, lot: Box) -> None:
     """A parking deck of two or three floors, and rows on what is left."""
     width, depth = draft.number(26, 30, "deck_w"), draft.number(33, 35, "deck_d")
     if lot.depth < depth + 16 or lot.width < width + 30:
-        raise NoRoom("no room for the deck")
+        raise NoRoomError("no room for the deck")
     left = draft.chance(0.5, "deck_side")
     x0 = lot.x0 + 6.5 if left else lot.x1 - width - 7.5
     box = [round(v, 2) for v in (x0, lot.y0 + 10.5, x0 + width, lot.y0 + 10.5 + depth)]
@@ -137,7 +158,15 @@ def _court(draft: Draft, lot: Box) -> None:
     at = [round(lot.x0 + 3.0, 2), round(lot.y1 - 7.2, 2)]
     doors = draft.shuffled(["#3f6f5a", "#7a3b36", "#44618a", "#c9a23f", "#6f6f70", "#8a5a8a"], "doors")[:3]
     opened = [k for k in range(count) if draft.chance(0.25, "open", k)]
-    draft.make("lockup_garages", at=at, count=count, doors=doors, open_doors=opened, wall=draft.material("wall", "garages"), **{"as": "garage_top"})
+    draft.make(
+        "lockup_garages",
+        at=at,
+        count=count,
+        doors=doors,
+        open_doors=opened,
+        wall=draft.material("wall", "garages"),
+        **{"as": "garage_top"},
+    )
     draft.take(Box(at[0] - 1, at[1] - 2, at[0] + count * 3.4 + 1, lot.y1).shape())
     for k in range(count):
         x = at[0] + (k + 0.5) * 3.4
@@ -159,9 +188,9 @@ def _solar(draft: Draft, lot: Box) -> None:
         x = inner.middle[0]
         posts = [[round(x + u * half * 0.9, 2), round(y, 2)] for u in (-1, -0.5, 0, 0.5, 1)]
         steel = draft.material("steel", k)
+        box = Box(x - half, y - 5, x + half, y + 5).rounded()
         draft.add({"node": f"solar_roof_{k}", "category": "solar_roof", "parts": [
-            {"make": "canopy", "box": [round(x - half, 2), round(y - 5, 2), round(x + half, 2), round(y + 5, 2)], "z_m": 4.2,
-             "roof": "sheet_metal:#c9ced0", "post": steel},
+            {"make": "canopy", "box": box, "z_m": 4.2, "roof": "sheet_metal:#c9ced0", "post": steel},
             {"make": "round_columns", "at": posts, "z": [0, 4.2], "material": steel, "radius_m": 0.2},
         ]})  # fmt: skip
         for u in range(int(half * 2 // 6)):

@@ -1,0 +1,153 @@
+"""The twin of ``vary``: worlds of a scene type as plans, drafted annotations and a pipeline, in a project folder."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.csv
+
+from aerialdojo_gen.annotations.draft import DraftOptions
+from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.base.shipped import home
+from aerialdojo_gen.imports.command import PIPELINE, write_pipeline
+from aerialdojo_gen.imports.drafting import draft_scene
+from aerialdojo_gen.pipeline.stage import ProjectPaths
+from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.worlds.kinds import type_names
+from aerialdojo_gen.scenes.worlds.make import make_world
+from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.root import open_root
+
+DRAWS = "draws.csv"
+_MAX_WORLDS = 100_000
+_COLUMNS = ("world", "draw", "reason", "what")
+
+
+@dataclass(frozen=True)
+class VariedWorld:
+    """A world that was written, or that stood there already."""
+
+    name: str
+    made: bool  # False where its plan and annotations were there
+    refused: tuple[tuple[str, str], ...] = ()  # Reason and what it was about, one a refused draw
+
+
+@dataclass(frozen=True)
+class VaryOptions:
+    """What all worlds of a call have in common."""
+
+    knobs: Mapping[str, float]
+    held_out: bool = False
+    n_objects: int = 40  # Most annotated objects of a world
+
+
+def vary(
+    types: Sequence[str], seeds: range, project: Path, options: VaryOptions | None = None, *,
+    workers: int = 1, on_done: Callable[[VariedWorld], object] = lambda done: None,
+) -> list[VariedWorld]:  # fmt: skip
+    """Write the worlds of some types (names or globs) and seeds; those that are there already stay.
+
+    Parameters
+    ----------
+    types : sequence of str
+        Names of types, or globs: ``"U_*"``.
+    seeds : range
+    project : Path
+        Folder for ``scenes/``, ``annotations/``, ``pipeline.toml`` and ``draws.csv``, the table of refused draws.
+    options : VaryOptions, optional
+    workers : int
+        Processes.
+    on_done : callable
+        Called with each world when it is written.
+
+    Raises
+    ------
+    UsageError
+        No such type, no seed, or too many worlds.
+    AssetError
+        A knob is unknown or out of its range, or no draw of a seed makes a sound scene.
+    """
+    options = options or VaryOptions({})
+    names = choose_scenes(list(types), type_names(home() / "scene_assets"), "type")
+    if count(names, seeds) > _MAX_WORLDS:
+        raise UsageError(f"{count(names, seeds):,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
+    worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
+    for inner in ("scenes", "annotations"):
+        make_folder(project / inner)
+    write_pipeline(project)
+    done = []
+    for one in _each(worlds, project, options, workers):
+        done.append(one)
+        on_done(one)
+    _write_draws(project, done)
+    return done
+
+
+def count(types: Sequence[str], seeds: range) -> int:
+    """Count the worlds of some types and seeds."""
+    if not seeds or seeds[0] < 0 or seeds[-1] > MAX_SEED:
+        raise UsageError(f"--seeds: FIRST:END is wanted, from 0 to {MAX_SEED:,}, the end not included: 1000:1010")
+    return len(seeds) * len(choose_scenes(list(types), type_names(home() / "scene_assets"), "type"))
+
+
+def _each(worlds: Sequence[World], project: Path, options: VaryOptions, workers: int) -> Iterator[VariedWorld]:
+    if workers <= 1 or len(worlds) == 1:
+        yield from (_write_world(world, project, options) for world in worlds)
+        return
+    # Spawned, because a forked child of a process that has drawn pictures may hang.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(worlds)), mp_context=context) as pool:
+        waiting = [pool.submit(_write_world, world, project, options) for world in worlds]
+        try:
+            for future in waiting:
+                yield future.result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _write_world(world: World, project: Path, options: VaryOptions) -> VariedWorld:
+    plan, annotations = project / "scenes" / f"{world.name}.toml", project / "annotations" / f"{world.name}.json"
+    if plan.exists() and annotations.exists():
+        return VariedWorld(world.name, made=False)
+    made = make_world(world, home() / "scene_assets", _catalogue())
+    with atomic_file(project, f"scenes/{world.name}.toml") as path:
+        path.write_text(made.text, encoding="utf-8")
+    pipeline = _pipeline(project / PIPELINE)
+    folders = (home() / "scene_assets", project / "scenes", project / "annotations")
+    paths = ProjectPaths(open_root(project / "data"), *folders)
+    draft = DraftOptions(n_objects=options.n_objects, seed=world.seed)
+    draft_scene(world.name, pipeline, paths, draft, force=True)
+    return VariedWorld(world.name, made=True, refused=made.refused)
+
+
+@cache
+def _catalogue() -> Catalogue:
+    return load_catalogue(home() / "scene_assets")
+
+
+@cache
+def _pipeline(path: Path) -> Pipeline:
+    return load_pipeline(path)
+
+
+def _write_draws(project: Path, done: Sequence[VariedWorld]) -> None:
+    """Add the refused draws of new worlds to those of earlier calls."""
+    path, made = project / DRAWS, {one.name for one in done if one.made}
+    earlier = pyarrow.csv.read_csv(path).to_pylist() if path.exists() else []
+    rows = [row for row in earlier if row["world"] not in made]
+    rows += [
+        {"world": one.name, "draw": draw, "reason": reason, "what": what}
+        for one in done for draw, (reason, what) in enumerate(one.refused)
+    ]  # fmt: skip
+    schema = pa.schema([(name, pa.int32() if name == "draw" else pa.string()) for name in _COLUMNS])
+    with atomic_file(project, DRAWS) as out:
+        pyarrow.csv.write_csv(pa.Table.from_pylist(rows, schema=schema), out)

@@ -1,0 +1,121 @@
+"""Worlds: sound scenes from seeds and knobs, the same every time, and streams that do not depend on one another."""
+
+import ast
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.layout_checks import ASSETS, catalogue
+
+import aerialdojo_gen.scenes.worlds
+from aerialdojo_gen.annotations.appearance import SHADES
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.checks import faults
+from aerialdojo_gen.scenes.colours import colour_name
+from aerialdojo_gen.scenes.materials import parse_colour
+from aerialdojo_gen.scenes.plans.build import build_tables
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.kinds import load_type, type_names
+from aerialdojo_gen.scenes.worlds.make import MAX_BYTES, make_world
+from aerialdojo_gen.scenes.worlds.paints import PAINTS, paintable
+from aerialdojo_gen.scenes.worlds.types import generator_of
+from aerialdojo_gen.scenes.worlds.world import World, world_of
+
+TYPES = type_names(ASSETS)
+
+
+def draft_of(world: World) -> Draft | None:
+    """The first draw of a world; None where it has no room."""
+    draft = Draft(world, load_type(world.type, ASSETS, catalogue()), catalogue())
+    try:
+        generator_of(world.type)(draft)
+    except NoRoomError:
+        return None
+    return draft
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_a_world_is_sound_and_its_plan_builds_the_same_scene(kind: str) -> None:
+    made = make_world(World(kind, 1000), ASSETS, catalogue())
+    again = make_world(World(kind, 1000), ASSETS, catalogue())
+    assert made.text == again.text
+    assert len(made.text) <= MAX_BYTES
+    scene = build_tables(made.world.name, tomllib.loads(made.text), catalogue())
+    assert list(faults(scene, catalogue())) == []
+    assert [i.node for i in scene.instances] == [i.node for i in made.scene.instances]
+    for one, other in zip(scene.instances, again.scene.instances, strict=True):
+        assert (one.vertices == other.vertices).all()
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
+def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
+    made = make_world(World(kind, seed, held_out=held_out), ASSETS, catalogue())
+    table = load_type(kind, ASSETS, catalogue())
+    world = tomllib.loads(made.text)["world"]
+    assert table.topologies[world["topology"]].held_out == table.palettes[world["palette"]].held_out == held_out
+    withheld = {what for slots in table.slots.values() for what in slots.held_out}
+    if not held_out:
+        assert withheld.isdisjoint(i.category for i in made.scene.instances)
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_seeds_give_all_topologies_and_other_worlds(kind: str) -> None:
+    drafts = [d for d in (draft_of(World(kind, seed)) for seed in range(1000, 1040)) if d is not None]
+    table = load_type(kind, ASSETS, catalogue())
+    assert {d.topology for d in drafts} == {name for name, t in table.topologies.items() if not t.held_out}
+    assert len({d.text().split("\n", 1)[1] for d in drafts}) == len(drafts)
+
+
+def test_a_knob_changes_its_part_alone() -> None:
+    kind = "U_ParkingLot"
+    few, many = (draft_of(World(kind, 1002, {"occupancy": share})) for share in (0.4, 0.8))
+    assert few is not None
+    assert many is not None
+    rows = [entry for entry in few.tables()["site"] if entry.get("make") == "parking_rows"]
+    assert rows
+    for one, other in zip(few.tables()["site"], many.tables()["site"], strict=True):
+        assert {**one, "occupancy": 0} == {**other, "occupancy": 0}
+
+
+@pytest.mark.parametrize(
+    ("knobs", "message"),
+    [({"storys": 2.0}, "storeys"), ({"storeys": 2.5}, "an integer"), ({"storeys": 99.0}, "from 1 to 4")],
+)
+def test_a_wrong_knob_is_refused_in_a_line(knobs: dict[str, float], message: str) -> None:
+    with pytest.raises(AssetError, match=message):
+        make_world(World("U_ParkingLot", 1000, knobs), ASSETS, catalogue())
+
+
+def test_another_version_and_another_type_are_refused_by_name() -> None:
+    with pytest.raises(AssetError, match="version 7"):
+        make_world(World("U_ParkingLot", 1000, version=7), ASSETS, catalogue())
+    with pytest.raises(AssetError, match="U_ParkingLot"):
+        make_world(World("U_ParkingLod", 1000), ASSETS, catalogue())
+
+
+@given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
+def test_a_name_says_what_a_world_is_made_from(kind: str, seed: int, held_out: bool) -> None:
+    world = World(kind, seed, held_out=held_out)
+    assert world_of(world.name) == world
+    assert world.side == ("test" if seed < 200 else "validation" if seed < 1000 else "train")
+
+
+def test_paints_are_the_colours_that_they_are_called() -> None:
+    for word, shades in PAINTS.items():
+        for shade in shades:
+            assert colour_name(parse_colour(shade)) in SHADES[word], (word, shade)
+    assert paintable(catalogue(), "sedan") == ("body", ("red", "silver", "blue", "black", "white"))
+
+
+def test_generators_draw_from_keyed_streams_alone() -> None:
+    folder = Path(aerialdojo_gen.scenes.worlds.__file__).parent
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not {"random", "time", "uuid", "datetime", "secrets"} & {n.partition(".")[0] for n in names}, path
+            if isinstance(node, ast.Attribute) and node.attr in ("default_rng", "seed") and path.name != "world.py":
+                assert not (isinstance(node.value, ast.Attribute) and node.value.attr == "random"), path
