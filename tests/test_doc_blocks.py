@@ -51,6 +51,7 @@ NOT_RUN = {
     "tests/pipeline/test_ray_cluster.py has one",
     r"export .?HF_TOKEN.*|push-to-hub .*|pull .*|validate --data pulled .*": "asks a hub: "
     "tests/exchange/test_hub.py has one",
+    r"vary .*|run my-worlds/.*": "makes worlds: tests/imports/test_vary.py",
     r"(add-map|add-terrain) .*": "needs an extract or a height model: tests/imports/test_add_map.py, "
     "tests/imports/test_add_terrain.py",
     r"validate --release DOWNLOADED .*": "runs in tests/dataset/test_validate_release.py, on a release "

@@ -177,9 +177,8 @@ class Draft:
             order.remove(what)
             self.take(_box(x, y, *extents_m(self.catalogue, what), yaw, 0.5))
             self.landmarks.append(what)
-            self.add(
-                {"place": [[f"{what}:*" if ":" not in what else what, x, y, yaw]], "fit": "must", "margin_m": 0.4}
-            )
+            thing = repainted(self.catalogue, what, (x, y, yaw), self.rng("landmark", what, "variant"))
+            self.add({"place": [thing], "fit": "must", "margin_m": 0.4, **self._levelled(None)})
 
     # Slots
 
@@ -209,8 +208,11 @@ class Draft:
             keys: Entry = {"fit": "skip", "margin_m": 0.25}
             keys |= {} if on is None else {"on": on}
             keys |= {} if settle_m is None else {"settle_m": settle_m}
-            self.add({"place": sorted(things, key=_pose), **keys})
+            self.add({"place": sorted(things, key=_pose), **keys, **self._levelled(on)})
         self._slots.clear()
+
+    def _levelled(self, on: float | str | None) -> Entry:
+        return {"level": True} if self.level_things and on is None else {}
 
     def _dealt(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
         """Draw what stands at a slot; None where nothing that is left has room."""

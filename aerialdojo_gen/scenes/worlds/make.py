@@ -63,5 +63,5 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
         if wrong is None:
             return MadeWorld(world, text, scene, draft.topology, tuple(refused))
         refused.append(wrong)
-    reasons = "; ".join(sorted({reason for reason, _ in refused}))
+    reasons = "; ".join(f"{reason}: {what}" if what else reason for reason, what in sorted(set(refused))[:3])
     raise AssetError(f"{world.name}: none of {MAX_DRAWS} draws makes a sound scene ({reasons}): take another seed")

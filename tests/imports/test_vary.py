@@ -1,0 +1,33 @@
+"""`vary` writes worlds that run through the stages, and makes none twice."""
+
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.dataset.build import run_pipeline
+from aerialdojo_gen.imports.worlds import VaryOptions, vary
+
+
+@pytest.mark.pipeline
+def test_worlds_run_through_the_stages_and_train_or_test_by_their_seeds(tmp_path: Path) -> None:
+    out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=3)
+    for seed in (7, 1000):
+        (one,) = vary(["U_Parking*"], range(seed, seed + 1), out, options)
+        assert one.made
+    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")}
+    (again,) = vary(["U_ParkingLot"], range(1000, 1001), out, options)
+    assert not again.made
+    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")} == before
+    run_pipeline(out / "pipeline.toml", data=out / "data")
+    for scene, subset in (("U_ParkingLot-7", "test"), ("U_ParkingLot-1000", "train")):
+        tables = [pq.read_table(p) for p in (out / "data/release/tasks").rglob(f"part-{scene}.parquet")]
+        assert {s for t in tables for s in t.column("subset").to_pylist()} == {subset}
+
+
+@pytest.mark.parametrize("seeds", [range(0), range(-1, 1)])
+def test_seeds_that_are_none_are_refused(seeds: range, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--seeds"):
+        vary(["U_ParkingLot"], seeds, tmp_path)
+    assert list(tmp_path.iterdir()) == []
