@@ -61,7 +61,7 @@ def paths(draft: Draft, lines: dict[str, shapely.LineString], width_m: float = 1
     draft.section("Paths")
     draft.paint(ribbons, draft.material("path"))
     draft.make("keep_free", areas=[{"ribbon": name, "width_m": width_m + 0.6} for name in lines])
-    for name, line in lines.items():
+    for line in lines.values():
         draft.take(line.buffer(width_m / 2 + 0.3))
     for name, line in lines.items():
         for k in range(int(line.length // 8.0)):
@@ -83,7 +83,9 @@ def clearing(draft: Draft, name: str, at: Point, radius_m: float) -> None:
     draft.paint(name, draft.material("glade", name))
 
 
-def about(draft: Draft, kind: str, at: Point, ring: tuple[float, float], number: int, room_m: tuple[float, float]) -> None:
+def about(
+    draft: Draft, kind: str, at: Point, ring: tuple[float, float], number: int, room_m: tuple[float, float]
+) -> None:
     """Offer slots about a point, in a ring between two radii, fronts to the point."""
     rng = draft.rng("about", kind, *at)
     first = float(rng.uniform(0, 360))
@@ -115,11 +117,11 @@ def anywhere(draft: Draft, number: int = 60, margin_m: float = 7.0) -> list[tupl
 
 
 def wood(draft: Draft, area: Any, most: float, spacing_m: float = 4.6) -> None:
-    """Plant trees of the palette on what is left of an area, denser here and thinner there, and what grows under them."""
+    """Plant the palette's trees on what is left of an area, and what grows under them."""
     species = draft.material("trees").split("+")
     draft.add({
         "pattern": {"of": species, "scatter": area, "spacing_m": spacing_m, "limit": int(most), "stream": "wood"},
         "fit": "skip", "room_m": 0.0,
     })  # fmt: skip
-    kinds = draft.shuffled(["bush", "fern", "sapling", "grass_tuft", "wildflowers", "young_spruce"], "undergrowth")[:3]
-    draft.make("undergrowth", area=area, kinds=[{"of": kind, "spacing_m": 3.5, "limit": 24} for kind in kinds])
+    low = draft.shuffled(["bush", "fern", "sapling", "grass_tuft", "wildflowers", "young_spruce"], "undergrowth")
+    draft.make("undergrowth", area=area, kinds=[{"of": kind, "spacing_m": 3.5, "limit": 24} for kind in low[:3]])

@@ -58,23 +58,24 @@ def _camp(draft: Draft, at: Point, name: str) -> None:
 
 
 def _creek(draft: Draft, w: float, d: float) -> None:
-    bed = winding(draft, "creek", ((-w - 1, draft.number(-d / 3, d / 3, "in")), (w + 1, draft.number(-d / 3, d / 3, "out"))), d / 5)
+    ends = ((-w - 1, draft.number(-d / 3, d / 3, "in")), (w + 1, draft.number(-d / 3, d / 3, "out")))
+    bed = winding(draft, "creek", ends, d / 5)
     step(draft, "level_along", lines=["creek"], width_m=5.6, blend_m=5, smooth_m=40)
     step(draft, "sink_area", area={"ribbon": "creek", "width_m": 7.0}, depth_m=1.8, blend_m=2.4)
     draft.areas["water"] = {"ribbon": "creek", "width_m": 2.8}
-    draft.make("paint_shore", water="water", material=draft.material("bank"), lobe_m=1.3, seed=draft.whole(0, 9999, "shore"))
-    draft.paint("water", draft.material("water"))
+    _water(draft)
     middle = bed.interpolate(bed.length * draft.number(0.35, 0.65, "bridge"))
     ahead = bed.interpolate(bed.project(middle) + 0.5)
     across = math.degrees(math.atan2(ahead.y - middle.y, ahead.x - middle.x)) + 90.0
     c, s = math.cos(math.radians(across)), math.sin(math.radians(across))
     landing = [(round(middle.x + u * c, 1), round(middle.y + u * s, 1)) for u in (-6.5, 6.5)]
-    lines = {
-        "south_path": winding(draft, "south_path", (landing[0], (draft.number(-w / 2, w / 2, "sp"), -d if landing[0][1] < landing[1][1] else d)), 6.0, 3),
-        "north_path": winding(draft, "north_path", (landing[1], (draft.number(-w / 2, w / 2, "np"), d if landing[0][1] < landing[1][1] else -d)), 6.0, 3),
-    }
+    sign = 1.0 if landing[0][1] < landing[1][1] else -1.0
+    outer = [(draft.number(-w / 2, w / 2, "path", k), sign * (2 * k - 1) * d) for k in (0, 1)]
+    lines = {f"path_{k}": winding(draft, f"path_{k}", (landing[k], outer[k]), 6.0, 3) for k in (0, 1)}
     draft.take(bed.buffer(3.8))
-    draft.make("footbridge", at=[round(middle.x, 1), round(middle.y, 1)], yaw_deg=round(across, 1), span_m=8.5, place="")
+    at = [round(middle.x, 1), round(middle.y, 1)]
+    draft.take(middle.buffer(7.5))
+    draft.make("footbridge", at=at, yaw_deg=round(across, 1), span_m=8.5, place="")
     paths(draft, lines)
     for k in range(int(bed.length // 16)):
         p = bed.interpolate(8 + 16 * k)
@@ -83,13 +84,18 @@ def _creek(draft: Draft, w: float, d: float) -> None:
     _sites(draft, [_cabin, _camp], 11.0)
 
 
+def _water(draft: Draft) -> None:
+    seed = draft.whole(0, 9999, "shore")
+    draft.make("paint_shore", water="water", material=draft.material("bank"), lobe_m=1.4, seed=seed)
+    draft.paint("water", draft.material("water"))
+
+
 def _sites(draft: Draft, kinds: list[Callable[[Draft, Point, str], None]], radius_m: float) -> list[Point]:
     """Lay out sites where the ground is free, far from one another."""
     found: list[Point] = []
     for k, kind in enumerate(kinds):
-        spot = next(
-            ((x, y) for x, y, _ in anywhere(draft, 200, radius_m + 2) if draft.is_free(shapely.Point(x, y).buffer(radius_m))), None
-        )  # fmt: skip
+        spots = ((x, y) for x, y, _ in anywhere(draft, 200, radius_m + 2))
+        spot = next((p for p in spots if draft.is_free(shapely.Point(p).buffer(radius_m))), None)
         if spot is None:
             raise NoRoomError("no room for a clearing")
         kind(draft, spot, f"clearing_{k}")
@@ -118,7 +124,8 @@ def _hill(draft: Draft, w: float, d: float) -> None:
     step(draft, "level_area", area={"disc": [*at, 5.5]}, blend_m=5)
     about(draft, "hill", at, (2.5, 5.0), 6, (2.8, 2.8))
     draft.take(shapely.Point(at).buffer(6.5))
-    draft.make("strew_rocks", area={"disc": [*at, radius * 0.8], "minus": {"disc": [*at, 6.5]}}, spacing_m=4.0, radius_m=[0.4, 1.3], material="rock:#8b8881", limit=26)
+    rocky = {"disc": [*at, round(radius * 0.8, 1)], "minus": {"disc": [*at, 6.5]}}
+    draft.make("strew_rocks", area=rocky, spacing_m=4.0, radius_m=[0.4, 1.3], material="rock:#8b8881", limit=26)
     lines = {
         "up": winding(draft, "up", ((at[0] + 6, at[1]), (w, draft.number(-d / 2, d / 2, "up"))), 5.0, 3),
         "over": winding(draft, "over", ((-w, draft.number(-d / 2, d / 2, "over")), (at[0] - 6, at[1])), 5.0, 3),
@@ -133,8 +140,7 @@ def _pond(draft: Draft, w: float, d: float) -> None:
     step(draft, "level_area", area={"disc": [*at, radius + 6]}, blend_m=6)
     step(draft, "sink_area", area={"disc": [*at, radius]}, depth_m=1.2, blend_m=3.0)
     draft.areas["water"] = {"blob": [*at, round(radius - 1.5, 1), draft.whole(0, 1999, "pond"), 0.2]}
-    draft.make("paint_shore", water="water", material=draft.material("bank"), lobe_m=1.6, seed=draft.whole(0, 9999, "shore"))
-    draft.paint("water", draft.material("water"))
+    _water(draft)
     about(draft, "water", at, (radius + 2.5, radius + 4.5), 9, (4.2, 4.2))
     draft.take(shapely.Point(at).buffer(radius + 6))
     lines = {"round": winding(draft, "round", ((-w, at[1] + radius + 9), (w, at[1] + radius + 7)), 3.0, 4)}
@@ -150,16 +156,17 @@ def _ruin(draft: Draft, w: float, d: float) -> None:
     walls = [
         {"ends": [[-7, -4.5], [2, -4.5]], "height_m": high[0], "openings": [[1.2, 2.3, 0.8, 1.3]]},
         {"ends": [[7, -4.5], [7, 4.5]], "height_m": high[1]}, {"ends": [[7, 4.5], [1, 4.5]], "height_m": high[2]},
-        {"ends": [[-2.2, 4.5], [-7, 4.5]], "height_m": high[3]}, {"ends": [[-7, 4.5], [-7, 1.6]], "height_m": high[4]},
+        {"ends": [[-2.2, 4.5], [-7, 4.5]], "height_m": high[3]},
+        {"ends": [[-7, 4.5], [-7, 1.6]], "height_m": high[4]},
     ]  # fmt: skip
     yaw = draft.number(0, 180, "ruin")
     draft.make("roofless_walls", node="ruin", at=list(at), yaw_deg=yaw, stone=draft.material("stone"), walls=walls)
     about(draft, "hill", at, (10.5, 12.5), 8, (2.6, 2.6))
     draft.take(shapely.Point(at).buffer(14))
-    lines = {
-        f"path_{k}": winding(draft, f"path_{k}", ((at[0] + 13.5 * ux, at[1] + 13.5 * uy), (w * ux + uy * 9, d * uy + ux * 9)), 4.0, 2)
-        for k, (ux, uy) in enumerate(((1, 0), (-1, 0), (0, 1)))
-    }  # fmt: skip
+    lines = {}
+    for k, (ux, uy) in enumerate(((1, 0), (-1, 0), (0, 1))):
+        ends = (at[0] + 13.5 * ux, at[1] + 13.5 * uy), (w * ux + uy * 9, d * uy + ux * 9)
+        lines[f"path_{k}"] = winding(draft, f"path_{k}", ends, 4.0, 2)
     paths(draft, lines)
     _sites(draft, [_camp], 11.0)
 
