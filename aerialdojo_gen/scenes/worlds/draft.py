@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -64,6 +65,7 @@ class Draft:
         self._slots: list[Slot] = []
         self._taken: list[BaseGeometry] = []
         self.landmarks: list[str] = []
+        self.level_things = False  # Whether the ground is levelled under what stands on it
 
     # Random streams
 
@@ -167,7 +169,7 @@ class Draft:
         low, high = self.kind.n_landmarks
         wanted = self.whole(low, high, "n_landmarks")
         weights = self.kind.landmarks
-        order = sorted(weights, key=lambda c: -np.log(self.rng("landmark", c).random()) / weights[c])
+        order = sorted(weights, key=lambda c: -math.log(self.rng("landmark", c).random()) / weights[c])
         for x, y, yaw in spots:
             if not order or len(self.landmarks) == wanted:
                 return

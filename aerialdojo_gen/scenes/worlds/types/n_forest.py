@@ -36,7 +36,7 @@ def write(draft: Draft) -> None:
     draft.landmark(anywhere(draft))
     if not draft.landmarks:
         raise NoRoomError("no room for a landmark")
-    strewn(draft, "wood", 34, (4.0, 4.0))
+    strewn(draft, "wood", 44, (4.0, 4.0))
     draft.furnish()
     draft.section("The wood")
     wood(draft, [-w + 1.5, -d + 1.5, w - 1.5, d - 1.5], draft.knob("trees"))
@@ -45,7 +45,7 @@ def write(draft: Draft) -> None:
 def _cabin(draft: Draft, at: Point, name: str) -> None:
     clearing(draft, name, at, 10.0)
     draft.slot("cabin", *at, draft.number(0, 360, name), (9.0, 9.0))
-    about(draft, "yard", at, (7.0, 9.5), 9, (3.0, 3.0))
+    about(draft, "yard", at, (7.0, 9.5), 12, (3.0, 3.0))
     draft.take(shapely.Point(at).buffer(10.5))
 
 
@@ -53,7 +53,7 @@ def _camp(draft: Draft, at: Point, name: str) -> None:
     clearing(draft, name, at, 9.0)
     draft.slot("fire", *at, 0.0, (2.0, 2.0))
     about(draft, "camp", at, (2.6, 3.4), 4, (1.5, 1.5))
-    about(draft, "camp", at, (6.0, 8.5), 8, (3.6, 3.6))
+    about(draft, "camp", at, (6.0, 8.5), 10, (3.6, 3.6))
     draft.take(shapely.Point(at).buffer(9.5))
 
 
