@@ -190,7 +190,7 @@ def test_a_word_that_is_not_so(planted, object_id, change, old, new):
 
 def test_words_of_a_look_that_another_variant_has(planted):
     """The catalogue's own phrase, of parts that this bin does not have."""
-    text = "A green litter bin on the lawn by the path. It has a lid held up by two short posts."
+    text = "A green litter bin on the lawn by the path. It has a hood over its mouth."
     retell(planted, BIN, description=text)
     assert check(planted) == {"object_words": objects_of(BIN)}
     retell(planted, BIN, description=text.partition(". ")[0] + ".")
