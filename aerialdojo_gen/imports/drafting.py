@@ -102,7 +102,7 @@ def draft_scene(
     unknown = sum(is_unnamed(entry.node, entry.category) for entry in objects)
     if unknown:
         log.warning(
-            "%s: needs review: only colour and shape are known of %d of %d objects; name them: %s",
+            "%s: needs review: %d of %d objects are known by colour and form alone; name them (--names): %s",
             name, unknown, len(objects), command("annotate", scene=name),
         )  # fmt: skip
     counted = f"{_plural(len(chosen_landmarks), 'landmark')}, {_plural(len(objects), 'object')}"
