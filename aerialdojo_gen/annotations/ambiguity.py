@@ -9,12 +9,14 @@ distractor, with the slack `claims.DISTRACTOR_SLACK` on distances and angles.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from aerialdojo_gen.annotations.bearings import Bearing, nearest_landmark
 from aerialdojo_gen.annotations.parsing import Lexicon, Reading
+from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
+from aerialdojo_gen.scenes.model import Scene
 
 
 def first_sentence(text: str) -> str:
@@ -93,3 +95,18 @@ class Ambiguity:
             elif why := self._place_fault(i, place):
                 wrong.append(f"{place!r} is not so of {instance.node}: {why}")
         return wrong
+
+
+def make_ambiguity(
+    scene: Scene,
+    names: Mapping[str, str],
+    landmarks: Mapping[str, str],
+    order: Sequence[str],
+    geometry: SceneGeometry | None = None,
+) -> Ambiguity:
+    """Make the ambiguity check of a scene."""
+    geometry = geometry or SceneGeometry(scene)
+    bound = None if scene.imported else places_of(scene.name)
+    places = None if bound is None else Places(geometry, bound)
+    lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()}, places)
+    return Ambiguity(geometry, lexicon, [geometry.index[node] for node in order])

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import Looks, false_colours, false_phrases
-from aerialdojo_gen.annotations.bearings import nearest_landmark
+from aerialdojo_gen.annotations.bearings import Bearing
+from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
-from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.head_noun import NounChecker
-from aerialdojo_gen.annotations.parsing import Lexicon
-from aerialdojo_gen.annotations.places import Places, places_of
+from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import JsonPath
 from aerialdojo_gen.scenes.model import Scene
@@ -31,31 +29,39 @@ _WORDS = 60
 _SPACES = "has leading, trailing or double spaces"
 
 
+@dataclass(frozen=True)
+class Checked:
+    """What the checks found of an annotation file."""
+
+    faults: list[Fault]  # In line order
+    claims: SceneClaims | None  # None where the landmarks are at fault
+    unchecked: Mapping[int, list[str]]  # Words of texts that match no claim, by the object's index in the file
+
+
 def check_source(
     source: Source,
-    scene: Scene,
-    names: Mapping[str, str],
+    vocabulary: Vocabulary,
     counts: tuple[int, int] | None = None,
     geometry: SceneGeometry | None = None,
-    looks: Looks | None = None,
-) -> list[Fault]:
-    """Check an annotation file against its scene and return all faults, in line order."""
-    faults = list(source.faults)
-    if source.document.value is not None:
-        faults += _Checker(source, scene, names, geometry or SceneGeometry(scene), looks or {}).faults(counts)
-    return sorted(dict.fromkeys(faults), key=lambda fault: fault.line)
+) -> Checked:
+    """Check an annotation file against its scene."""
+    if source.document.value is None:
+        return Checked(list(source.faults), None, {})
+    checker = _Checker(source, vocabulary, geometry or SceneGeometry(vocabulary.scene))
+    faults = sorted(dict.fromkeys([*source.faults, *checker.faults(counts)]), key=lambda fault: fault.line)
+    return Checked(faults, checker.claims, checker.unchecked)
 
 
 class _Checker:
     """The checks of one file; each yields its faults."""
 
-    def __init__(
-        self, source: Source, scene: Scene, names: Mapping[str, str], geometry: SceneGeometry, looks: Looks
-    ) -> None:
-        self._source, self._scene, self._names, self._geometry, self._looks = source, scene, names, geometry, looks
+    def __init__(self, source: Source, vocabulary: Vocabulary, geometry: SceneGeometry) -> None:
+        self._source, self._scene, self._geometry = source, vocabulary.scene, geometry
+        self._vocabulary = vocabulary
         self._fault, self._raw = source.document.fault, source.document.value
-        self._known = sorted({*names, *(instance.category for instance in scene.instances)})
-        self._nouns, self._surface = NounChecker(names), Surface(scene)
+        self._known = sorted({*vocabulary.names, *(instance.category for instance in self._scene.instances)})
+        self.claims: SceneClaims | None = None
+        self.unchecked: dict[int, list[str]] = {}
 
     def faults(self, counts: tuple[int, int] | None) -> Iterator[Fault]:
         source, scene = self._source, self._scene
@@ -71,10 +77,7 @@ class _Checker:
         for i, entry in source.objects.items():
             yield from self._entry(("objects", i), entry)
             yield from self._object(("objects", i), entry)
-            # The categories of imported scenes are guesses.
-            if not scene.imported and entry.node in scene:
-                yield from self._appearance(("objects", i), entry)
-        yield from self._places()
+        yield from self._texts()
 
     def _unique(self) -> Iterator[Fault]:
         landmarks, objects = self._source.landmarks, self._source.objects
@@ -113,7 +116,7 @@ class _Checker:
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
         scene, category = self._scene, entry.category
-        for text in _description_faults(entry.description):
+        for text in _description_faults(entry.description) if entry.description is not None else ():
             yield self._fault((*path, "description"), text)
         if category not in self._known:
             yield self._fault((*path, "category"), f"no category {category!r}{nearest(category, self._known, 2)}")
@@ -123,21 +126,11 @@ class _Checker:
         if entry.anchor is not None and not _inside(scene, entry.anchor.position_m):
             yield self._fault((*path, "anchor", "position_m"), "outside the scene's bounds")
 
-    def _appearance(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
-        thing, materials = self._scene[entry.node], self._scene.materials
-        for key in ("name", "description"):
-            for message in self._nouns.contradictions(getattr(entry, key), thing):
-                yield self._fault((*path, key), message)
-        for message in false_phrases(entry.description, thing, self._looks, materials, self._surface):
-            yield self._fault((*path, "description"), message)
-        for key in ("name", "description"):
-            for message in false_colours(getattr(entry, key), thing, materials):
-                yield self._fault((*path, key), message)
-
-    def _places(self) -> Iterator[Fault]:
-        """Check directions and descriptions against the mesh; only if all landmarks are valid."""
+    def _texts(self) -> Iterator[Fault]:
+        """Check directions, texts and what tells objects apart; only if all landmarks are valid."""
         source, scene, geometry = self._source, self._scene, self._geometry
-        nodes = [landmark.node for landmark in sorted(source.landmarks.values(), key=lambda entry: entry.id)]
+        landmarks = sorted(source.landmarks.values(), key=lambda entry: entry.id)
+        nodes = [landmark.node for landmark in landmarks]
         raw = self._raw.get("landmarks") if isinstance(self._raw, dict) else None
         if not isinstance(raw, list) or len(nodes) < len(raw) or len(set(nodes)) < len(nodes):
             return
@@ -147,39 +140,56 @@ class _Checker:
             if source.objects:
                 yield self._fault(("landmarks",), "there is none: objects need one to be located by")
             return
-        named = {entry.name: entry.node for entry in source.landmarks.values()}
-        ambiguity = make_ambiguity(scene, self._names, named, nodes, geometry)
+        self.claims = SceneClaims(self._vocabulary, landmarks, geometry)
+        matcher = Matcher(self.claims)
         described: dict[tuple[object, ...], int] = {}
         for k, entry in source.objects.items():
             if entry.node not in scene or entry.node in nodes:
                 continue
             i = geometry.index[entry.node]
-            bearing = nearest_landmark(geometry.centres[i], geometry.centres[list(ambiguity.landmarks)])
+            bearing = self.claims.bearings[i]
             if bearing is None:
                 text = "is exactly at its nearest landmark's position, so it has no direction"
                 yield self._fault(("objects", k, "node"), text)
                 continue
-            for key in ("name", "description"):
-                for false_claim in ambiguity.false_claims(i, getattr(entry, key)):
-                    yield self._fault(("objects", k, key), false_claim)
-            path = ("objects", k, "description")
+            for false in matcher.faults(i, entry.name):
+                yield self._fault(("objects", k, "name"), false)
+            if entry.description is None or not entry.description.strip():
+                if others := self._listed(self.claims.distractors(i, self.claims.of(i))):
+                    text = f"nothing tells it from {others}, {bearing.direction} of the same landmark"
+                    yield self._fault(("objects", k, "node"), f"{text}: choose another object")
+                continue
+            yield from self._description(matcher, k, entry, bearing)
             same = (entry.name.lower(), bearing, entry.description.lower())
             if same in described:
                 text = f"name, landmark, direction and description are those of objects[{described[same]}]"
-                yield self._fault(path, text)
+                yield self._fault(("objects", k, "description"), text)
             described.setdefault(same, k)
-            if not entry.description.strip():
-                continue
-            if others := self._listed(ambiguity.distractors(i, entry.description)):
-                text = f"ambiguous: it fits {others} as well, {bearing.direction} of the same landmark; "
-                yield self._fault(path, f"{text}describe how it differs or what stands near it")
-            elif others := self._listed(ambiguity.first_sentence_distractors(i, entry.name, entry.description)):
-                text = f"its first sentence fits {others} as well: add what distinguishes it to the first sentence"
-                yield self._fault(path, text)
+
+    def _description(self, matcher: Matcher, k: int, entry: Object, bearing: Bearing) -> Iterator[Fault]:
+        """Check a person's text: what is matched to claims must be so, and fit one thing."""
+        assert self.claims is not None
+        assert entry.description is not None
+        path, i = ("objects", k, "description"), self._geometry.index[entry.node]
+        for false in matcher.faults(i, entry.description):
+            yield self._fault(path, false)
+        if words := matcher.read(entry.description, i).unchecked:
+            self.unchecked[k] = words
+        for text, what in ((entry.description, "it"), (first_sentence(entry.name, entry.description), "its start")):
+            if others := self._listed(self.claims.distractors(i, matcher.true_claims(i, text))):
+                where = f"{what} fits {others} as well, {bearing.direction} of the same landmark"
+                hint = "" if what == "it" else " in the first sentence"
+                yield self._fault(path, f"ambiguous: {where}; say{hint} how it differs or what stands near it")
+                break
 
     def _listed(self, instances: Sequence[int]) -> str:
         nodes = ", ".join(self._scene.instances[j].node for j in instances[:3])
         return nodes + ("..." if len(instances) > 3 else "")
+
+
+def first_sentence(name: str, description: str) -> str:
+    """The name and the first sentence of a description: a reader may stop there."""
+    return f"The {name}: {re.split(r'(?<=[.!?])[ ]', description.strip(), maxsplit=1)[0]}"
 
 
 def _description_faults(text: str) -> Iterator[str]:
@@ -201,18 +211,3 @@ def _description_faults(text: str) -> Iterator[str]:
 
 def _inside(scene: Scene, point: Sequence[float] | np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> bool:
     return bool(np.all(np.asarray(point) >= scene.bounds[0]) and np.all(np.asarray(point) <= scene.bounds[1]))
-
-
-def make_ambiguity(
-    scene: Scene,
-    names: Mapping[str, str],
-    landmarks: Mapping[str, str],
-    order: Sequence[str],
-    geometry: SceneGeometry | None = None,
-) -> Ambiguity:
-    """Make the ambiguity check of a scene."""
-    geometry = geometry or SceneGeometry(scene)
-    bound = None if scene.imported else places_of(scene.name)
-    places = None if bound is None else Places(geometry, bound)
-    lexicon = Lexicon(geometry, names, {name: geometry.index[node] for name, node in landmarks.items()}, places)
-    return Ambiguity(geometry, lexicon, [geometry.index[node] for node in order])

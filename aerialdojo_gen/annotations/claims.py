@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.appearance import unsupported_colours
+from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
 from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.phrases import Noun
@@ -101,6 +101,7 @@ class SceneClaims:
         self._nouns = vocabulary.nouns
         self._count = Counter(noun.name for noun in self._nouns)
         self._short = Counter(noun.short for noun in self._nouns)
+        self._known: dict[int, tuple[Claim, ...]] = {}
         self._fitting: dict[Mention, frozenset[int]] = {}
 
     @cached_property
@@ -126,6 +127,11 @@ class SceneClaims:
 
     def of(self, i: int) -> tuple[Claim, ...]:
         """All true claims of an instance, by kind, the most natural first."""
+        if i not in self._known:
+            self._known[i] = tuple(self._find(i))
+        return self._known[i]
+
+    def _find(self, i: int) -> list[Claim]:
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
         found += [Claim("part", say) for say in self.vocabulary.looks(instance)]
@@ -134,16 +140,28 @@ class SceneClaims:
         bearing = self.bearings[i]
         if bearing is not None and bearing.clear:
             found.append(Claim("direction", bearing.direction, (self._mention_of(self.landmarks[bearing.landmark]),)))
-        return tuple(found)
+        return found
 
     def holds(self, claim: Claim, j: int, slack: float = 1.0) -> bool:
         """Whether a claim is true of an instance; see `relations` for `slack`."""
         return _HOLDS[claim.kind](self, claim, j, slack)
 
+    @property
+    def landmark_names(self) -> dict[str, str]:
+        """Nodes of the landmarks by their names in lower case."""
+        return {name.lower(): self.scene.instances[j].node for j, name in self._landmark_names.items()}
+
+    def place_wordings(self) -> dict[str, tuple[str, ...]]:
+        """Phrases of place, in lower case, and how else they are said; in a scene without a table its things' own."""
+        if self.places is not None:
+            return {phrase: self.places.wordings(phrase) for phrase in self.places.phrases()}
+        found = (instance.attributes.get("place", "").lower() for instance in self.scene.instances)
+        return {phrase: () for phrase in found if phrase}
+
     def _values(self, instance: Instance) -> Iterator[Claim]:
         attributes = instance.attributes
         colour = attributes.get("colour", "")
-        if colour and not unsupported_colours(colour, instance, self.scene.materials):
+        if colour and (self.scene.imported or not unsupported_colours(colour, instance, self.scene.materials)):
             yield Claim("colour", colour)
         if attributes.get("size"):
             yield Claim("size", attributes["size"])
@@ -233,9 +251,10 @@ class SceneClaims:
 
     def _named(self, noun: str) -> list[int]:
         """Landmarks and instances of a name; a picnic bench is a bench, too."""
-        marks = [j for j, name in self._landmark_names.items() if name == noun]
-        ending = f" {noun}"
-        return [*marks, *(j for j, n in enumerate(self._nouns) if j not in marks and f" {n.name}".endswith(ending))]
+        ending = f" {noun.lower()}"
+        marks = [j for j, name in self._landmark_names.items() if f" {name.lower()}" == ending]
+        things = (j for j, n in enumerate(self._nouns) if j not in marks)
+        return [*marks, *(j for j in things if f" {self._nouns[j].name.lower()}".endswith(ending))]
 
     @cached_property
     def _keys_of(self) -> Mapping[str, frozenset[str]]:
@@ -260,7 +279,10 @@ class SceneClaims:
         own = instance.attributes.get("colour", "")
         if slack > 1.0:
             return not own or _covers(own, claim.key)
-        return _words(claim.key) <= _words(own) and not unsupported_colours(claim.key, instance, self.scene.materials)
+        if self.scene.imported:
+            return not own or _is_shade(own, claim.key)
+        shown = not unsupported_colours(claim.key, instance, self.scene.materials)
+        return shown and (not own or _is_shade(own, claim.key))
 
     def _value_holds(self, claim: Claim, j: int, slack: float) -> bool:
         key, _, value = claim.key.rpartition("=")
@@ -289,9 +311,19 @@ class SceneClaims:
             and lies_towards(self.geometry.centres[j] - self.geometry.centres[marks[0]], claim.key, 22.5 * slack)
         )
 
+    def is_true(self, claim: Claim, i: int) -> bool:
+        """Whether a claim is true of an instance and of the very things that it names."""
+        if claim.kind != "relation":
+            return self.holds(claim, i)
+        named = all(self.geometry.index.get(m.node, -1) in self.fitting(m) for m in claim.things)
+        return named and self._related(claim, i, [[self.geometry.index[m.node]] for m in claim.things], 1.0)
+
     def _relation_holds(self, claim: Claim, j: int, slack: float) -> bool:
         close = set(self.geometry.neighbours(j, _FAR_M * slack))
-        sets = [sorted((self.fitting(m) & close) - {j}) for m in claim.things]
+        return self._related(claim, j, [sorted((self.fitting(m) & close) - {j}) for m in claim.things], slack)
+
+    def _related(self, claim: Claim, j: int, sets: Sequence[Sequence[int]], slack: float) -> bool:
+        """Whether a relation holds of an instance to any of some things each."""
         if claim.key == "between":
             return len(sets) == 2 and any(self.geometry.between(j, a, b, slack) for a in sets[0] for b in sets[1])
         if len(sets) != 1:
@@ -321,6 +353,12 @@ def _covers(own: str, said: str) -> bool:
     return all(
         word in mine or any(word in colours and mine & colours for colours in _ONE_COLOUR) for word in _words(said)
     )
+
+
+def _is_shade(own: str, said: str) -> bool:
+    """Whether each colour of a text may be a name of one that the thing has: red may be said of orange."""
+    mine = [SHADES[word] for word in _words(own) if word in SHADES]
+    return not mine or all(any(SHADES[word] & one for one in mine) for word in _words(said) if word in SHADES)
 
 
 _Test = Callable[[SceneGeometry, int, int, float], bool]

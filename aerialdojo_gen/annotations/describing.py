@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.check import make_ambiguity
+from aerialdojo_gen.annotations.ambiguity import Ambiguity, make_ambiguity
 from aerialdojo_gen.annotations.compose import compose
 from aerialdojo_gen.annotations.facts import Fact, FactFinder
 from aerialdojo_gen.annotations.format import Landmark

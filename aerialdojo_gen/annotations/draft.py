@@ -211,7 +211,7 @@ def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotat
         others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
         valid = entry.name not in others - {own} and writer.is_true_name(i, entry.name)
         name = entry.name if valid else own
-        text = writer.describe(i, {other.description for other in objects}, name)
+        text = writer.describe(i, {other.description or "" for other in objects}, name)
         if text is None:
             raise AnnotationError(
                 f"{scene.name}: {entry.node} (object {entry.id}) cannot be distinguished from others of its "

@@ -47,7 +47,7 @@ class Object(_Entry):
     id: _Id  # Unique in the scene
     name: StrictStr  # What a person would call it, e.g. ``"red delivery van"``
     category: StrictStr  # Category of the catalogue, the node's own
-    description: StrictStr  # One to three sentences: what it looks like and what stands by it
+    description: StrictStr | None = None  # One to three sentences by a person; None: the program makes them
     node: StrictStr  # Node of the scene's mesh
     anchor: Anchor | None = None  # The viewpoint that a person chose, where one did
 

@@ -6,7 +6,7 @@
     "in the coal yard" = { surface = "dirt*", near = "coal_heap*", also = ["among the coal heaps"] }
 
 All conditions must hold of the built mesh. Things are patterns of node names or categories, with alternatives
-separated by ``|``; surfaces are patterns of materials. The word fixes the length: *beside* means at most 5 m.
+separated by ``|``; surfaces are patterns of materials. A word means the distance that it means in `relations`.
 `also` gives other wordings, true under the same conditions; `say` one that texts use instead of the phrase itself.
 """
 
@@ -24,7 +24,7 @@ import shapely
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.ground import GROUND, GroundMaterials
-from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.relations import AT_M, BESIDE_M, NEAR_M, TOUCHING_M, SceneGeometry
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -37,7 +37,8 @@ THINGS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside
 SIDES = frozenset({"north_of", "south_of", "east_of", "west_of"})
 _FOLDER = Path(__file__).parent / "places"
 _PARTS = frozenset(f"{a}{b}" for a in ("", "north", "south") for b in ("", "east", "west")) - {""} | {"middle"}
-_MAX_AMONG_M = 15.0
+# Farthest things that make a place: the heaps of a yard, the rows of a street.
+_MAX_PLACE_M = 15.0
 
 
 @cache
@@ -88,7 +89,7 @@ def _number(value: Any) -> bool:
 def _among(value: Any) -> bool:
     return (
         isinstance(value, list) and len(value) == 3 and isinstance(value[0], int) and value[0] > 0
-        and _text(value[1]) and _number(value[2]) and 0 < value[2] <= _MAX_AMONG_M
+        and _text(value[1]) and _number(value[2]) and 0 < value[2] <= _MAX_PLACE_M
     )  # fmt: skip
 
 
@@ -110,7 +111,6 @@ _FORMS: Mapping[str, Callable[[Any], bool]] = {
 }
 
 
-TOUCHING_M, BESIDE_M, AT_M, NEAR_M = 0.3, 5.0, 8.0, 15.0
 _REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
 _STEP_M = 0.4
 _SLAB_SHARE = 0.06  # of the outline: smaller level surfaces are sills or stairs
@@ -243,14 +243,14 @@ class Places:
         return bool(shapely.contains_xy(hull, x, y))
 
     def _between(self, i: int, patterns: list[str], slack: float) -> bool:
-        """Between two things that are at most `NEAR_M` away."""
+        """Between two things that are at most `_MAX_PLACE_M` away."""
         geometry = self._geometry
         x, y = (float(c) for c in geometry.centres[i, :2])
-        close = set(geometry.neighbours(i, NEAR_M * slack))
+        close = set(geometry.neighbours(i, _MAX_PLACE_M * slack))
         first, second = (sorted(self._match(pattern) & close) for pattern in patterns)
         for a in first:
             for b in second:
-                if a == b or max(geometry.gap_m(i, a), geometry.gap_m(i, b)) > NEAR_M * slack:
+                if a == b or max(geometry.gap_m(i, a), geometry.gap_m(i, b)) > _MAX_PLACE_M * slack:
                     continue
                 hull = shapely.convex_hull(shapely.union(geometry.outline(a), geometry.outline(b)))
                 if shapely.contains_xy(shapely.buffer(hull, slack), x, y):

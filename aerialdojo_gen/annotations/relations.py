@@ -22,10 +22,9 @@ Floats = NDArray[np.float64]
 
 DISTRACTOR_SLACK = 1.35
 
-AGAINST_M = 0.5
-BESIDE_M = 3.0
-AT_M = 5.0
-NEAR_M = 8.0
+# The one table of distances, for relations and for conditions of places.
+TOUCHING_M, AGAINST_M = 0.3, 0.5
+BESIDE_M, AT_M, NEAR_M = 3.0, 5.0, 8.0
 SIDE_M = 12.0
 BETWEEN_M = 6.0
 LEVEL_M = 1.5  # less than a storey: things on different floors are not beside each other

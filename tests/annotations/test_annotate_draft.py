@@ -58,8 +58,7 @@ def test_drafts_pass_the_checks_and_are_the_same_each_time(plaza, catalogue):
     text = format_annotations(draft)
     assert text == format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=3))
     assert text != format_annotations(draft_annotations(plaza, catalogue, 1, 20, seed=4))
-    names = {category: catalogue[category].name for category in catalogue}
-    assert check_source(parse_annotations(text), plaza, names, (1, 20)) == []
+    assert check_source(parse_annotations(text), Vocabulary(plaza, catalogue), (1, 20)).faults == []
 
 
 def test_drafts_are_varied_english(plaza, catalogue):
@@ -160,10 +159,9 @@ def test_objects_are_described_anew_and_stay_what_they_are(plaza, catalogue):
     kept = [(entry.id, entry.node, entry.category, entry.name) for entry in after.objects]
     assert kept == [(entry.id, entry.node, entry.category, entry.name) for entry in draft.objects]
     assert [entry.description for entry in after.objects] != [entry.description for entry in draft.objects]
-    names = {category: catalogue[category].name for category in catalogue}
     looks = {category: catalogue[category].looks for category in catalogue}
     text = format_annotations(after)
-    assert check_source(parse_annotations(text), plaza, names, (1, 20), looks=looks) == []
+    assert check_source(parse_annotations(text), Vocabulary(plaza, catalogue), (1, 20)).faults == []
     said = [
         look.phrase for entry in after.objects for look in looks[entry.category] if look.phrase in entry.description
     ]

@@ -18,6 +18,7 @@ from support import annotation_scenes
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.stages.work.annotate_import import annotation_tables
@@ -36,15 +37,15 @@ def _annotations() -> list[Case]:
 
 
 @cache
-def _street() -> tuple[object, SceneGeometry]:
-    scene = annotation_scenes.street()
-    return scene, SceneGeometry(scene)
+def _street() -> tuple[Vocabulary, SceneGeometry]:
+    vocabulary = annotation_scenes.street_vocabulary()
+    return vocabulary, SceneGeometry(vocabulary.scene)
 
 
 def _read_annotations(folder: Path) -> None:
     path = folder / "U_Street_0.json"
     raw = path.read_bytes()
-    scene, geometry = _street()
+    vocabulary, geometry = _street()
     try:
         annotations = parse_whole(raw, "U_Street_0", str(path))
     except AerialDojoError:
@@ -55,10 +56,10 @@ def _read_annotations(folder: Path) -> None:
         raise
     source = parse_annotations(format_annotations(annotations).encode().decode())
     assert source.annotations == annotations
-    faults = check_source(source, scene, annotation_scenes.NAMES, None, geometry)
-    utterable(map(str, faults))
-    if not faults:
-        annotation_tables(annotations, scene)
+    checked = check_source(source, vocabulary, None, geometry)
+    utterable(map(str, checked.faults))
+    if not checked.faults:
+        annotation_tables(annotations, checked.claims)
 
 
 def _twice(source) -> bool:

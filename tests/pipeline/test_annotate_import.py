@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.annotation_scenes import NAMES, street, street_annotations
+from support.annotation_scenes import street, street_annotations, street_vocabulary
 
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotations, parse_annotations
@@ -38,7 +38,7 @@ def _job(tmp_path, text):
 
 
 def _faults(annotations, scene=None, counts=None):
-    return check_source(parse_annotations(format_annotations(annotations)), scene or street(), NAMES, counts)
+    return check_source(parse_annotations(format_annotations(annotations)), street_vocabulary(scene), counts).faults
 
 
 def _changed(k, **changes):

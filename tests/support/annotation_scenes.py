@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
 _QUADS = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -66,6 +70,11 @@ GOOD = {
     "delivery_van_002": "The blue delivery van. It has sliding doors.",
     "mailbox_001": "A red mailbox under the canopy.",
 }
+
+
+def street_vocabulary(scene: Scene | None = None) -> Vocabulary:
+    """The words of the street, or of a scene like it."""
+    return Vocabulary(scene or street(), load_catalogue(Path(__file__).resolve().parents[2] / "scene_assets"))
 
 
 def street_annotations(**descriptions: str) -> Annotations:

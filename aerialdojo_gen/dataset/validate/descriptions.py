@@ -1,9 +1,9 @@
-"""Checks that names and descriptions are true of the mesh, as `annotate-import` holds annotations to it.
+"""Checks that what is said of objects is true of the mesh and fits one thing only.
 
-The reader of English, the relations and what makes a description ambiguous are those of
+The claims that texts are made from are held against the mesh one by one; texts are matched to claims besides, as far
+as they go, which finds a text that was changed. Relations, places and what makes a claim ambiguous are those of
 `aerialdojo_gen.annotations`, which a second account of the English language would not improve on. The input is the
-release's own: its tables and meshes, no annotation file. Stricter than there: every value that is said of a thing
-counts, not only one that stands before its name, unless the thing's looks or its materials bear it out.
+release's own: its tables and meshes, no annotation file.
 """
 
 from __future__ import annotations
@@ -13,21 +13,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.appearance import false_colours, false_phrases
-from aerialdojo_gen.annotations.check import make_ambiguity
-from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.parsing import Lexicon
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AerialDojoError
+from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.model import Instance
 
 _FAULTS = ("object_node", "object_category")
@@ -50,56 +49,93 @@ _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 
 @dataclass(frozen=True)
 class _Words:
-    """What texts of a scene are read with."""
+    """What is said of a scene's things, and what texts are matched with."""
 
-    ambiguity: Ambiguity  # Relations, phrases and rivals
-    names: dict[str, str]  # What a person says for each category
-    catalogue: Catalogue  # Of the props
-    surface: Surface  # Ground and water, which hide what is under them
+    claims: SceneClaims
+    matcher: Matcher
+
+
+@check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
+def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """Every claim about an object is so of the mesh, and of the very things that it names."""
+    words = _words(data)
+    for row, i in _placed(words, rows):
+        claims = _claims(rows, row)
+        if claims is None:
+            yield Finding(row, f"claims = {str(rows.texts('claims')[row])[:80]!r}", "a JSON list of claims")
+        elif wrong := next((claim for claim in claims if not words.claims.is_true(claim, i)), None):
+            said = f"{wrong.kind} {wrong.key!r} {' and '.join(thing.node for thing in wrong.things)}".strip()
+            yield Finding(row, f"it claims {said}", f"what is so of {words.claims.scene.instances[i].node}")
 
 
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
 def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A name or description names its own thing, and says no value and no relation that is not so in the mesh."""
+    """Names and texts name their own thing, and say no value, relation or direction that is not so in the mesh."""
     words = _words(data)
-    instances, index = words.ambiguity.geometry.scene.instances, words.ambiguity.geometry.index
-    texts = {name: rows.texts(name) for name in ("name", "description")}
-    for row, node in enumerate(rows.texts("mesh_node")):
-        if node not in index:
-            continue
-        i = index[str(node)]
-        for name, column in texts.items():
-            text = column[row] or ""
-            if wrong := _untrue(words, i, text) or _unlike(words, instances[i], text):
-                yield Finding(row, f"{name} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
+    instances = words.claims.scene.instances
+    for row, i in _placed(words, rows):
+        for column, text in (("name", rows.texts("name")[row] or ""), *_texts(rows, row)):
+            wrong = next(iter(words.matcher.faults(i, text)), "") or _recoloured(instances[i], text)
+            if wrong := wrong or _turned(words, i, text):
+                yield Finding(row, f"{column} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break
 
 
-@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words"))
+@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A description fits nothing else of its category in the same direction of the same landmark."""
-    ambiguity = _words(data).ambiguity
-    index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
-    for row, (node, text) in enumerate(zip(rows.texts("mesh_node"), rows.texts("description"), strict=True)):
-        distractors = ambiguity.distractors(index[str(node)], text or "") if node in index else []
-        if others := _listed(instances, distractors):
-            yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
+    """A text fits nothing else of its category in the same direction of the same landmark."""
+    words = _words(data)
+    instances = words.claims.scene.instances
+    for row, i in _placed(words, rows):
+        said = [(text, words.matcher.true_claims(i, text)) for column, text in _texts(rows, row) if column != _MADE]
+        own = _claims(rows, row) or ()
+        made = [(one["text"], [own[k] for k in one["claims"] if k < len(own)]) for one in _made(rows, row)]
+        for text, claims in (*said, *made, *([] if said or made else [("all that is claimed", own)])):
+            if others := _listed(instances, words.claims.distractors(i, claims)):
+                yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
+                break
 
 
-@check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_ambiguous"))
-def object_twins(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    """A name and the first sentence of its description fit nothing else of that landmark and direction."""
-    ambiguity = _words(data).ambiguity
-    index, instances = ambiguity.geometry.index, ambiguity.geometry.scene.instances
-    columns = (rows.texts(name) for name in ("mesh_node", "name", "description"))
-    for row, (node, name, text) in enumerate(zip(*columns, strict=True)):
-        twins = (
-            ambiguity.first_sentence_distractors(index[str(node)], name or "", text or "") if node in index else []
-        )
-        if others := _listed(instances, twins):
-            yield Finding(
-                row, f"{text!r}, the first sentence of which fits {others} as well", "words that tell them apart"
-            )
+def _placed(words: _Words, rows: Rows) -> Iterator[tuple[int, int]]:
+    """Rows whose node is in the mesh, and its index there."""
+    index = words.claims.geometry.index
+    yield from ((row, index[str(node)]) for row, node in enumerate(rows.texts("mesh_node")) if node in index)
+
+
+_MADE = "paraphrases"
+
+
+def _made(rows: Rows, row: int) -> list[dict[str, Any]]:
+    """The texts that the program made of an object's claims."""
+    return (rows.table[_MADE][row].as_py() or []) if _MADE in rows.table.column_names else []
+
+
+def _texts(rows: Rows, row: int) -> list[tuple[str, str]]:
+    """All texts about an object, and their columns."""
+    text = rows.texts("description")[row]
+    return [*([("description", text)] if text else []), *((_MADE, one["text"]) for one in _made(rows, row))]
+
+
+def _claims(rows: Rows, row: int) -> list[Claim] | None:
+    """Read an object's claims; None where they are malformed."""
+    try:
+        raw = loads_json(str(rows.texts("claims")[row]))
+        return [Claim.from_json(one) for one in raw] if isinstance(raw, list) else None
+    except (AerialDojoError, ValueError):
+        return None
+
+
+def _turned(words: _Words, i: int, text: str) -> str:
+    """Say which direction from the object's own landmark a text says, where the goal says another."""
+    bearing = words.claims.bearings[i]
+    if bearing is None:
+        return ""
+    node = words.claims.scene.instances[words.claims.landmarks[bearing.landmark]].node
+    name = next(name for name, own in words.claims.landmark_names.items() if own == node)
+    plain = re.sub(r"\b(north|south)[- ](east|west)", r"\1\2", text.lower())
+    said = re.findall(rf"\b({'|'.join(DIRECTIONS)})(?:ern)?(?: side)? of the {re.escape(name)}\b", plain)
+    wrong = [direction for direction in said if direction != bearing.direction]
+    return f"{wrong[0]} of the {name}, and the goal says {bearing.direction}" if wrong else ""
 
 
 def _listed(instances: Sequence[Instance], some: Sequence[int]) -> str:
@@ -122,24 +158,24 @@ def text_form(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("landmarks", needs=("mesh",), after=("landmark_node",))
 def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's name is one of a kind, names its own thing, and says no value that the mesh does not bear out."""
-    words = _words(data, landmarks=False)
-    geometry, first = words.ambiguity.geometry, dict[str, int]()
-    for row, (node, name) in enumerate(zip(rows.texts("mesh_node"), rows.texts("name"), strict=True)):
-        if node not in geometry.index:
-            continue
-        i, text = geometry.index[str(node)], name or ""
-        wrong = _untrue(words, i, text) or _other_side(words, data, i, text)
+    words = _words(data)
+    first = dict[str, int]()
+    for row, i in _placed(words, rows):
+        text = rows.texts("name")[row] or ""
+        wrong = next(iter(words.matcher.faults(i, text)), "") or _recoloured(words.claims.scene.instances[i], text)
+        wrong = wrong or _other_side(words, i, text)
         if first.setdefault(text.lower(), row) != row:
             wrong = f"as {rows.key(first[text.lower()])}"
         if wrong:
+            node = words.claims.scene.instances[i].node
             yield Finding(row, f"name = {text!r}: {wrong}", f"what is so of {node}")
 
 
-def _words(data: SceneData, landmarks: bool = True) -> _Words:
-    return data.keep(f"words {landmarks}", lambda: _read_words(data, landmarks))
+def _words(data: SceneData) -> _Words:
+    return data.keep("words", lambda: _read_words(data))
 
 
-def _read_words(data: SceneData, landmarks: bool) -> _Words:
+def _read_words(data: SceneData) -> _Words:
     scene = scene_mesh(data).scene
     geometry = data.keep("relations", lambda: SceneGeometry(scene))
     marks = data["landmarks"]
@@ -149,13 +185,10 @@ def _read_words(data: SceneData, landmarks: bool) -> _Words:
     catalogue = _catalogue(data.pipeline.scene_assets)
     if catalogue is None:
         raise UncheckedError("no catalogue of props: the pipeline names no scene_assets")
-    names = {category: catalogue[category].name for category in catalogue}
-    order = [nodes[k] for k in np.argsort(marks.ints("landmark_id"), kind="stable")]
-    called = dict(zip((str(name) for name in marks.texts("name")), nodes, strict=True))
-    ambiguity = make_ambiguity(scene, names, called if landmarks else {}, order, geometry)
-    # A colour that nothing in the scene has is a colour all the same.
-    ambiguity.lexicon.add_values("colour", _COLOURS)
-    return _Words(ambiguity, names, catalogue, Surface(scene))
+    named = zip(marks.ints("landmark_id").tolist(), map(str, marks.texts("name")), nodes, strict=True)
+    landmarks = sorted((Landmark(id=k, name=name, node=node) for k, name, node in named), key=lambda mark: mark.id)
+    claims = SceneClaims(Vocabulary(scene, catalogue), landmarks, geometry)
+    return _Words(claims, Matcher(claims))
 
 
 @lru_cache(maxsize=2)
@@ -164,36 +197,6 @@ def _catalogue(folder: Path | None) -> Catalogue | None:
         return load_catalogue(folder) if folder else None
     except (AerialDojoError, OSError):
         return None
-
-
-def _untrue(words: _Words, i: int, text: str) -> str:
-    """Say what a text says of its thing, as a name, claim, value or colour, that is not so."""
-    wrong = _misnamed(words, i, text) or next(iter(words.ambiguity.false_claims(i, text)), "")
-    return wrong or _unborne(words, i, text) or _recoloured(words.ambiguity.geometry.scene.instances[i], text)
-
-
-def _misnamed(words: _Words, i: int, text: str) -> str:
-    """Say what a text calls its thing, where that is the name of other things and its own is not in it."""
-    lexicon, instance = words.ambiguity.lexicon, words.ambiguity.geometry.scene.instances[i]
-    called = lexicon.read(text, i).subjects
-    own = words.names.get(instance.category, instance.category.replace("_", " "))
-    if not called or own.lower() in text.lower() or any(i in lexicon.members(name) for name in called):
-        return ""
-    return f"it is called {called[0]!r}, and the mesh has a {own}"
-
-
-def _unborne(words: _Words, i: int, text: str) -> str:
-    """Say which value a text says of its thing that neither attributes nor looks nor materials bear out."""
-    instance = words.ambiguity.geometry.scene.instances[i]
-    lexicon: Lexicon = words.ambiguity.lexicon
-    known = _looks(words, instance) | {word for value in instance.attributes.values() for word in _split(value)}
-    known |= set(_split(words.names.get(instance.category, "")))
-    for value in lexicon.read(text, i).values:
-        if not lexicon.denied(i, value) or set(_split(value)) <= known:
-            continue
-        if value not in _COLOURS or not _COLOURS[value] & _shades(words, instance):
-            return f"it is said to be {value!r}, and nothing of it is"
-    return ""
 
 
 def _recoloured(instance: Instance, text: str) -> str:
@@ -214,31 +217,9 @@ def _recoloured(instance: Instance, text: str) -> str:
     return ""
 
 
-def _unlike(words: _Words, instance: Instance, text: str) -> str:
-    """Say which of the catalogue's phrases, or of its colours, a text says of a thing that is not so."""
-    materials = words.ambiguity.geometry.scene.materials
-    looks = {key: words.catalogue[key].looks for key in (instance.category,) if key in words.catalogue}
-    # What no part is known of, as in a release of an older version, cannot be asked.
-    wrong = (
-        list(false_phrases(text, instance, looks, materials, words.surface)) if instance.anatomy is not None else []
-    )
-    return next(iter([*wrong, *false_colours(text, instance, materials)]), "")
-
-
-def _looks(words: _Words, instance: Instance) -> set[str]:
-    looks = words.catalogue[instance.category].looks if instance.category in words.catalogue else ()
-    return {word for look in looks for wording in look.wordings for word in _split(wording)}
-
-
-def _shades(words: _Words, instance: Instance) -> set[str]:
-    """What a person calls the colours of a thing's materials."""
-    materials = words.ambiguity.geometry.scene.materials
-    return {colour_name(materials[part.material].colour) for part in instance.parts}
-
-
-def _other_side(words: _Words, data: SceneData, i: int, text: str) -> str:
+def _other_side(words: _Words, i: int, text: str) -> str:
     """Say which side a landmark is said to be on of its like, where it is on another."""
-    geometry, marks = words.ambiguity.geometry, words.ambiguity.landmarks
+    geometry, marks = words.claims.geometry, words.claims.landmarks
     category = geometry.scene.instances[i].category
     alike = [j for j in marks if j != i and geometry.scene.instances[j].category == category]
     for side, (dx, dy) in _SIDES.items():

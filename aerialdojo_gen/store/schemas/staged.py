@@ -26,12 +26,22 @@ OBJECT_COLUMNS = [
     column("object_id", pa.int32(), "id of the target object within its scene"),
     column("name", pa.string(), "what a person would call it, e.g. red delivery van"),
     column("category", pa.string(), "semantic category, one of the catalogue's"),
-    column("description", pa.string(), "what it looks like and what stands by it"),
+    column(
+        "description",
+        pa.string(),
+        "what it looks like and what stands by it, as a person wrote it; null where none did",
+        nullable=True,
+    ),
     column("mesh_node", pa.string(), "node of the scene's mesh"),
     *xyz("centre of the object's axis-aligned box"),
     *[column(f"size_{a}_m", pa.float64(), f"extent of the box along {a}", "m") for a in "xyz"],
     column("landmark_id", pa.int32(), "nearest landmark in the plane"),
     column("direction", pa.string(), "compass direction from that landmark to the object, one of eight"),
+    column(
+        "claims",
+        pa.string(),
+        "what can be said of it, true of the mesh: a JSON list of claims (kind, key, things)",
+    ),
 ]
 REFERENCE = [
     column("reference_image", pa.binary(), "PNG: front view from the selected anchor, or from further back "

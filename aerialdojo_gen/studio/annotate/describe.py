@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.annotations.appearance import Looks
 from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.format import Annotations, Object, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.relations import SceneGeometry
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import is_unnamed
-from aerialdojo_gen.scenes.model import Scene
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
 _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
@@ -23,11 +21,9 @@ _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
 class Describer:
     """Describes annotations of one scene as JSON; not thread-safe."""
 
-    def __init__(
-        self, scene: Scene, names: Mapping[str, str], counts: tuple[int, int] | None, looks: Looks | None = None
-    ) -> None:
-        self._scene, self._names, self._counts, self._looks = scene, names, counts, looks
-        self._geometry = SceneGeometry(scene)  # caches results
+    def __init__(self, vocabulary: Vocabulary, counts: tuple[int, int] | None) -> None:
+        self._scene, self._vocabulary, self._counts = vocabulary.scene, vocabulary, counts
+        self._geometry = SceneGeometry(vocabulary.scene)  # caches results
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
         """Describe all entries.
@@ -37,7 +33,7 @@ class Describer:
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}
         general = []
-        faulty = check_source(source, self._scene, self._names, self._counts, self._geometry, self._looks)
+        faulty = check_source(source, self._vocabulary, self._counts, self._geometry).faults
         for fault in faulty:
             message = _MENTION.sub(lambda m: _entry_name(annotations, m[1], int(m[2])), fault.message)
             at = _PATH.match(fault.path)
@@ -56,11 +52,12 @@ class Describer:
         return {"landmarks": landmarks, "objects": objects, "faults": general}
 
     def _object(self, annotations: Annotations, entry: Object, faults: list[dict[str, str]]) -> dict[str, Any]:
-        lacks = [key for key in ("name", "category", "description") if not getattr(entry, key).strip()]
+        lacks = [key for key in ("name", "category") if not getattr(entry, key).strip()]
         lacks += ["person"] if is_unnamed(entry.node, entry.category) else []
         lacks += ["check"] if any(fault["field"] not in lacks for fault in faults) else []
         return {
             **entry.model_dump(),
+            "description": entry.description or "",
             **self.place(entry.node),
             **self.bearing(annotations, entry.node),
             "faults": faults,

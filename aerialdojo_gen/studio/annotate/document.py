@@ -129,7 +129,8 @@ def _entry(model: type[Entry], values: dict[str, Any]) -> Entry:
     unknown = values.keys() - model.model_fields.keys()
     if unknown:
         raise AerialDojoError(f"a {model.__name__.lower()} has no {', '.join(sorted(unknown))}")
-    return model(**values)
+    # An empty text is none: the program makes one.
+    return model(**{key: value for key, value in values.items() if key != "description" or value})
 
 
 def apply(annotations: Annotations, edits: Sequence[Edit]) -> Annotations:

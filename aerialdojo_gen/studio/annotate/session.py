@@ -13,6 +13,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.format import Anchor, Object, format_annotations
 from aerialdojo_gen.annotations.phrases import spoken
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
@@ -42,7 +43,7 @@ class AnnotationSession:
         self._pipeline, self._roots = pipeline, roots
         catalogue = load_catalogue(roots.scene_assets)
         self._names = {category: catalogue[category].name for category in catalogue}
-        self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._catalogue = catalogue
         self._targets = catalogue.targets
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
         self._lock = threading.RLock()  # the geometry caches results
@@ -53,7 +54,7 @@ class AnnotationSession:
         name, pipeline = self.storage.scene, self._pipeline
         job = Job("annotate", name, 0, 1, pipeline.seed, pipeline.embodiment, self._roots)
         scene = job.scene_model(keep=2)  # a picture of the previous scene may be in progress
-        payload, describer = scene_payload(scene), Describer(scene, self._names, self._counts, self._looks)
+        payload, describer = scene_payload(scene), Describer(Vocabulary(scene, self._catalogue), self._counts)
         rays = ray_caster(scene)
         commit()
         self.scene: Scene = scene

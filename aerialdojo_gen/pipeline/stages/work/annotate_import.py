@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -9,16 +10,16 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from aerialdojo_gen.annotations.bearings import nearest_landmark
 from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations
 from aerialdojo_gen.annotations.positions import Fault
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import CHOSEN_ANCHORS, LANDMARKS, OBJECTS
 
 
@@ -32,22 +33,23 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     except UnicodeDecodeError as error:
         raise AnnotationError(f"{path} is not UTF-8: {error}") from None
     source = parse_annotations(text)
-    scene = job.scene_model()
-    catalogue = load_catalogue(job.roots.scene_assets)
-    names = {category: catalogue[category].name for category in catalogue}
+    vocabulary = Vocabulary(job.scene_model(), load_catalogue(job.roots.scene_assets))
     counts = paper_counts().get(job.scene) if config.paper_counts else None
-    looks = {category: catalogue[category].looks for category in catalogue}
-    faults = check_source(source, scene, names, counts, looks=looks)
-    if faults:
-        raise AnnotationError(_report(path, faults))
-    tables = annotation_tables(source.annotations, scene)
+    checked = check_source(source, vocabulary, counts)
+    if checked.faults or checked.claims is None:
+        raise AnnotationError(_report(path, checked.faults))
+    tables = annotation_tables(source.annotations, checked.claims)
     landmarks, chosen = tables["landmarks"].num_rows, tables["chosen_anchors"].num_rows
+    unchecked = sum(map(len, checked.unchecked.values()))
     rows = landmarks + tables["objects"].num_rows
-    return Output(tables, rows, rows, {"landmarks": landmarks, "chosen_anchors": chosen})
+    return Output(
+        tables, rows, rows, {"landmarks": landmarks, "chosen_anchors": chosen, "unchecked_words": unchecked}
+    )
 
 
-def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Table]:
+def annotation_tables(annotations: Annotations, claims: SceneClaims) -> dict[str, pa.Table]:
     """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right."""
+    scene = claims.scene
     landmarks = sorted(annotations.landmarks, key=lambda entry: entry.id)
     places = np.array([scene[entry.node].centroid for entry in landmarks]).reshape(-1, 3)
     landmark_rows = [
@@ -57,7 +59,8 @@ def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Ta
     object_rows = []
     for entry in sorted(annotations.objects, key=lambda entry: entry.id):
         instance = scene[entry.node]
-        bearing = nearest_landmark(instance.centroid, places)
+        i = claims.geometry.index[entry.node]
+        bearing = claims.bearings[i]
         assert bearing is not None, f"{scene.name}, object {entry.id}: unchecked annotations"
         object_rows.append(
             {
@@ -71,6 +74,7 @@ def annotation_tables(annotations: Annotations, scene: Scene) -> dict[str, pa.Ta
                 **_xyz("size_{}_m", instance.bounds[1] - instance.bounds[0]),
                 "landmark_id": landmarks[bearing.landmark].id,
                 "direction": bearing.direction,
+                "claims": json.dumps([claim.to_json() for claim in claims.of(i)], ensure_ascii=False),
             }
         )
     chosen_rows = [

@@ -75,7 +75,7 @@ export class Editor {
       this.panel.append(
         h("div", { class: "pair" }, name, this.field("category", "Category", category)),
         this.field("description", "Description", h("textarea", { rows: 5, spellcheck: "true" }),
-          "what it looks like, what stands by it"),
+          "optional: what it looks like, what stands by it; without one the program writes it"),
         this.task);
       this.anchors = new AnchorChooser(this.page, entry);
       this.panel.append(this.anchors.element);

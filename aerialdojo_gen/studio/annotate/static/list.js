@@ -9,12 +9,12 @@ const sampled = (entry) => entry.anchor === null;
 const FILTERS = {
   all: () => true,
   unfinished,
-  text: (entry) => ["name", "category", "description"].some((key) => entry.lacks.includes(key)),
+  text: (entry) => ["name", "category"].some((key) => entry.lacks.includes(key)),
   check: (entry) => entry.faults.length > 0,
   anchor: sampled,
 };
 
-const WORDS = { name: "name", category: "category", description: "description", check: "check", person: "a person" };
+const WORDS = { name: "name", category: "category", check: "check", person: "a person" };
 
 export class List {
   constructor(select) {
@@ -66,7 +66,7 @@ export class List {
     byId("progress").max = Math.max(1, objects.length);
     byId("progress").value = done;
     const lacking = (key) => objects.filter((entry) => entry.lacks.includes(key)).length;
-    const parts = [["name", "lack", "a name"], ["description", "lack", "a description"], ["check", "have", "a warning"]]
+    const parts = [["name", "lack", "a name"], ["check", "have", "a warning"]]
       .map(([key, verb, what]) => [lacking(key), verb, what]).filter(([n]) => n)
       .map(([n, verb, what]) => `${n} ${n === 1 ? { lack: "lacks", have: "has" }[verb] : verb} ${what}`);
     const left = objects.filter(sampled).length;

@@ -1,0 +1,248 @@
+"""Match what a person wrote of an object to claims, as far as a small grammar goes.
+
+It knows *things* (nouns of the catalogue and of landmarks), *values* (adjectives of the scene's things, colours),
+*relations* (beside, north of, between ... and), the scene's phrases of place and the catalogue's looks. Values before
+a thing belong to it; a relation and the things after it make a claim. Other words are counted as unchecked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from aerialdojo_gen.annotations.appearance import SHADES
+from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
+from aerialdojo_gen.annotations.phrases import plural, spoken
+from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.scenes.model import Instance
+
+_TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
+# Compass corners are one word in the tables; people write two.
+_CORNER = re.compile(r"\b(north|south)[- ](east|west)")
+_STOPS = frozenset(".;:!?")
+_VERBS = frozenset(re.findall(
+    r"\w+",
+    "is are stands grows lies sits hangs rises leans floats flies waits has have which that it its you",
+))  # fmt: skip
+# Words that say nothing by themselves.
+_EMPTY = frozenset(re.findall(
+    r"\w+",
+    "a an the and or of to with there here where this these one another other who find look for search go see will "
+    "target be can tell know notice reading stand standing parked lying growing hanging sitting in on at by from "
+    "also as your",
+))  # fmt: skip
+_DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
+
+
+def _relations() -> dict[tuple[str, ...], str]:
+    phrases = {
+        "beside": "beside, right beside, next to, right next to, alongside, by, right by, adjacent to, flanked by, "
+        "close beside, at the foot of",
+        "against": "leaning against, right against, up against",
+        "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
+        "surrounded by, facing, around",
+        "at": "at",
+        "front": "in front of, before",
+        "behind": "behind, at the back of",
+        "on": "on, on top of, atop, upon, on the top of",
+        "under": "under, beneath, underneath, below, sheltered by, in the shade of, under the cover of",
+        "above": "above, over, high above",
+        "between": "between, in between",
+    }
+    table = {phrase: key for key, many in phrases.items() for phrase in many.split(", ")}
+    forms = ("{} of", "to the {} of", "just {} of", "on the {} side of", "at the {} side of", "on the {}ern side of")
+    table |= {form.format(d): f"{d} of" for d in DIRECTIONS for form in forms}
+    return {_tokens(phrase): key for phrase, key in table.items()}
+
+
+def _tokens(text: str) -> tuple[str, ...]:
+    return tuple(_TOKEN.findall(_CORNER.sub(r"\1\2", text.lower())))
+
+
+@dataclass
+class Matched:
+    """What is understood of a text about one object."""
+
+    claims: dict[Claim, str] = field(default_factory=dict)  # With the words that make it
+    called: str = ""  # What the text calls its object, if that contradicts the mesh
+    unchecked: list[str] = field(default_factory=list)  # Words that say something, and match nothing
+
+
+class Matcher:
+    """Matches texts about the instances of one scene."""
+
+    def __init__(self, claims: SceneClaims) -> None:
+        self._claims, self._instances = claims, claims.scene.instances
+        self._categories: dict[str, set[str]] = {}
+        for category, name in claims.vocabulary.names.items():
+            for form in {name.lower(), spoken(category)}:
+                self._categories.setdefault(form, set()).add(category)
+        self._phrases: dict[tuple[str, ...], tuple[str, str]] = {}
+        for phrase, key in _relations().items():
+            self._phrases[phrase] = "relation", key
+        for value in self._keys_of:
+            self._add(value, "value", value)
+        for word in SHADES:
+            self._phrases.setdefault((word,), ("value", word))
+        for place, wordings in claims.place_wordings().items():
+            for wording in (place, *wordings):
+                self._add(wording, "place", place)
+        nouns = {noun.name.lower() for noun in claims.vocabulary.nouns} | {*claims.landmark_names}
+        for name in sorted({*self._categories, *nouns}):
+            for form in (plural(name), name):
+                self._add(form, "thing", name)
+        self._longest = max(map(len, self._phrases), default=0)
+
+    def _add(self, phrase: str, kind: str, meaning: str) -> None:
+        if tokens := _tokens(phrase):
+            self._phrases[tokens] = kind, meaning
+
+    @cached_property
+    def _keys_of(self) -> Mapping[str, set[str]]:
+        """Attributes by their values."""
+        keys: dict[str, set[str]] = {}
+        for instance in self._instances:
+            for key, value in instance.attributes.items():
+                if key not in ("place", "group", "called"):
+                    keys.setdefault(value.lower(), set()).add(key)
+        return keys
+
+    def faults(self, i: int, text: str) -> list[str]:
+        """What a text says of an instance that is false, in words."""
+        node, matched = self._instances[i].node, self.read(text, i)
+        wrong = [f"it is called {matched.called!r}, and the mesh says {self._name(i)!r}"] if matched.called else []
+        return wrong + [
+            f"{words!r} is not so of {node}{self._why(claim, i)}"
+            for claim, words in matched.claims.items()
+            if not self._claims.holds(claim, i)
+        ]
+
+    def true_claims(self, i: int, text: str) -> list[Claim]:
+        """The claims of a text that hold of its instance."""
+        return [claim for claim in self.read(text, i).claims if self._claims.holds(claim, i)]
+
+    def _why(self, claim: Claim, i: int) -> str:
+        places = self._claims.places
+        return f": {places.fault(i, claim.key)}" if claim.kind == "place" and places is not None else ""
+
+    def _name(self, i: int) -> str:
+        category = self._instances[i].category
+        return self._claims.vocabulary.names.get(category, spoken(category))
+
+    def read(self, text: str, i: int) -> Matched:
+        """Match a name or a description of an instance."""
+        reading = _Reading(self, i)
+        text = self._looks(text, i, reading.matched)
+        tokens, at = _tokens(text), 0
+        while at < len(tokens):
+            length, kind, meaning = self._match(tokens, at)
+            if kind == "thing" and self._match(tokens, at + length)[1] == "thing":
+                kind = "part of a name"  # a spruce log pile is no spruce
+            reading.take(tokens[at : at + length], kind, meaning)
+            at += length
+        reading.end_clause()
+        return reading.matched
+
+    def _looks(self, text: str, i: int, matched: Matched) -> str:
+        """Take the catalogue's phrases about the instance's category out of a text."""
+        for look in (
+            () if self._claims.scene.imported else self._claims.vocabulary.catalogue_looks(self._instances[i])
+        ):
+            for wording in look.wordings:
+                pattern = r"[\W_]+".join(map(re.escape, re.findall(r"[^\W_]+", wording.lower())))
+                left = re.sub(rf"(?<![^\W_]){pattern}(?![^\W_])", " , ", text, flags=re.IGNORECASE)
+                if left != text:
+                    matched.claims[Claim("part", look.phrase)] = wording
+                    text = left
+        return text
+
+    def _match(self, tokens: tuple[str, ...], at: int) -> tuple[int, str, str]:
+        for length in range(min(self._longest, len(tokens) - at), 0, -1):
+            if found := self._phrases.get(tokens[at : at + length]):
+                return length, *found
+        return 1, "", ""
+
+    def values(self, i: int, values: Iterable[str], named: bool) -> Iterator[tuple[Claim, str]]:
+        """Claims of the values that a text gives its instance; those not right before its name count only if so."""
+        colours = [value for value in values if set(_tokens(value)) & SHADES.keys()] if named else []
+        if colours:
+            yield Claim("colour", " ".join(colours)), " ".join(colours)
+        for value in values:
+            for key in sorted(self._keys_of.get(value, ())) if value not in colours else ():
+                claim = Claim(key, value) if key in ("colour", "size") else Claim("attribute", f"{key}={value}")
+                known = named and key in self._instances[i].attributes
+                if known or self._claims.holds(claim, i):
+                    yield claim, value
+
+    def contradicts(self, i: int, called: str) -> bool:
+        """Whether a noun is no name of an instance; "garden wall" is none against "stone wall"."""
+        instance: Instance = self._instances[i]
+        if self._claims.scene.imported or called not in self._categories:
+            return False
+        own = {*_tokens(self._name(i)), *_tokens(spoken(instance.category))}
+        return instance.category not in self._categories[called] and not own & set(_tokens(called))
+
+    def landmark(self, name: str) -> str:
+        """Node of a landmark by its name; empty if it is none."""
+        return self._claims.landmark_names.get(name, "")
+
+
+class _Reading:
+    """A text under way."""
+
+    def __init__(self, matcher: Matcher, i: int) -> None:
+        self.matched = Matched()
+        self._matcher, self._i = matcher, i
+        self._relation, self._words = "", list[str]()
+        self._values, self._adjacent = list[str](), False
+        self._things: list[Mention] = []
+        self._subject = ""
+
+    def take(self, words: tuple[str, ...], kind: str, meaning: str) -> None:
+        """Take one phrase: its words, its kind and its meaning."""
+        first = words[0]
+        if first in _STOPS or (first in ",()" and not self._things) or (not kind and first in _VERBS):
+            self.end_clause()
+        elif kind == "relation":
+            self.end_clause()
+            self._relation = meaning
+        elif kind == "place":
+            self.end_clause()
+            self.matched.claims[Claim("place", meaning)] = " ".join(words)
+        elif kind == "value":
+            self._values.append(meaning)
+        elif kind == "thing":
+            self._thing(meaning, [*words])
+        elif not kind and first.isalpha() and first not in _EMPTY | _DEGREES:
+            self.matched.unchecked.append(first)
+        if self._relation:
+            self._words += words
+        self._adjacent = kind == "value" or (self._adjacent and first in ("and", ","))
+
+    def _thing(self, name: str, words: list[str]) -> None:
+        if self._relation:
+            mention = Mention(self._matcher.landmark(name), name, tuple(self._values))
+            self._things.append(mention)
+            if self._relation != "between" or len(self._things) == 2:
+                kind = "direction" if mention.node and self._relation.endswith(" of") else "relation"
+                key = self._relation.removesuffix(" of") if kind == "direction" else self._relation
+                self.matched.claims[Claim(kind, key, tuple(self._things))] = " ".join([*self._words, *words])
+                self._things = []
+        elif not self._subject:
+            self._subject = name
+            self.matched.called = name if self._matcher.contradicts(self._i, name) else ""
+            self._settle(named=self._adjacent)
+        self._values = []
+
+    def end_clause(self) -> None:
+        """End what a relation or a verb governs."""
+        # After "beside a bench with ..." the values belong to the bench, not to the subject.
+        if not self._relation:
+            self._settle(named=False)
+        self._values, self._relation, self._words, self._things = [], "", [], []
+
+    def _settle(self, named: bool) -> None:
+        for claim, words in self._matcher.values(self._i, self._values, named):
+            self.matched.claims.setdefault(claim, words)
