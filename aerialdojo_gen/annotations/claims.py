@@ -19,7 +19,6 @@ import numpy as np
 from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
 from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.annotations.phrases import Noun
 from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
@@ -268,11 +267,11 @@ class SceneClaims:
 
     def _may_be(self, j: int, adjective: str) -> bool:
         """Whether an instance may be called by an adjective."""
-        noun: Noun = self._nouns[j]
-        if any(_covers(own, adjective) for own in noun.adjectives):
+        attributes = self.scene.instances[j].attributes
+        if any(_covers(own, adjective) for own in (*self._nouns[j].adjectives, *attributes.values())):
             return True
         # What is said of no attribute of it is not denied, either.
-        return not self._keys_of.get(adjective, frozenset()) & self.scene.instances[j].attributes.keys()
+        return not self._keys_of.get(adjective, frozenset()) & attributes.keys()
 
     def _colour_holds(self, claim: Claim, j: int, slack: float) -> bool:
         instance = self.scene.instances[j]
@@ -292,7 +291,7 @@ class SceneClaims:
     def _part_holds(self, claim: Claim, j: int, slack: float) -> bool:
         instance = self.scene.instances[j]
         if slack <= 1.0:
-            return claim.key in self.vocabulary.looks(instance)
+            return claim.key in self.vocabulary.true_looks(instance)
         looks = [look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key]
         return bool(valid_looks(looks, instance, self.scene.materials))
 

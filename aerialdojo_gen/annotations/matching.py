@@ -14,13 +14,14 @@ from functools import cached_property
 
 from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.phrases import plural, spoken
+from aerialdojo_gen.annotations.phrases import phrases_of_value, plural, spoken
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
 
 _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 # Compass corners are one word in the tables; people write two.
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
+_MARK = "look'"
 _STOPS = frozenset(".;:!?")
 _VERBS = frozenset(re.findall(
     r"\w+",
@@ -84,6 +85,11 @@ class Matcher:
             self._phrases[phrase] = "relation", key
         for value in self._keys_of:
             self._add(value, "value", value)
+        for instance in self._instances:
+            for key, value in instance.attributes.items():
+                known = key in self._keys_of.get(value.lower(), ())
+                for wording in phrases_of_value(key, value, instance.category) if known else ():
+                    self._add(wording.removeprefix("+"), "value", value.lower())
         for word in SHADES:
             self._phrases.setdefault((word,), ("value", word))
         for place, wordings in claims.place_wordings().items():
@@ -134,10 +140,12 @@ class Matcher:
     def read(self, text: str, i: int) -> Matched:
         """Match a name or a description of an instance."""
         reading = _Reading(self, i)
-        text = self._looks(text, i, reading.matched)
+        text, looks = self._looks(text, i)
         tokens, at = _tokens(text), 0
         while at < len(tokens):
             length, kind, meaning = self._match(tokens, at)
+            if tokens[at].startswith(_MARK):
+                reading.look(*looks[int(tokens[at].removeprefix(_MARK))])
             if kind == "thing" and self._match(tokens, at + length)[1] == "thing":
                 kind = "part of a name"  # a spruce log pile is no spruce
             reading.take(tokens[at : at + length], kind, meaning)
@@ -145,18 +153,18 @@ class Matcher:
         reading.end_clause()
         return reading.matched
 
-    def _looks(self, text: str, i: int, matched: Matched) -> str:
-        """Take the catalogue's phrases about the instance's category out of a text."""
-        for look in (
-            () if self._claims.scene.imported else self._claims.vocabulary.catalogue_looks(self._instances[i])
-        ):
+    def _looks(self, text: str, i: int) -> tuple[str, list[tuple[str, str]]]:
+        """Replace the catalogue's phrases about the instance's category by marks; phrases and words by mark."""
+        imported, vocabulary = self._claims.scene.imported, self._claims.vocabulary
+        marked: list[tuple[str, str]] = []
+        for look in () if imported else vocabulary.catalogue_looks(self._instances[i]):
             for wording in look.wordings:
                 pattern = r"[\W_]+".join(map(re.escape, re.findall(r"[^\W_]+", wording.lower())))
-                left = re.sub(rf"(?<![^\W_]){pattern}(?![^\W_])", " , ", text, flags=re.IGNORECASE)
-                if left != text:
-                    matched.claims[Claim("part", look.phrase)] = wording
-                    text = left
-        return text
+                mark = f" {_MARK}{len(marked)} "
+                left = re.sub(rf"(?<![^\W_]){pattern}(?![^\W_])", mark, text, flags=re.IGNORECASE)
+                marked += [(look.phrase, wording)] if left != text else []
+                text = left
+        return text, marked
 
     def _match(self, tokens: tuple[str, ...], at: int) -> tuple[int, str, str]:
         for length in range(min(self._longest, len(tokens) - at), 0, -1):
@@ -220,6 +228,11 @@ class _Reading:
         if self._relation:
             self._words += words
         self._adjacent = kind == "value" or (self._adjacent and first in ("and", ","))
+
+    def look(self, phrase: str, words: str) -> None:
+        """Take one of the catalogue's phrases: after a relation it is said of the other thing."""
+        if not self._relation:
+            self.matched.claims[Claim("part", phrase)] = words
 
     def _thing(self, name: str, words: list[str]) -> None:
         if self._relation:

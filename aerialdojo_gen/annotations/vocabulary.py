@@ -9,7 +9,7 @@ from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
+from aerialdojo_gen.scenes.claims import valid_looks
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -60,13 +60,14 @@ class Vocabulary:
         """Phrases that the catalogue has for an instance's category."""
         return self._looks.get(instance.category, ())
 
+    def true_looks(self, instance: Instance) -> tuple[str, ...]:
+        """Phrases that are true of an instance, and visible."""
+        true = valid_looks(self.catalogue_looks(instance), instance, self.scene.materials)
+        return tuple(look.phrase for look in true if self._surface.shows(look, instance))
+
     def looks(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
-        looks = self._looks.get(instance.category, ())
-        true = valid_looks(looks, instance, self.scene.materials)
-        visible = tuple(look.phrase for look in true if self._surface.shows(look, instance))
-        new = tuple(say for say in visible if not repeats(say, instance))
-        return new if len(new) >= MIN_TRUE_LOOKS else visible
+        return tuple(say for say in self.true_looks(instance) if not repeats(say, instance))
 
     def faults(self, instance: Instance, text: str) -> list[str]:
         """Return the false statements of a text about an instance's appearance."""
