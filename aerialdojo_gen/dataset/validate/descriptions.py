@@ -87,10 +87,12 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     words = _words(data)
     instances = words.claims.scene.instances
     for row, i in _placed(words, rows):
-        said = [(text, words.matcher.true_claims(i, text)) for column, text in _texts(rows, row) if column != _MADE]
-        own = _claims(rows, row) or ()
-        made = [(one["text"], [own[k] for k in one["claims"] if k < len(own)]) for one in _made(rows, row)]
-        for text, claims in (*said, *made, *([] if said or made else [("all that is claimed", own)])):
+        own = _claims(rows, row) or []
+        made = [(one["text"], one["claims"]) for one in _made(rows, row) if one["claims"]]
+        texts = [(text, [own[k] for k in chosen if k < len(own)]) for text, chosen in made]
+        known = {text for text, _ in made}
+        texts += [(t, words.matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in known]
+        for text, claims in texts or [("all that is claimed", own)]:
             if others := _listed(instances, words.claims.distractors(i, claims)):
                 yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
                 break
