@@ -116,7 +116,7 @@ class _Checker:
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:
         scene, category = self._scene, entry.category
-        for text in _description_faults(entry.description) if entry.description is not None else ():
+        for text in description_faults(entry.description) if entry.description is not None else ():
             yield self._fault((*path, "description"), text)
         if category not in self._known:
             yield self._fault((*path, "category"), f"no category {category!r}{nearest(category, self._known, 2)}")
@@ -192,7 +192,8 @@ def first_sentence(name: str, description: str) -> str:
     return f"The {name}: {re.split(r'(?<=[.!?])[ ]', description.strip(), maxsplit=1)[0]}"
 
 
-def _description_faults(text: str) -> Iterator[str]:
+def description_faults(text: str) -> Iterator[str]:
+    """Yield what is wrong with the form of a person's text."""
     if not text.strip():
         yield "is empty"
         return

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.ambiguity import Ambiguity
+from aerialdojo_gen.annotations.bearings import lies_towards
 from aerialdojo_gen.annotations.compose import RELATIONS
 from aerialdojo_gen.annotations.parsing import Claim
 from aerialdojo_gen.annotations.phrases import Noun, Words
@@ -98,7 +99,8 @@ class FactFinder:
         bearing = geometry.bearing_rad(i, j)
         if bearing is not None and not touching and geometry.level_gap_m(i, j) > 0.0:
             direction = compass_direction(float(np.cos(bearing)), float(np.sin(bearing)))
-            if geometry.side(i, j, direction, _TIGHT):
+            offset = geometry.centres[i] - geometry.centres[j]
+            if geometry.side(i, j, direction, _TIGHT) and lies_towards(offset, direction, 17.5):
                 text = self._phrase("side", rng).format(thing, d=direction)
                 found += self._verified(i, text, weight, (j,))
         return found

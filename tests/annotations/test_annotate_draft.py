@@ -11,7 +11,7 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
-from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions, redraft_annotations
+from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
@@ -146,32 +146,3 @@ def test_articles():
     assert [article(w) for w in ("unicycle", "umbrella", "oak", "SUV", "one-armed lamp", "red oak")] == [
         "a", "an", "an", "an", "a", "a",
     ]  # fmt: skip
-
-
-def test_objects_are_described_anew_and_stay_what_they_are(plaza, catalogue):
-    draft = draft_annotations(plaza, catalogue, 1, 20, seed=3)
-    # Words that are not so of the mesh any more, such as a colour, go; the choice stays.
-    first = draft.objects[0].model_copy(update={"description": "A thing that is no more.", "name": "purple kiosk"})
-    before = dataclasses.replace(draft, objects=(first, *draft.objects[1:]))
-    after = redraft_annotations(plaza, catalogue, before, seed=5)
-    assert after == redraft_annotations(plaza, catalogue, before, seed=5)
-    assert after.landmarks == draft.landmarks
-    kept = [(entry.id, entry.node, entry.category, entry.name) for entry in after.objects]
-    assert kept == [(entry.id, entry.node, entry.category, entry.name) for entry in draft.objects]
-    assert [entry.description for entry in after.objects] != [entry.description for entry in draft.objects]
-    looks = {category: catalogue[category].looks for category in catalogue}
-    text = format_annotations(after)
-    assert check_source(parse_annotations(text), Vocabulary(plaza, catalogue), (1, 20)).faults == []
-    said = [
-        look.phrase for entry in after.objects for look in looks[entry.category] if look.phrase in entry.description
-    ]
-    assert len(said) > 10
-    # Names of two of a kind that have changed places come back.
-    a, b = next((x, y) for x in draft.objects for y in draft.objects if x.category == y.category and x.name != y.name)
-    swapped = {a.id: b.name, b.id: a.name}
-    mixed = [o.model_copy(update={"name": swapped.get(o.id, o.name)}) for o in draft.objects]
-    again = redraft_annotations(plaza, catalogue, dataclasses.replace(draft, objects=tuple(mixed)), seed=5)
-    assert [o.name for o in again.objects] == [o.name for o in draft.objects]
-    gone = dataclasses.replace(draft, objects=(first.model_copy(update={"node": "bench_999"}),))
-    with pytest.raises(AnnotationError, match="no node 'bench_999'"):
-        redraft_annotations(plaza, catalogue, gone, seed=5)

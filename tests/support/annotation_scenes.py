@@ -67,7 +67,7 @@ def street() -> Scene:
 GOOD = {
     "delivery_van_000": "A red delivery van, parked in the yard beside a yellow mailbox.",
     "delivery_van_001": "A red delivery van parked between the bench and the street lamp. It is in the yard.",
-    "delivery_van_002": "The blue delivery van. It has sliding doors.",
+    "delivery_van_002": "The blue delivery van. It is a cheerful sight.",
     "mailbox_001": "A red mailbox under the canopy.",
 }
 
