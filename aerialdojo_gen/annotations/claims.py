@@ -36,6 +36,7 @@ _ONE_COLOUR = (
     {"gold", "golden", "yellow"}, {"maroon", "red"}, {"violet", "purple", "lilac"},
     {"russet", "rusty", "reddish", "brown"}, {"navy", "blue"},
 )  # fmt: skip
+_SPELT = {"wooden": "wood", "gray": "grey", "golden": "gold"}
 # Stricter than the check, so that claims stay true after small changes of the scene.
 _TIGHT = 0.9
 _REACH_M, _FAR_M = 9.0, 15.0
@@ -343,7 +344,7 @@ class SceneClaims:
 
 
 def _words(text: str) -> set[str]:
-    return set(re.findall(r"[^\W_]+", text.lower()))
+    return {_SPELT.get(word, word) for word in re.findall(r"[^\W_]+", text.lower())}
 
 
 def _covers(own: str, said: str) -> bool:

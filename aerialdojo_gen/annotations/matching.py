@@ -83,13 +83,10 @@ class Matcher:
         self._phrases: dict[tuple[str, ...], tuple[str, str]] = {}
         for phrase, key in _relations().items():
             self._phrases[phrase] = "relation", key
-        for value in self._keys_of:
-            self._add(value, "value", value)
-        for instance in self._instances:
-            for key, value in instance.attributes.items():
-                known = key in self._keys_of.get(value.lower(), ())
-                for wording in phrases_of_value(key, value, instance.category) if known else ():
-                    self._add(wording.removeprefix("+"), "value", value.lower())
+        for phrase in ("know it by", "tell it by"):
+            self._add(phrase, "words", "")  # and not where it stands
+        for wording in self._values_of:
+            self._add(wording, "value", wording)
         for word in SHADES:
             self._phrases.setdefault((word,), ("value", word))
         for place, wordings in claims.place_wordings().items():
@@ -106,14 +103,15 @@ class Matcher:
             self._phrases[tokens] = kind, meaning
 
     @cached_property
-    def _keys_of(self) -> Mapping[str, set[str]]:
-        """Attributes by their values."""
-        keys: dict[str, set[str]] = {}
+    def _values_of(self) -> Mapping[str, set[tuple[str, str]]]:
+        """Attributes and their values by how they are said; several may be said alike."""
+        values: dict[str, set[tuple[str, str]]] = {}
         for instance in self._instances:
             for key, value in instance.attributes.items():
                 if key not in ("place", "group", "called"):
-                    keys.setdefault(value.lower(), set()).add(key)
-        return keys
+                    for wording in (value, *phrases_of_value(key, value, instance.category)):
+                        values.setdefault(wording.removeprefix("+").lower(), set()).add((key, value))
+        return values
 
     def faults(self, i: int, text: str) -> list[str]:
         """What a text says of an instance that is false, in words."""
@@ -161,7 +159,9 @@ class Matcher:
             for wording in look.wordings:
                 pattern = r"[\W_]+".join(map(re.escape, re.findall(r"[^\W_]+", wording.lower())))
                 mark = f" {_MARK}{len(marked)} "
-                left = re.sub(rf"(?<![^\W_]){pattern}(?![^\W_])", mark, text, flags=re.IGNORECASE)
+                left = re.sub(
+                    rf"(?<!without )(?<!no )(?<![^\W_]){pattern}(?![^\W_])", mark, text, flags=re.IGNORECASE
+                )
                 marked += [(look.phrase, wording)] if left != text else []
                 text = left
         return text, marked
@@ -177,12 +177,13 @@ class Matcher:
         colours = [value for value in values if set(_tokens(value)) & SHADES.keys()] if named else []
         if colours:
             yield Claim("colour", " ".join(colours)), " ".join(colours)
+        attributes = self._instances[i].attributes
         for value in values:
-            for key in sorted(self._keys_of.get(value, ())) if value not in colours else ():
-                claim = Claim(key, value) if key in ("colour", "size") else Claim("attribute", f"{key}={value}")
-                known = named and key in self._instances[i].attributes
-                if known or self._claims.holds(claim, i):
-                    yield claim, value
+            known = sorted(self._values_of.get(value, ())) if value not in colours else []
+            claims = [Claim(k, v) if k in ("colour", "size") else Claim("attribute", f"{k}={v}") for k, v in known]
+            true = [claim for claim in claims if self._claims.holds(claim, i)]
+            denied = [claim for claim, (key, _) in zip(claims, known, strict=True) if named and key in attributes]
+            yield from ((claim, value) for claim in true or denied[:1])
 
     def contradicts(self, i: int, called: str) -> bool:
         """Whether a noun is no name of an instance; "garden wall" is none against "stone wall"."""
