@@ -83,8 +83,8 @@ class Matcher:
         self._phrases: dict[tuple[str, ...], tuple[str, str]] = {}
         for phrase, key in _relations().items():
             self._phrases[phrase] = "relation", key
-        for phrase in ("know it by", "tell it by"):
-            self._add(phrase, "words", "")  # and not where it stands
+        for idiom in ("know it by", "tell it by"):
+            self._add(idiom, "words", "")  # and not where it stands
         for wording in self._values_of:
             self._add(wording, "value", wording)
         for word in SHADES:
