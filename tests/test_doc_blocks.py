@@ -44,6 +44,7 @@ NOT_RUN = {
     r"add-scene \S+ (odm_|city\.).*": "reads a scan, a city: tests/imports/test_cuts.py and "
     "tests/imports/test_surfaces.py make some",
     r"evaluate --preset .*": "asks a language model: tests/benchmark/test_llm_evaluate.py does, of its own server",
+    r"annotate-draft .* --rewrite .*": "asks a language model: tests/studio/test_rewrite.py does, of its own server",
     r"evaluate --agent clip .*": "needs a CLIP model: tests/benchmark/test_clip_heuristic.py makes a small one",
     r"vllm .*|docker .*|helm .*|kubectl .*": "needs what is not of this project",
     r".*(s3://|AWS_).*": "needs an object store: tests/store/test_readers_on_s3.py has one",

@@ -230,3 +230,16 @@ def run_chosen(
         if not isinstance(error, UsageError):
             error.add_note(kept)
         raise
+
+
+def key_values(given: list[str]) -> dict[str, str]:
+    """Read ``--option key=value``."""
+    from aerialdojo_gen.base.errors import UsageError
+    from aerialdojo_gen.base.secrets import Secrets
+
+    options = {}
+    for item in given:
+        key, equals, options[key] = item.partition("=")
+        if not equals or not key.isidentifier():
+            raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
+    return options

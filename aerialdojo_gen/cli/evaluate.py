@@ -37,6 +37,7 @@ from aerialdojo_gen.cli.common import (
     Tell,
     Workers,
     default_workers,
+    key_values,
     merge_scenes,
     open_pipeline,
 )
@@ -160,7 +161,7 @@ def evaluate(
     chosen = tuple(merge_scenes(scenes, scene) or ())
     name = preset or agent or "random"
     with _tracebacks(traceback):
-        agent, options = _agent(agent, preset, _options(option or []))
+        agent, options = _agent(agent, preset, key_values(option or []))
         evaluation = Evaluation(
             run or name.replace(".", "-").replace(":", "-"),
             agent,
@@ -238,17 +239,6 @@ def _agent(agent: str | None, preset: str | None, given: dict[str, str]) -> tupl
     if agent is not None and agent != found.agent:
         raise UsageError(f"preset {preset!r} is of the agent {found.agent!r}: leave --agent {agent} out")
     return found.agent, found.options | read_options(found.agent, given)
-
-
-def _options(given: list[str]) -> dict[str, str]:
-    from aerialdojo_gen.base.secrets import Secrets
-
-    options = {}
-    for item in given:
-        key, equals, options[key] = item.partition("=")
-        if not equals or not key.isidentifier():
-            raise UsageError(f"--option {Secrets().text(item)[:60]!r}: write key=value")
-    return options
 
 
 def _sensors(

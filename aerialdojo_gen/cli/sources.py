@@ -21,12 +21,14 @@ from aerialdojo_gen.cli.common import (
     Scene,
     SceneOption,
     Scenes,
+    key_values,
     merge_scenes,
     open_pipeline,
     pipeline_file,
 )
 
 if TYPE_CHECKING:
+    from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
     from aerialdojo_gen.imports.command import AddedScene
 
 app = typer.Typer()
@@ -61,7 +63,7 @@ def add_scene(
     ceiling: Annotated[
         float | None, typer.Option(help="Maximum flying height z, metres.  (default: 6 m above the highest point)")
     ] = None,
-    names: Annotated[Path | None, typer.Option(help="CSV that names nodes: pattern,name,category,plural.")] = None,
+    names: Annotated[Path | None, typer.Option(help="CSV or TOML that names nodes and materials.")] = None,
     light: Annotated[
         str, typer.Option(help="Lighting of textures: sun (lit by the scene), baked (already in them) or auto.")
     ] = "auto",
@@ -116,6 +118,22 @@ def _describe(added: AddedScene) -> None:
         print(f"  {line}")
 
 
+Rewrite = Annotated[
+    str | None,
+    typer.Option(
+        metavar="openai|anthropic",
+        help="Let a language model write the descriptions; those that cannot be verified are dropped.",
+    ),
+]
+ModelOption = Annotated[
+    list[str] | None,
+    typer.Option("--option", help="Option of --rewrite, repeatable: --option model=…, --option base_url=…"),
+]
+Yes = Annotated[bool, typer.Option("--yes", help="Send the requests of --rewrite, whatever they cost.")]
+MaxTokens = Annotated[int | None, typer.Option(min=0, help="Ask --rewrite no more after this number of tokens.")]
+MaxCost = Annotated[float | None, typer.Option(min=0, help="Ask --rewrite no more after this cost, US dollars.")]
+
+
 @app.command("annotate-draft")
 def annotate_draft(
     name: OneScene = None,
@@ -158,6 +176,11 @@ def annotate_draft(
         bool,
         typer.Option("--keep-objects", help="Keep the file's objects and names, and write their descriptions again."),
     ] = False,
+    rewrite: Rewrite = None,
+    option: ModelOption = None,
+    yes: Yes = False,
+    max_tokens: MaxTokens = None,
+    max_cost: MaxCost = None,
     quiet: Quiet = False,
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
@@ -182,7 +205,29 @@ def annotate_draft(
         max_per_category=max_per_category,
     )
     reporter = Reporter(quiet=quiet)
-    print(draft_scene(scene, config, roots, options, force=force, keep_objects=keep_objects, reporter=reporter))
+    fresh = rewrite is None or force or keep_objects or not (roots.annotations / f"{scene}.json").exists()
+    agent = None if rewrite is None else _writer(rewrite, option or [], max_cost)
+    if fresh:
+        print(draft_scene(scene, config, roots, options, force=force, keep_objects=keep_objects, reporter=reporter))
+    if agent is not None:
+        from aerialdojo_gen.studio.annotate.rewrite import Limits, rewrite_scene
+
+        limits = Limits(max_tokens, max_cost) if yes or (max_tokens, max_cost) != (None, None) else None
+        rewrite_scene(scene, roots, agent, limits, again=fresh, say=print)
+        if limits is None:
+            print("nothing was sent: --yes sends it; --max-tokens or --max-cost sends it up to a limit")
+
+
+def _writer(protocol: str, option: list[str], max_cost: float | None) -> LanguageModelAgent:
+    """Make the client of ``--rewrite``."""
+    from aerialdojo_gen.studio.annotate.rewrite import make_agent
+
+    agent = make_agent(protocol, key_values(option))
+    if max_cost is not None and not agent.priced:
+        raise UsageError(
+            "--max-cost needs prices: --option input_usd_per_million=… --option output_usd_per_million=…"
+        )
+    return agent
 
 
 @app.command("gallery")

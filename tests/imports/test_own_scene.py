@@ -17,6 +17,7 @@ from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.forms import form_of, grown, is_unnamed
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import Naming, words_in
@@ -268,6 +269,32 @@ def test_words_are_read_out_of_node_names_and_nothing_else(node, words):
 def test_names_of_nodes_and_materials_are_a_noun_and_attributes(node, materials, category, attributes):
     name = Naming().name_of(node, materials)
     assert (name.category, name.attributes) == (category, attributes)
+
+
+def test_pieces_of_a_merged_mesh_are_put_together_and_named_by_their_materials(tmp_path):
+    ball, post = trimesh.creation.icosphere(2, 1.8), trimesh.creation.cylinder(0.25, 3)
+    pieces = [
+        ("Asphalt", box(60, 60, 0.2), (0, 0, -0.1)), ("Bark", post, (9, 9, 1.5)), ("Leaves_01", ball, (9, 9, 4.2)),
+        ("Wall_White", box(8, 6, 4), (-15, 0, 2)), ("RoofTiles", box(8.6, 6.8, 0.4), (-15, 0, 4.2)),
+        ("CarPaint_Blue", box(4.2, 1.8, 1.4), (0, -9, 0.75)), ("M_Concrete", box(10, 0.3, 1.8), (0, 14, 0.9)),
+        ("Material.001", ball, (14, -9, 1.6)),
+    ]  # fmt: skip
+    paints = ["0.3 0.3 0.3", "0.4 0.3 0.2", "0.3 0.5 0.2", "0.9 0.9 0.9", "0.6 0.2 0.2", "0.2 0.3 0.7", "0.6 0.6 0.6",
+              "0.6 0.2 0.6"]  # fmt: skip
+    lines, n = ["mtllib m.mtl", "o Merged"], 1
+    for material, body, place in pieces:
+        lines += [f"usemtl {material}", *(f"v {x} {y} {z}" for x, y, z in (body.vertices + place).tolist())]
+        lines += [f"f {a} {b} {c}" for a, b, c in (body.faces + n).tolist()]
+        n += len(body.vertices)
+    (tmp_path / "merged.obj").write_text("\n".join(lines))
+    told = [f"newmtl {m}\nKd {paint}" for (m, *_), paint in zip(pieces, paints, strict=True)]
+    (tmp_path / "m.mtl").write_text("\n".join(told))
+    scene, _ = import_mesh("Merged", read_mesh(tmp_path / "merged.obj"))
+    looks = [(i.category, i.attributes.get("material", ""), i.attributes["colour"]) for i in scene.instances]
+    assert sorted(looks) == [
+        ("ball", "", "purple"), ("car", "", "blue"), ("house", "", "white"), ("slab", "", "grey"),
+        ("tree", "", "green"), ("wall", "concrete", "grey"),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,6 +68,9 @@ _TRANSIENT = ("rate limit", "server error", "connection lost", "malformed answer
 _PATIENCE_S = 10.0
 
 
+Schema = Mapping[str, Any]
+
+
 @dataclass(frozen=True)
 class Message:
     """What is said, by whom."""
@@ -113,6 +116,7 @@ class LanguageModelAgent(AgentBase):
         o = self.options
         self.form: Form = "text" if o.answer == "auto" else o.answer
         self.tells_tokens = True
+        self._asked = False  # Whether `ask_for` has settled the form
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
         self.service = Connection(
             self.package,
@@ -144,9 +148,26 @@ class LanguageModelAgent(AgentBase):
         cleaned: dict[str, Any] = self._secrets.options(used)
         return cleaned
 
-    def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
-        """Send one request."""
+    def ask(
+        self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
+    ) -> Reply:
+        """Send one request; the answer has the JSON schema, that of an action where None."""
         raise NotImplementedError
+
+    def ask_for(self, system: str, text: str, schema: Schema) -> Reply:
+        """Ask for something else than an action, in the first form that the service takes."""
+        forms = self.forms if self.options.answer == "auto" else (self.form,)
+        for form in forms[forms.index(self.form) if self._asked else 0 :]:
+            self.form = form
+            try:
+                reply = self._send(system, [Message("user", (text,))], schema=schema)
+            except AgentUnavailable as error:
+                if self._asked or form == forms[-1] or error.kind not in _UNSUPPORTED:
+                    raise
+                continue
+            self._asked = True
+            return reply
+        raise AssertionError("the last form either answers or raises")
 
     def check(self) -> str:
         """Send one small request as the run will send them; settles how answers are asked for."""
@@ -181,10 +202,12 @@ class LanguageModelAgent(AgentBase):
             time.sleep(1.0 if error.retry_after_s is None else error.retry_after_s)
         return self._send(system, messages, 0)
 
-    def _send(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+    def _send(
+        self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
+    ) -> Reply:
         """Ask; what is refused for all requests ends the run."""
         try:
-            return self.ask(system, messages, retries)
+            return self.ask(system, messages, retries, schema)
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
             raise refused(error, self.options.model, variable) from None

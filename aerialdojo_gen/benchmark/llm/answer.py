@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -80,6 +80,9 @@ _THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
 _FENCE = re.compile(r"\A```(?:json)?[ \t]*\n(.*)\n?```\Z", re.DOTALL)
 
 
+Model = TypeVar("Model", bound=BaseModel)
+
+
 class Answer(BaseModel):
     """One action."""
 
@@ -91,6 +94,14 @@ class Answer(BaseModel):
 
 def parse_answer(text: str, names: Sequence[str] = SIXTEEN.names) -> Answer:
     """Read an answer."""
+    answer = read_as(Answer, text)
+    if answer.action not in names:
+        raise _refused(f"action: {answer.action[:40]!r} is none of the actions")
+    return answer
+
+
+def read_as(kind: type[Model], text: str) -> Model:
+    """Read an answer that is one JSON object of a kind, and nothing around it."""
     if len(text) > MAX_CHARACTERS:
         raise InvalidAnswer(f"it has {len(text):,} characters, more than {MAX_CHARACTERS:,}")
     body = _THOUGHTS.sub("", text, count=1).strip()
@@ -106,15 +117,13 @@ def parse_answer(text: str, names: Sequence[str] = SIXTEEN.names) -> Answer:
     if not isinstance(value, dict):
         raise InvalidAnswer(f"it is JSON, but no object: {type(value).__name__}")
     try:
-        answer = Answer.model_validate(value)
+        answer = kind.model_validate(value)
     except (ValidationError, ValueError) as error:
         raise _refused(_problems(error)) from None
-    if answer.action not in names:
-        raise _refused(f"action: {answer.action[:40]!r} is none of the actions")
     try:
-        answer.thought.encode("utf-8")
+        json.dumps(value, ensure_ascii=False).encode("utf-8")
     except UnicodeEncodeError:
-        raise InvalidAnswer("thought: it holds half of a surrogate pair, which is no character") from None
+        raise InvalidAnswer("it holds half of a surrogate pair, which is no character") from None
     return answer
 
 

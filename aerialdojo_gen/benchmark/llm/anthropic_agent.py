@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from aerialdojo_gen.base.pictures import Picture
-from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Reply, token_count
+from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Reply, Schema, token_count
 from aerialdojo_gen.benchmark.llm.options import Form
 
 
@@ -17,11 +17,17 @@ class AnthropicAgent(LanguageModelAgent):
     package = "anthropic"
     forms: tuple[Form, ...] = ("tool", "json", "text")
 
-    def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+    def ask(
+        self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
+    ) -> Reply:
         """Send one request; see `LanguageModelAgent.ask`."""
         o, service = self.options, self.service
         # By the body, for the package has dropped the argument: its newest models take no temperature.
-        body = self._form() | dict(o.extra_body) | ({} if o.temperature is None else {"temperature": o.temperature})
+        body = (
+            self._form(schema)
+            | dict(o.extra_body)
+            | ({} if o.temperature is None else {"temperature": o.temperature})
+        )
         said = [_as_message(message) for message in messages]
         message = service.call(
             lambda client: client.messages.create(
@@ -39,13 +45,14 @@ class AnthropicAgent(LanguageModelAgent):
             token_count(getattr(usage, "output_tokens", None)),
         )
 
-    def _form(self) -> dict[str, Any]:
-        schema = self.options.action_set.schema()
+    def _form(self, schema: Schema | None) -> dict[str, Any]:
+        name, what = ("act", "Do one action.") if schema is None else ("answer", "Give the answer.")
+        schema = schema or self.options.action_set.schema()
         if self.form == "json":
             return {"output_config": {"format": {"type": "json_schema", "schema": schema}}}
         if self.form == "tool":
-            tool = {"name": "act", "description": "Do one action.", "input_schema": schema}
-            return {"tools": [tool], "tool_choice": {"type": "tool", "name": "act"}}
+            tool = {"name": name, "description": what, "input_schema": schema}
+            return {"tools": [tool], "tool_choice": {"type": "tool", "name": name}}
         return {}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from aerialdojo_gen.base.pictures import Picture
-from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Reply, token_count
+from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Reply, Schema, token_count
 
 
 class OpenAIAgent(LanguageModelAgent):
@@ -18,11 +18,13 @@ class OpenAIAgent(LanguageModelAgent):
 
     package = "openai"
 
-    def ask(self, system: str, messages: Sequence[Message], retries: int | None = None) -> Reply:
+    def ask(
+        self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
+    ) -> Reply:
         """Send one request; see `LanguageModelAgent.ask`."""
         o, service = self.options, self.service
         limit = "max_completion_tokens" if service.base_url is None else "max_tokens"
-        body: dict[str, Any] = {limit: o.max_tokens} | self._form() | o.extra_body
+        body: dict[str, Any] = {limit: o.max_tokens} | self._form(schema) | o.extra_body
         if o.temperature is not None:
             body["temperature"] = o.temperature
         said = [{"role": o.system_role, "content": system}, *map(_as_message, messages)]
@@ -44,16 +46,17 @@ class OpenAIAgent(LanguageModelAgent):
             token_count(getattr(usage, "completion_tokens", None)),
         )
 
-    def _form(self) -> dict[str, Any]:
-        schema = self.options.action_set.schema()
+    def _form(self, schema: Schema | None) -> dict[str, Any]:
+        name, what = ("act", "Do one action.") if schema is None else ("answer", "Give the answer.")
+        form = {"name": "action" if schema is None else name, "strict": True}
+        schema = schema or self.options.action_set.schema()
         if self.form == "json":
-            form = {"name": "action", "strict": True, "schema": schema}
-            return {"response_format": {"type": "json_schema", "json_schema": form}}
+            return {"response_format": {"type": "json_schema", "json_schema": form | {"schema": schema}}}
         if self.form == "tool":
-            tool = {"name": "act", "description": "Do one action.", "strict": True, "parameters": schema}
+            tool = {"name": name, "description": what, "strict": True, "parameters": schema}
             return {
                 "tools": [{"type": "function", "function": tool}],
-                "tool_choice": {"type": "function", "function": {"name": "act"}},
+                "tool_choice": {"type": "function", "function": {"name": name}},
             }
         return {}
 
