@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import string
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -19,6 +20,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.observations import GoalText, mosaic, render_views
+from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
 from aerialdojo_gen.benchmark.tasks import (
     MODALITIES,
     Selection,
@@ -80,6 +82,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
     tell : str or sequence of str
         ``"heading"``: the goal says which way the body faces at the start, as `heading` (an index of the eight
         directions) and `heading_deg` (clockwise from north).
+    paraphrase : str
+        ``"task"``: a semantic goal has the task's own description. ``"random"``: one of its target's is drawn for
+        every episode, of test tasks one of those that training tasks do not have.
     render_mode : str, optional
         ``"rgb_array"``: `render` returns the four views in one picture.
     scenes_in_memory : int
@@ -121,6 +126,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
         tell: str | Sequence[str] = (),
+        paraphrase: str = "task",
         render_mode: str | None = None,
         scenes_in_memory: int = SEVERAL,
         episodes_per_scene: int = 1,
@@ -135,6 +141,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self._data = open_root(data)
         self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height)
         self._tell = check_tell(_names(tell))
+        self._paraphrase = check_paraphrase(paraphrase)
         self._flight = Flight(
             self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell, scenes_in_memory
         )
@@ -171,8 +178,15 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     def told(self) -> list[tuple[str, str, str, str | None]]:
         """Goals in words, of all tasks to draw from: target, landmark, direction, description or None."""
-        words = self._rows.group_by([*_TEXT[:2], "direction", _TEXT[2]]).aggregate([]).to_pylist()
-        return [(w["target_name"], w["landmark"], w["direction"], w["description"]) for w in words]
+        names = (*_TEXT[:2], "direction")
+        words = self._rows.group_by([*names, *_TEXT[2:], "scene", "subset", "nav_id"]).aggregate([]).to_pylist()
+        return list(dict.fromkeys((*(w[name] for name in names), text) for w in words for text in self._texts(w)))
+
+    def _texts(self, row: dict[str, Any]) -> Sequence[str | None]:
+        """Return the descriptions that a task may have in an episode: of an image goal, None."""
+        if self._paraphrase == "task" or row["description"] is None:
+            return (row["description"],)
+        return texts_of_tasks(self._data, row["scene"], row["subset"])[row["nav_id"]]
 
     @property
     def n_tasks(self) -> int:
@@ -209,7 +223,11 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if unknown:
             raise UsageError(f"reset has no option {sorted(unknown)[0]!r}: there is 'task_id'")
         at = self._find(options["task_id"]) if options else self._draw.next(self.np_random)
-        self._flight.begin(read_tasks(self._data, self._rows.slice(at, 1))[0])
+        task = read_tasks(self._data, self._rows.slice(at, 1))[0]
+        texts = self._texts(task.row)
+        if len(texts) > 1:
+            task = replace(task, row=task.row | {"description": texts[int(self.np_random.integers(len(texts)))]})
+        self._flight.begin(task)
         self._begun = True
         if self._prefetch and not options and (coming := self._draw.coming) is not None:
             self._flight.look_ahead(coming)
@@ -306,9 +324,12 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         return self._index[task_id]
 
     def _observations(self) -> spaces.Dict:
-        longest = {name: pc.max(pc.utf8_length(self._rows[name])).as_py() or 1 for name in _TEXT}
         # Over all tasks, so that the space reveals nothing about the current one.
-        texts = {text for name in _TEXT for text in pc.unique(self._rows[name]).to_pylist() if text}
+        said = {name: {text for text in pc.unique(self._rows[name]).to_pylist() if text} for name in _TEXT}
+        if self._paraphrase != "task":
+            said["description"] |= {text for *_, text in self.told() if text}
+        longest = {name: max(map(len, texts), default=1) for name, texts in said.items()}
+        texts = set().union(*said.values())
         characters = "".join(sorted(set(string.printable).union(*texts)))
         goal: dict[str, spaces.Space[Any]] = {
             "modality": spaces.Discrete(len(MODALITIES)),

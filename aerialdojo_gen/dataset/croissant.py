@@ -130,10 +130,35 @@ def _field(table: str, field: pa.Field) -> dict[str, Any]:
         "@id": f"{table}/{field.name}",
         "name": field.name,
         "description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else ""),
-        "dataType": _TYPES[kind],
+        **(
+            {"subField": _sub_fields(table, field.name, kind)}
+            if pa.types.is_struct(kind)
+            else {"dataType": _TYPES[kind]}
+        ),
         **({"repeated": True} if repeated else {}),
         "source": {"fileSet": {"@id": f"{table}-files"}, "extract": {"column": field.name}},
     }
+
+
+def _sub_fields(table: str, column: str, kind: pa.StructType) -> list[dict[str, Any]]:
+    found = []
+    for field in kind:
+        repeated = pa.types.is_list(field.type)
+        found.append(
+            {
+                "@type": "cr:Field",
+                "@id": f"{table}/{column}/{field.name}",
+                "name": field.name,
+                "dataType": _TYPES[field.type.value_type if repeated else field.type],
+                **({"repeated": True} if repeated else {}),
+                "source": {
+                    "fileSet": {"@id": f"{table}-files"},
+                    "extract": {"column": column},
+                    "transform": {"jsonPath": field.name},
+                },
+            }
+        )
+    return found
 
 
 def write_croissant(data: Where) -> Path:

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
 from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.words import goal_text
@@ -95,12 +97,18 @@ class Index:
 
 
 def read_index(
-    root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = ()
-) -> Index:
-    """Read the trajectories of a selection: its references, or the successful flights of runs on its tasks."""
+    root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
+    paraphrase: str = "task",
+) -> Index:  # fmt: skip
+    """Read the trajectories of a selection: its references, or the successful flights of runs on its tasks.
+
+    With the `paraphrase` ``"random"`` a goal's description is one of its target's, drawn by the selection's seed.
+    """
     if target_split is not None and target_split not in _SIDES:
         raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
     chosen = select(root, selection)
+    if check_paraphrase(paraphrase) == "random":
+        chosen = _paraphrased(root, chosen, selection.seed)
     flown = _flown(root, runs) if runs else None
     if flown is not None:
         chosen = chosen.filter(pc.is_in(chosen["nav_id"], pa.array(flown, pa.string())))
@@ -114,6 +122,15 @@ def read_index(
     if not parts:
         raise UsageError(f"no task of the selection has the target split {target_split!r}")
     return _joined(parts)
+
+
+def _paraphrased(root: DataRoot, rows: pa.Table, seed: int) -> pa.Table:
+    texts: list[str | None] = []
+    for row in rows.select(["scene", "subset", "nav_id", "description"]).to_pylist():
+        known = texts_of_tasks(root, row["scene"], row["subset"])[row["nav_id"]]
+        one = known[rank(seed, "paraphrase", row["nav_id"]) % len(known)]
+        texts.append(None if row["description"] is None else one)
+    return rows.set_column(rows.column_names.index("description"), "description", pa.array(texts, pa.string()))
 
 
 def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:

@@ -50,6 +50,8 @@ class SampleOptions:
     rgb: bool = True  # Which pictures; without both nothing is drawn
     depth: bool = True
     goal: str | Sequence[str] = "text"  # Of "text", "tokens", "image"
+    # "task": the task's own description; "random": one of its target's, of the task's side, drawn by `seed`.
+    paraphrase: str = "task"
     past: int | None = 0  # Steps before a sample's last; None for whole trajectories, each with a T of its own
     # Every so many steps a sample ends, counted back from the Stop: with past = stride - 1 a step is in one sample.
     stride: int = 1
@@ -136,7 +138,7 @@ class Trajectories:
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(_names(split), _names(own.setting), modalities, _names(own.scene), None, own.seed)
-        self.index = read_index(self._root, chosen, own.target_split, _names(own.run))
+        self.index = read_index(self._root, chosen, own.target_split, _names(own.run), own.paraphrase)
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)

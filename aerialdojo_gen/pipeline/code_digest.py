@@ -54,6 +54,7 @@ BY_NAME: dict[str, tuple[str, ...]] = {
 
 # Files that modules read, relative to the package. Files outside it are sources of stages.
 DATA_FILES = {
+    "annotations.language.grammar": "annotations/language/*.toml",
     "annotations.phrases": "annotations/phrases/*.toml",
     "annotations.places": "annotations/places/*.toml",
     "scenes.colours": "scenes/colour_names.toml",

@@ -46,6 +46,14 @@ STAGES: tuple[Stage, ...] = (
         seconds=(1.0, 0.1),
     ),
     Stage(
+        "describe",
+        "Write each object's descriptions from what its pictures show.",
+        reads=("scenes", "landmarks", "objects", "references"),
+        writes=("descriptions",),
+        sources=hooks.catalogue_sources,
+        seconds=(0.5, 0.01),
+    ),
+    Stage(
         "pair-objects",
         "Pair start anchors with targets: the candidate tasks.",
         reads=("scenes", "objects", "anchors"),
@@ -71,7 +79,18 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "split",
         "Write the release: tasks, routes, objects, train and test.",
-        reads=("scenes", "landmarks", "objects", "anchors", "viewpoints", "references", "pairs", "plans", "verdicts"),
+        reads=(
+            "scenes",
+            "landmarks",
+            "objects",
+            "anchors",
+            "viewpoints",
+            "references",
+            "descriptions",
+            "pairs",
+            "plans",
+            "verdicts",
+        ),
         writes=(
             "tasks/train",
             "tasks/test",

@@ -68,21 +68,33 @@ def write_file(path: Path, table: pa.Table) -> None:
 def write_clustered(spec: TableSpec, table: pa.Table, path: Path) -> None:
     """Write a Parquet file with the encodings of docs/release-format.md, a row group a cluster."""
     plain = [field for field in spec.schema if field.name in spec.plain]
-    leaves = {f.name: f"{f.name}.list.element" if pa.types.is_list(f.type) else f.name for f in spec.schema}
+    leaves = {field.name: _leaves(field.name, field.type) for field in spec.schema}
     # A picture is compressed already; all else gains.
-    codec = {leaves[f.name]: "NONE" if pa.types.is_binary(f.type) else "ZSTD" for f in spec.schema}
+    codec = {leaf: "NONE" if pa.types.is_binary(f.type) else "ZSTD" for f in spec.schema for leaf in leaves[f.name]}
     with pq.ParquetWriter(
         path,
         table.schema,
         compression=codec,
-        compression_level={leaves[f.name]: _PLAIN_LEVEL for f in plain if not pa.types.is_binary(f.type)} or None,
-        use_dictionary=[leaf for name, leaf in leaves.items() if name not in spec.plain],
+        compression_level={
+            leaf: _PLAIN_LEVEL for f in plain if not pa.types.is_binary(f.type) for leaf in leaves[f.name]
+        }
+        or None,
+        use_dictionary=[leaf for name, own in leaves.items() if name not in spec.plain for leaf in own],
         # The bounds of a list's elements bound nothing that a reader filters by.
         write_statistics=[f.name for f in spec.schema if not pa.types.is_list(f.type)],
         write_page_checksum=True,
     ) as writer:
         for begin, end in itertools.pairwise(_cluster_edges(spec, table)):
             writer.write_table(table.slice(begin, end - begin), row_group_size=_ROW_GROUP)
+
+
+def _leaves(name: str, kind: pa.DataType) -> list[str]:
+    """Name the columns of the Parquet file that a column becomes."""
+    if pa.types.is_list(kind):
+        return _leaves(f"{name}.list.element", kind.value_type)
+    if pa.types.is_struct(kind):
+        return [leaf for field in kind for leaf in _leaves(f"{name}.{field.name}", field.type)]
+    return [name]
 
 
 def _cluster_edges(spec: TableSpec, table: pa.Table) -> list[int]:

@@ -13,6 +13,7 @@ from aerialdojo_gen.base.config.sections import (
     AnchorSampleConfig,
     AnnotateImportConfig,
     BuildScenesConfig,
+    DescribeConfig,
     FilterConfig,
     PairObjectsConfig,
     PlanConfig,
@@ -47,6 +48,7 @@ class Pipeline(Section):
     annotate_import: AnnotateImportConfig = Field(AnnotateImportConfig(), alias="annotate-import")
     anchor_sample: AnchorSampleConfig = Field(AnchorSampleConfig(), alias="anchor-sample")
     reference_images: ReferenceImagesConfig = Field(ReferenceImagesConfig(), alias="reference-images")
+    describe: DescribeConfig = DescribeConfig()
     pair_objects: PairObjectsConfig = Field(PairObjectsConfig(), alias="pair-objects")
     plan: PlanConfig = PlanConfig()
     filter: FilterConfig = FilterConfig()

@@ -122,6 +122,12 @@ class ReferenceImagesConfig(Section):
     )
 
 
+class DescribeConfig(Section):
+    """The objects' descriptions."""
+
+    paraphrases: int = Field(5, ge=1, le=50, description="texts an object, of several levels, none twice")
+
+
 class PairObjectsConfig(Section):
     """Candidate tasks: ordered pairs of objects times the start object's anchors."""
 

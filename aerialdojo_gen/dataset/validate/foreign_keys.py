@@ -219,7 +219,6 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
         "target_name": objects.column("name"),
         "landmark": landmarks.column("name").take(_at(landmark)),
         "direction": objects.column("direction"),
-        "description": objects.column("description"),
         "reference_image_id": objects.column("reference_image_id"),
         "image_distance_m": objects.column("step_back_m"),
     }

@@ -35,6 +35,11 @@ def annotation_sources(roots: ProjectPaths, scene: str) -> list[Path]:
     return [_annotation_file(roots, scene), *catalogue_files(roots.scene_assets)]
 
 
+def catalogue_sources(roots: ProjectPaths, _scene: str) -> list[Path]:
+    """List the files of the catalogue and its materials."""
+    return [roots.scene_assets / "materials.toml", *catalogue_files(roots.scene_assets)]
+
+
 def missing_annotations(roots: ProjectPaths, scene: str) -> str:
     """Explain that a scene has no annotation file, and how to make one; empty if it has."""
     file = _annotation_file(roots, scene)

@@ -29,6 +29,7 @@ from aerialdojo_gen.store.schemas.release import (
 from aerialdojo_gen.store.schemas.staged import (
     ANCHORS,
     CHOSEN_ANCHORS,
+    DESCRIPTIONS,
     FRAMES,
     LANDMARKS,
     OBJECTS,
@@ -50,6 +51,7 @@ __all__ = [
     "ANCHORS",
     "APPROACH",
     "CHOSEN_ANCHORS",
+    "DESCRIPTIONS",
     "DIFFICULTY_COLUMNS",
     "DIRECTIONS",
     "EPISODES",

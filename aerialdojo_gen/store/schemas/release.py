@@ -17,10 +17,11 @@ from aerialdojo_gen.store.schemas.columns import (
     SETTING,
     START_VIEW,
     column,
+    list_of,
     table,
     xyz,
 )
-from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, REFERENCE
+from aerialdojo_gen.store.schemas.staged import ANCHOR_COLUMNS, OBJECT_COLUMNS, PARAPHRASE, REFERENCE
 
 RELEASE_ANCHORS = table("anchors", ["scene", "object_id", "anchor_id"], *ANCHOR_COLUMNS)
 
@@ -40,6 +41,9 @@ SPLITS = [
     column("target_held_out", pa.bool_(), "whether the target is one of the scene's objects that are held out",
            nullable=True),
     column("start_held_out", pa.bool_(), "whether the object that the task starts from is held out", nullable=True),
+    column("frame_seen_in_train", pa.bool_(),
+           "whether descriptions of training tasks have sentences built like that of the semantic task",
+           nullable=True),
 ]  # fmt: skip
 
 TASKS = table(
@@ -93,8 +97,14 @@ ROUTES = table(
 
 REFERENCE_ID = column("reference_image_id", pa.string(), "opaque id that image tasks name")
 
+PARAPHRASES = column(
+    "paraphrases", list_of(pa.struct([pa.field(f.name, f.type, nullable=False) for f in PARAPHRASE])),
+    "the object's descriptions; training tasks have those that are not held out, test tasks the others",
+)  # fmt: skip
+
 RELEASE_OBJECTS = table(
-    "objects", ["scene", "object_id"], *OBJECT_COLUMNS, REFERENCE_ID, *REFERENCE, plain=["reference_image"]
+    "objects", ["scene", "object_id"], *OBJECT_COLUMNS, PARAPHRASES, REFERENCE_ID, *REFERENCE,
+    plain=["reference_image"],
 )  # fmt: skip
 
 # Columns that a task is not flown by: other formats have no field for them.

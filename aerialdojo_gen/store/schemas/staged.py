@@ -198,11 +198,30 @@ REFERENCES = table(
     SCENE,
     column("object_id", pa.int32(), "object that the image shows"),
     *REFERENCE,
+    column("parts_shown", list_of(pa.string()), "named parts that both the image and the view from the anchor show"),
     command="reference-images",
 )  # fmt: skip
 
+PARAPHRASE = (
+    column("level", pa.string(), "terse, normal, detailed or vague; written if a person wrote it"),
+    column("text", pa.string(), "the description"),
+    column("claims", list_of(pa.int32()), "which of the object's claims it makes, from 0"),
+    column("frame", pa.string(), "its sentences with slots for noun phrases and places"),
+    column("held_out", pa.bool_(), "whether no training task has a text with its first sentence's template"),
+)
+
+DESCRIPTIONS = table(
+    "descriptions", ["scene", "object_id", "paraphrase_id"],
+    SCENE,
+    column("object_id", pa.int32(), "object that is described"),
+    column("paraphrase_id", pa.int32(), "number among the object's texts"),
+    *PARAPHRASE,
+    command="describe",
+)  # fmt: skip
+
 # What lies in a folder of its own, by scene and part; a new stage's table is listed here.
-STAGED = (SCENES, LANDMARKS, OBJECTS, CHOSEN_ANCHORS, ANCHORS, VIEWPOINTS, REFERENCES, PAIRS, PLANS, VERDICTS)
+STAGED = (SCENES, LANDMARKS, OBJECTS, CHOSEN_ANCHORS, ANCHORS, VIEWPOINTS, REFERENCES, DESCRIPTIONS, PAIRS, PLANS,
+          VERDICTS)  # fmt: skip
 
 
 RECORDINGS = table(

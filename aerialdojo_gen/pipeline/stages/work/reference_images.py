@@ -14,8 +14,8 @@ from aerialdojo_gen.base.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, encode_png
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.portable import product
-from aerialdojo_gen.geometry.rays import RayCaster, instance_caster
-from aerialdojo_gen.pipeline.scoring.views import box_px, part_shares
+from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
+from aerialdojo_gen.pipeline.scoring.views import box_px, boxed, part_shares
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
@@ -29,6 +29,8 @@ _POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
 LEAST_SHARE = 0.0005
 # A rasteriser's edges are within a pixel of those that rays see; what it leaves out altogether is larger than that.
 _NEAR_PX, _EVERY_PX = 2, 4
+# Of the pixels, one in so many rows and columns is asked which part it shows.
+_SOME_PX = 3
 
 
 def run(job: Job, config: ReferenceImagesConfig) -> Output:
@@ -51,6 +53,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             "scene": job.scene,
             "object_id": item["object_id"],
             "reference_image": None,
+            "parts_shown": [],
             **dict.fromkeys((*_POSE, "step_back_m", *_BOX, "image_fraction", "tells_shown", "tells_missing")),
         }
         rows.append(row)
@@ -59,7 +62,8 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             counts["no_anchor"] += 1
             continue
         yaw, back = anchor["yaw_rad"], min(anchor["step_back_m"], config.step_back_m)
-        eye = (anchor["x_m"] - back * math.cos(yaw), anchor["y_m"] - back * math.sin(yaw), anchor["z_m"])
+        place = (anchor["x_m"], anchor["y_m"], anchor["z_m"])
+        eye = (place[0] - back * math.cos(yaw), place[1] - back * math.sin(yaw), place[2])
         pose = view_pose(eye, yaw, "front")
         row |= zip((*_POSE, "step_back_m"), (*eye, yaw, back), strict=True)
         picture = renderer.render(camera, pose, instances=renderer.name == "gl")
@@ -72,12 +76,43 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             row |= zip(_BOX, box_of(mask), strict=True)
         else:
             counts["not_in_view"] += 1
+        row["parts_shown"] = _parts_shown(rays, k, thing, camera, pose, mask, view_pose(place, yaw, "front"))
         missing = missing_tells(thing, camera, pose, mask)
         if thing.anatomy is not None and thing.anatomy.identifying_parts:
             row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.identifying_parts)
             row["tells_missing"] = ", ".join(missing) or None
     pictures = sum(row["reference_image"] is not None for row in rows)
     return Output({"references": from_rows(REFERENCES, rows)}, len(objects), pictures, counts)
+
+
+def _parts_shown(
+    rays: RayCaster, k: int, thing: Instance, camera: Camera, pose: NDArray[np.float64], mask: NDArray[np.bool_],
+    at_anchor: NDArray[np.float64],
+) -> list[str]:  # fmt: skip
+    """Names of the parts that the picture shows, and the view from the anchor, too."""
+    if thing.anatomy is None:
+        return []
+    some = np.zeros_like(mask)
+    some[::_SOME_PX, ::_SOME_PX] = True
+    alone = instance_caster(thing)
+    seen = _seen_faces(alone, len(thing.faces), camera, pose, mask & some)
+    if not np.allclose(pose, at_anchor):
+        pixels = np.flatnonzero(boxed(camera, at_anchor, thing.vertices) & some)
+        directions = product(_local_rays(camera).reshape(-1, 3)[pixels], at_anchor[:3, :3].T)
+        own = np.zeros_like(mask)
+        own.flat[pixels] = rays.first_hit(at_anchor[:3, 3], directions)[1] == k
+        seen = np.stack([seen, _seen_faces(alone, len(thing.faces), camera, at_anchor, own)])
+    least = LEAST_SHARE * mask.size / _SOME_PX**2
+    names = sorted(thing.anatomy.runs)
+    return [name for name in names if (seen[..., thing.faces_of(name)].sum(axis=-1) >= least).all()]
+
+
+def _seen_faces(
+    alone: TriangleRayCaster, faces: int, camera: Camera, pose: NDArray[np.float64], pixels: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """How many of some pixels (H, W) that show an instance show each of its faces, (faces,) int64."""
+    hit = alone.first_hit(pose[:3, 3], product(_local_rays(camera)[pixels], pose[:3, :3].T))[1]
+    return np.bincount(hit[hit >= 0], minlength=faces)
 
 
 def missing_tells(

@@ -9,7 +9,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.language.sides import of_side
 from aerialdojo_gen.base.config.sections import SplitConfig
+from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
 from aerialdojo_gen.pipeline.stages.work.quota import Kept, difficulty_level, sampling_key, train_mask
@@ -17,6 +19,8 @@ from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_i
 from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
+from aerialdojo_gen.store.schemas.release import PARAPHRASES
+from aerialdojo_gen.store.schemas.staged import PARAPHRASE
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 
@@ -91,9 +95,10 @@ def tasks_table(
 ) -> pa.Table:
     """Make both instances of every navigation task, 2n rows of `TASKS`."""
     n = routes.num_rows
+    said, seen_frame = _said(routes, train, objects)
     target = _take(objects, "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
-    seen_and_split = splits_of(routes, train, out)
+    seen_and_split = splits_of(routes, train, out) | {"frame_seen_in_train": seen_frame}
     instances = []
     for modality in ("image", "semantic"):
         columns: dict[str, Any] = {
@@ -109,13 +114,37 @@ def tasks_table(
             "target_name": target.column("name"),
             "landmark": target.column("landmark"),
             "direction": target.column("direction"),
-            "description": target.column("description") if modality == "semantic" else nulls,
+            "description": said if modality == "semantic" else nulls,
             "reference_image_id": target.column("reference_image_id") if modality == "image" else nulls,
             "image_distance_m": target.column("step_back_m") if modality == "image" else pa.nulls(n, pa.float64()),
             **seen_and_split,
         }
         instances.append(pa.table(columns, schema=TASKS.schema))
     return pa.concat_tables(instances).sort_by([(key, "ascending") for key in TASKS.order])
+
+
+def _said(routes: pa.Table, train: NDArray[np.bool_], objects: pa.Table) -> tuple[pa.Array, pa.Array]:
+    """Choose every navigation task's description by its id, and say whether training tasks have such sentences."""
+    paraphrases = dict(zip(objects["object_id"].to_pylist(), objects["paraphrases"].to_pylist(), strict=True))
+    texts, seen = [], []
+    targets, ids = routes["target_object_id"].to_pylist(), routes["nav_id"].to_pylist()
+    for target, name, trains in zip(targets, ids, train.tolist(), strict=True):
+        own = of_side(paraphrases[target], held_out=not trains)
+        one = own[rank(0, "description", name) % len(own)]
+        texts.append(one["text"])
+        seen.append(not one["held_out"])
+    return pa.array(texts, pa.string()), pa.array(seen, pa.bool_())
+
+
+def _described(objects: pa.Table, descriptions: pa.Table) -> pa.Table:
+    """Give objects their paraphrases, and as description the first of them."""
+    rows: dict[int, list[dict[str, Any]]] = {}
+    for row in descriptions.to_pylist():
+        rows.setdefault(row["object_id"], []).append({name.name: row[name.name] for name in PARAPHRASE})
+    found = [rows[k] for k in objects["object_id"].to_pylist()]
+    objects = objects.append_column("paraphrases", pa.array(found, PARAPHRASES.type))
+    firsts = pa.array([texts[0]["text"] for texts in found], pa.string())
+    return objects.set_column(objects.column_names.index("description"), "description", firsts)
 
 
 def _kept(routes: pa.Table) -> Kept:
@@ -141,6 +170,7 @@ def run(job: Job, config: SplitConfig) -> Output:
     routes = routes_table(
         job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
     )
+    objects = _described(objects, job.read("descriptions"))
     references = _take(job.read("references"), "object_id", objects.column("object_id"))
     names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
     references = references.append_column("reference_image_id", pa.array(names, pa.string()))

@@ -1,0 +1,1 @@
+"""Texts from claims: a small grammar of sentences, noun phrases and wordings of relations."""

@@ -1,0 +1,116 @@
+"""Noun phrases: synonyms that a scene leaves unambiguous, collectives, the order of adjectives, articles."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerialdojo_gen.annotations.phrases import Words, article, group_of
+
+# What "a stack of fish crates" begins with: adjectives of colour and kind go before the crates.
+COLLECTIVES = frozenset(
+    {"row", "pile", "stack", "heap", "group", "bundle", "line", "pallet", "rack", "cluster", "clump", "patch", "set"}
+)
+_USUAL = 0.35  # How often the catalogue's own name is used where there are others
+# First words of names that go before other adjectives: "an overturned red car".
+LEADING = frozenset(
+    {"broken", "overturned", "fallen", "burnt-out", "ruined", "collapsed", "abandoned", "torn", "wrecked"}
+)
+# Adjectives that stay before the collective: "a tall stack of grey pallets".
+OF_THE_WHOLE = frozenset({"size"})
+
+
+@dataclass(frozen=True)
+class Name:
+    """A noun without adjectives."""
+
+    head: str  # "sedan"; "wheelie bins" of a collective
+    group: str = ""  # "row" of a collective
+    lead: str = ""  # "overturned", which other adjectives follow
+
+    @property
+    def text(self) -> str:
+        """The noun in full: "row of wheelie bins"."""
+        return " ".join(
+            [*([self.lead] if self.lead else []), *([f"{self.group} of"] if self.group else []), self.head]
+        )
+
+
+@dataclass(frozen=True)
+class NounPhrase:
+    """A noun with adjectives."""
+
+    name: Name
+    whole: tuple[str, ...] = ()  # Adjectives of the whole, and of the head
+    own: tuple[str, ...] = ()
+    tail: str = ""  # "full of soil"
+
+    @property
+    def bare(self) -> str:
+        """Without article."""
+        own = " ".join([*self.own, self.name.head])
+        middle = f"{self.name.group} of {own}" if self.name.group else own
+        return " ".join(part for part in (self.name.lead, *self.whole, middle, self.tail) if part)
+
+    @property
+    def a(self) -> str:
+        """With the indefinite article."""
+        return f"{article(self.bare)} {self.bare}"
+
+    @property
+    def the(self) -> str:
+        """With the definite article."""
+        return f"the {self.bare}"
+
+
+def name_of(text: str) -> Name:
+    """Split a noun into its collective and its head."""
+    group, of, head = text.partition(" of ")
+    if of and group in COLLECTIVES:
+        return Name(head, group)
+    first, _, rest = text.partition(" ")
+    return Name(rest, lead=first) if rest and first in LEADING else Name(text)
+
+
+class Names:
+    """The nouns that texts of a scene may use, by category."""
+
+    def __init__(self, words: Mapping[str, Words], landmarks: Sequence[str]) -> None:
+        self._words = words
+        users: defaultdict[str, set[str]] = defaultdict(set)
+        for category, own in words.items():
+            for noun in (own.name, *own.nouns):
+                users[noun].add(category)
+        for name in landmarks:
+            users[name].add(name)
+        # "Bench" may mean a picnic bench, too.
+        ends: defaultdict[str, set[str]] = defaultdict(set)
+        for noun, categories in users.items():
+            parts = noun.split()
+            for k in range(len(parts)):
+                ends[" ".join(parts[k:])] |= categories
+        self._free = {noun for noun in users if len(ends[noun]) == 1}
+
+    def choose(self, category: str, name: str, rng: np.random.Generator) -> Name:
+        """Choose a noun for a thing of a category that is usually called `name`."""
+        words = self._words[category]
+        usual = _grouped(words, name)
+        if name != words.name:
+            return usual  # An imported thing has a name of its own
+        free = [noun for noun in words.nouns if noun in self._free]
+        others = [_grouped(words, noun) for noun in free]
+        if words.collectives:
+            others += [Name(head, group) for head in words.plural_heads for group in words.collectives]
+        if not others or rng.random() < _USUAL:
+            return usual
+        return others[int(rng.integers(len(others)))]
+
+
+def _grouped(words: Words, noun: str) -> Name:
+    name = name_of(noun)
+    if name.group or not words.group or not group_of(noun):
+        return name
+    return Name(noun, words.group.removeprefix("a ").removeprefix("an ").removesuffix(" of"))

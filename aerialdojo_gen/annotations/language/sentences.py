@@ -1,0 +1,160 @@
+"""Choose sentences for what a text says, and fill them in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerialdojo_gen.annotations.language.grammar import Frame, frames
+from aerialdojo_gen.annotations.language.locations import Location
+from aerialdojo_gen.annotations.language.nouns import NounPhrase
+from aerialdojo_gen.annotations.language.subject import Wording
+
+_STARTS = re.compile(r"(^|[.?!] +)([a-zé])")
+_OPENING = 2  # words that no other text of the object begins with
+# How often a kind of first sentence is used where there is something to say with it.
+_KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.2, "at_telling": 1.5}
+# "In front of the ..." begins a text more rarely than "by the ...": many would begin alike.
+_SHORT_LEAD, _RARELY = 2, 0.8
+_LONG = 8  # words of a place: what is longer ends its clause
+_VERBS = frozenset({"be", "ing", "stands"})  # slots of a verb, which is not said twice
+_TURNED = 0.6  # how often a further place is said of the thing that it names
+_CLAUSE, _TELLING = 0.5, 0.6
+_SECOND_IN_FIRST = 0.6  # how often the first sentence says two places
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a text says, in words."""
+
+    level: str
+    phrase: NounPhrase
+    verb: tuple[str, str]  # "is parked", "parked"
+    places: Sequence[Location]
+    details: Sequence[tuple[Wording, bool]]  # With whether it is true of no other of the category
+
+
+def compose(
+    content: Content, held_out: bool, used: Collection[str], rng: np.random.Generator
+) -> tuple[str, str, bool] | None:
+    """Write a text: it, its frame, and whether that is held out; None if no sentence is left.
+
+    `used` are first words that it must not begin with.
+    """
+    if content.level in ("terse", "vague") and content.details:
+        return _with_tail(content, held_out, used, rng)
+    places, details = list(content.places), list(content.details)
+    section = "normal" if content.level == "detailed" else content.level
+    kinds = {"at": _KINDS["at"]}
+    if places[0].thing and places[0].unique and (len(places) == 1 or content.level == "detailed"):
+        kinds["ref"] = _KINDS["ref"]
+    if details and section == "normal":
+        kinds |= {kind: _KINDS[kind] for kind in ("at_telling" if details[0][1] else "at_with",)}
+    names, weights = list(kinds), np.array(list(kinds.values()))
+    kind = names[int(rng.choice(len(names), p=weights / weights.sum()))]
+    first = _choose([f for f in frames(section, kind) if f.held_out == held_out and _fits(f, content)], rng)
+    if first is None:
+        return None
+    slots = _slots(content, rng)
+    own = places[:1]
+    if kind == "ref":
+        slots |= {"ref": own[0].thing, "byit": own[0].pronoun}
+    else:
+        if len(places) > 1 and (content.level != "detailed" or rng.random() < _SECOND_IN_FIRST):
+            own = places[:2]
+        slots["at"] = _joined(own, first.text, rng)
+        if len(slots["at"].split()) > _LONG and "{at} " in first.text:
+            return None
+        if first.text.startswith("{at}") and own[0].lead > _SHORT_LEAD and rng.random() < _RARELY:
+            return None
+    if "w" in first.slots:
+        slots["w"] = _one(details.pop(0)[0].details, rng)
+    said = [(first, slots)]
+    said += [_detail(wording, telling, rng) for wording, telling in details]
+    said += [_place(place, "" if first.slots & _VERBS else content.verb[0], rng) for place in places[len(own) :]]
+    text = " ".join(_ended(frame.text.format(**slots)) for frame, slots in said)
+    text = _STARTS.sub(lambda m: m[1] + m[2].upper(), " ".join(text.split()))
+    text = text.removesuffix(".") if content.level == "terse" else text
+    if " ".join(text.split()[:_OPENING]) in used:
+        return None
+    return text, " | ".join(frame.text for frame, _ in said), first.held_out
+
+
+def _with_tail(
+    content: Content, held_out: bool, used: Collection[str], rng: np.random.Generator
+) -> tuple[str, str, bool] | None:
+    """Say the detail right after the noun."""
+    phrase = content.phrase
+    if phrase.tail or " with " in phrase.bare or len(content.details) > 1:
+        return None
+    detail = _one(content.details[0][0].details, rng)
+    named = replace(content, phrase=replace(phrase, tail=f"with {detail}"), details=())
+    return compose(named, held_out, used, rng)
+
+
+def _slots(content: Content, rng: np.random.Generator) -> dict[str, str]:
+    verb, participle = content.verb
+    return {
+        "a": content.phrase.a,
+        "the": content.phrase.the,
+        "np": content.phrase.bare,
+        "be": verb,
+        "ing": participle,
+        "stands": "is" if " " in verb else verb,
+    }
+
+
+def _fits(frame: Frame, content: Content) -> bool:
+    """Whether a frame goes with the noun phrase and the verb: nothing is "with ..." twice."""
+    doubled = " with " in content.phrase.bare and ("} with {w}" in frame.text or ", with {w}" in frame.text)
+    return not doubled and (bool(content.verb[1]) or "ing" not in frame.slots)
+
+
+def _choose(pool: Sequence[Frame], rng: np.random.Generator) -> Frame | None:
+    if not pool:
+        return None
+    weights = np.array([frame.share for frame in pool])
+    return pool[int(rng.choice(len(pool), p=weights / weights.sum()))]
+
+
+def _joined(places: Sequence[Location], template: str, rng: np.random.Generator) -> str:
+    if len(places) == 1:
+        return places[0].text
+    first, second = sorted(places, key=lambda place: (place.kind != "place", place.key == "between"))
+    after = template.partition("{at}")[2]
+    # No comma before words that go on, and none after a short phrase.
+    if first.kind == "place":
+        comma = "" if after[:1] == " " or (first.short and rng.random() < 0.6) else ","
+        return f"{first.text}{comma} {second.text}"
+    # "By the kiosk and the fountain" rather than "by the kiosk and next to the fountain".
+    return f"{first.text} and {second.thing if first.key == second.key != 'between' else second.text}"
+
+
+def _detail(wording: Wording, telling: bool, rng: np.random.Generator) -> tuple[Frame, dict[str, str]]:
+    if wording.clauses and rng.random() < _CLAUSE:
+        return _frame("clause", rng), {"clause": _one(wording.clauses, rng)}
+    kind = "telling" if telling and rng.random() < _TELLING else "with"
+    return _frame(kind, rng), {"w": _one(wording.details, rng)}
+
+
+def _place(place: Location, verb: str, rng: np.random.Generator) -> tuple[Frame, dict[str, str]]:
+    if place.turned and rng.random() < _TURNED:
+        return _frame("near", rng), {"ref": place.thing, "nearit": place.turned}
+    return _frame("at", rng, bool(verb)), {"at": place.text, "be": verb}
+
+
+def _frame(kind: str, rng: np.random.Generator, with_verb: bool = True) -> Frame:
+    frame = _choose([f for f in frames("more", kind) if with_verb or "be" not in f.slots], rng)
+    assert frame is not None
+    return frame
+
+
+def _ended(text: str) -> str:
+    return text if text[-1] in ".?!" else f"{text}."
+
+
+def _one(options: Sequence[str], rng: np.random.Generator) -> str:
+    return options[int(rng.integers(len(options)))]

@@ -1,0 +1,161 @@
+"""How varied texts are as language: words, frames, shared openings, n-grams, self-BLEU, patterns."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.base.text_table import Column, TextTable
+
+_TOKEN = re.compile(r"[a-zé]+(?:['’-][a-zé]+)*|\d+")
+_OPENING, _LONGEST = 4, 4
+# What holds a sentence together; any other word is of a noun phrase, and becomes a part of a slot.
+_KEPT = re.compile(
+    r"it|this|(?:that|it|there|you)['’]\w+|you|your|there|here|and|but|then|is|are|was|ha[sd]|have|so|if|where|what|who|"
+    r"how|look|find|search|go|fly|head|get|make|see|spot|notice|know|tell|want|need|seek|watch|reach|stop|aim|target|"
+    r"goal|will|would|should|can|could|may|must|we|us|i|me|be|finish|start"
+)
+_POSITION = re.compile(
+    r"(?:stand|sit|lie|lay|lean|hang|rise|float|grow|rest|drift|perch|wait|park|moor|stretch|fly|bloom|lying|set)\w*"
+)
+PATTERNS = {
+    "adjective before a collective": re.compile(
+        r"\b(?:red|blue|green|grey|gray|white|black|brown|yellow|orange|pink|purple|beige|rusty|wooden|empty|brick|"
+        r"concrete|steel|dark|light)\s+(?:row|pile|heap|stack|group|bundle|cluster|set|line|clump)s? of\b"
+    ),
+    "with a ... with a": re.compile(r"\bwith (?:an?|the) [^.,;:]*\bwith (?:an?|the)\b"),
+    "It is also": re.compile(r"\bit is also\b"),
+    "You will know it by, the one with": re.compile(r"\b(?:you will know it by|you can tell it by|the one with)\b"),
+    "beside, next to": re.compile(r"\b(?:beside|next to)\b"),
+}
+
+
+@dataclass(frozen=True)
+class Variety:
+    """Figures of a set of texts."""
+
+    texts: int
+    words: int
+    vocabulary: int  # Distinct words
+    once: int  # Words that occur once
+    frames: int  # Texts with their noun phrases and phrases of place replaced by slots
+    commonest: float  # Share of the most common frame
+    covering: int  # Frames that cover 99.9 % of the texts
+    openings: float  # Share of texts whose first four words a text of another object has
+    distinct: tuple[float, ...]  # Distinct n-grams over all, for n = 1 to 4
+    self_bleu: float
+    lengths: tuple[int, int, int]  # Fewest, median and most words
+    patterns: dict[str, float]  # Share of the texts by pattern
+
+
+def words_of(text: str) -> list[str]:
+    """Split a text into its words, lower case."""
+    return _TOKEN.findall(text.lower())
+
+
+def frame_of(text: str) -> str:
+    """Replace noun phrases and phrases of place by slots: what is left is the sentences' build."""
+    out: list[str] = []
+    for sentence in re.split(r"([.,;:!?])\s*", text.lower()):
+        for word in _TOKEN.findall(sentence):
+            slot = word if _KEPT.fullmatch(word) else "V" if _POSITION.fullmatch(word) else "_"
+            if slot != "_" or out[-1:] != ["_"]:
+                out.append(slot)
+        if sentence in (".", ",", ";", ":", "!", "?") and out:
+            out.append(sentence)
+    return " ".join(out)
+
+
+def measure(texts: Sequence[str], owners: Sequence[object], frames: Sequence[str] | None = None) -> Variety:
+    """Measure texts; `owners` are the objects that they describe, `frames` the derivations where these are known."""
+    tokens = [words_of(text) for text in texts]
+    counts = Counter(word for words in tokens for word in words)
+    built = Counter(frames if frames is not None else map(frame_of, texts))
+    lengths = sorted(map(len, tokens))
+    return Variety(
+        texts=len(texts),
+        words=sum(lengths),
+        vocabulary=len(counts),
+        once=sum(n == 1 for n in counts.values()),
+        frames=len(built),
+        commonest=max(built.values()) / len(texts),
+        covering=_covering(built, len(texts)),
+        openings=_shared_openings(tokens, owners),
+        distinct=tuple(_distinct(tokens, n) for n in range(1, _LONGEST + 1)),
+        self_bleu=self_bleu(tokens, owners),
+        lengths=(lengths[0], lengths[len(lengths) // 2], lengths[-1]),
+        patterns={name: sum(bool(p.search(t.lower())) for t in texts) / len(texts) for name, p in PATTERNS.items()},
+    )
+
+
+def _covering(built: Counter[str], texts: int, share: float = 0.999) -> int:
+    covered = np.cumsum([n for _, n in built.most_common()])
+    return int(np.searchsorted(covered, share * texts) + 1)
+
+
+def _shared_openings(tokens: Sequence[Sequence[str]], owners: Sequence[object]) -> float:
+    users: defaultdict[tuple[str, ...], set[object]] = defaultdict(set)
+    for words, owner in zip(tokens, owners, strict=True):
+        users[tuple(words[:_OPENING])].add(owner)
+    return sum(len(users[tuple(words[:_OPENING])]) > 1 for words in tokens) / len(tokens)
+
+
+def _grams(words: Sequence[str], n: int) -> Iterable[tuple[str, ...]]:
+    return zip(*(words[k:] for k in range(n)), strict=False)
+
+
+def _distinct(tokens: Sequence[Sequence[str]], n: int) -> float:
+    counts = Counter(gram for words in tokens for gram in _grams(words, n))
+    return len(counts) / max(counts.total(), 1)
+
+
+def self_bleu(tokens: Sequence[Sequence[str]], owners: Sequence[object], sample: int = 500) -> float:
+    """Mean BLEU-4 of texts of a sample against the sample's texts of other objects as references.
+
+    The sample has at most one text an object, drawn with a fixed seed. Precisions of 1- to 4-grams count alike,
+    clipped as in BLEU; one without a match counts as half a match. No penalty for length.
+    """
+    rng = generator(0, "self-bleu")
+    order = [k for k in rng.permutation(len(tokens)).tolist() if len(tokens[k]) >= _LONGEST]
+    by_owner = {owners[k]: k for k in reversed(order)}
+    chosen = sorted(by_owner.values(), key=order.index)[:sample]
+    logs = np.zeros(len(chosen))
+    for n in range(1, _LONGEST + 1):
+        own = [Counter(_grams(tokens[k], n)) for k in chosen]
+        best: defaultdict[tuple[str, ...], list[int]] = defaultdict(lambda: [0, 0])
+        for counter in own:
+            for gram, count in counter.items():
+                best[gram] = sorted([*best[gram], count])[1:]
+        for k, counter in enumerate(own):
+            # The most that another text has: the second most where the most is this one's own.
+            matches = sum(min(c, best[g][1] if c < best[g][1] else best[g][0]) for g, c in counter.items())
+            logs[k] += math.log(max(matches, 0.5) / counter.total()) / _LONGEST
+    return float(np.exp(logs).mean()) if len(chosen) else 0.0
+
+
+_ROWS: tuple[tuple[str, Callable[[Variety], str]], ...] = (
+    ("texts", lambda v: f"{v.texts:,}"),
+    ("words", lambda v: f"{v.words:,}"),
+    ("fewest, median, most words", lambda v: "{}, {}, {}".format(*v.lengths)),
+    ("vocabulary", lambda v: f"{v.vocabulary:,}"),
+    ("words that occur once", lambda v: f"{v.once:,}"),
+    ("frames", lambda v: f"{v.frames:,}"),
+    ("frames that cover 99.9 %", lambda v: f"{v.covering:,}"),
+    ("most common frame", lambda v: f"{v.commonest:.2%}"),
+    ("first four words shared", lambda v: f"{v.openings:.1%}"),
+    ("distinct 1-, 2-, 3- and 4-grams", lambda v: ", ".join(f"{share:.3f}" for share in v.distinct)),
+    ("self-BLEU-4", lambda v: f"{v.self_bleu:.3f}"),
+)
+
+
+def variety_table(measured: Mapping[str, Variety]) -> TextTable:
+    """Set measures of several sets of texts side by side."""
+    rows = [(label, [say(v) for v in measured.values()]) for label, say in _ROWS]
+    rows += [(f"pattern: {name}", [f"{v.patterns[name]:.1%}" for v in measured.values()]) for name in PATTERNS]
+    return TextTable("", [Column(name) for name in measured], rows, title="Variety of the texts")

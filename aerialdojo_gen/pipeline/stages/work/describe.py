@@ -1,0 +1,65 @@
+"""`describe`: write every object's descriptions from its claims, as far as its pictures show what they claim."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.language.sides import WRITTEN
+from aerialdojo_gen.annotations.language.writer import Text, Writer
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.config.sections import DescribeConfig
+from aerialdojo_gen.base.errors import AnnotationError
+from aerialdojo_gen.pipeline.stage import Job, Output
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.store.schemas import DESCRIPTIONS
+from aerialdojo_gen.store.tables import from_rows
+
+
+def run(job: Job, config: DescribeConfig) -> Output:
+    """Write the texts of one scene.
+
+    A text excludes everything of the object's category with the same landmark and direction. A text by a person comes
+    first, as it is, beside those that are made.
+    """
+    objects, landmarks = job.read("objects").to_pylist(), job.read("landmarks").to_pylist()
+    shown = {row["object_id"]: set(row["parts_shown"]) for row in job.read("references").to_pylist()}
+    vocabulary = Vocabulary(job.scene_model(), load_catalogue(job.roots.scene_assets))
+    marks = [Landmark(id=m["landmark_id"], name=m["name"], node=m["mesh_node"]) for m in landmarks]
+    claims = SceneClaims(vocabulary, marks)
+    writer = Writer(claims, [mark.name for mark in marks], job.seed, job.stage)
+    rows: list[dict[str, Any]] = []
+    counts = {"written by a person": 0, "with fewer texts": 0}
+    for item in objects:
+        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        texts = writer.texts(
+            claims.geometry.index[item["mesh_node"]], own, shown[item["object_id"]], config.paraphrases
+        )
+        counts["with fewer texts"] += len(texts) < config.paraphrases
+        if item["description"]:
+            counts["written by a person"] += 1
+            texts = [Text(WRITTEN, item["description"], (), item["description"], False), *texts]
+        if not texts:
+            raise AnnotationError(
+                f"{job.scene}: nothing that can be said of {item['mesh_node']} (object {item['object_id']}) tells it "
+                "from others of its category: write its description, or choose another object: "
+                f"{command('annotate', scene=job.scene)}"
+            )
+        rows += [_row(job.scene, item["object_id"], k, text) for k, text in enumerate(texts)]
+    return Output({"descriptions": from_rows(DESCRIPTIONS, rows)}, len(objects), len(rows), counts)
+
+
+def _row(scene: str, object_id: int, paraphrase_id: int, text: Text) -> dict[str, Any]:
+    return {
+        "scene": scene,
+        "object_id": object_id,
+        "paraphrase_id": paraphrase_id,
+        "level": text.level,
+        "text": text.text,
+        "claims": list(text.claims),
+        "frame": text.frame,
+        "held_out": text.held_out,
+    }
