@@ -55,11 +55,11 @@ class About:
         self.instance = scene.scene.instances[i]
         self.noun = scene.vocabulary.nouns[i].name
         said = [
-            w for w in wordings_of(claims, looks, self.noun.split()[-1])
+            w for w in wordings_of(claims, looks, self.instance.category)
             if w.key != "part" or _seen(looks, claims[w.index].key, shown)
         ]  # fmt: skip
         self.looks = {wording.index: wording for wording in said}
-        self.adjectives = [w for w in said if w.key != "part" and not w.details]
+        self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
         self.details = [w for w in said if w.details and min(len(d.split()) for d in w.details) <= _SHORT_DETAIL]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
         self.telling = cache(self._telling)

@@ -90,10 +90,3 @@ def _options(template: str, start: int) -> tuple[list[str], int]:
 
 def _digest(text: str) -> bytes:
     return hashlib.blake2b(text.encode(), digest_size=8, person=b"held out").digest()
-
-
-@cache
-def wordings() -> dict[str, dict[str, tuple[str, ...]]]:
-    """Read the wordings of relations, by table and the claim's key."""
-    tables = read_toml(FOLDER / "wordings.toml", AnnotationError)
-    return {name: {key: tuple(texts) for key, texts in table.items()} for name, table in tables.items()}

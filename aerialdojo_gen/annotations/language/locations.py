@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.language.grammar import wordings
-from aerialdojo_gen.annotations.language.nouns import Name, Names, NounPhrase
+from aerialdojo_gen.annotations.language.nouns import Names, NounPhrase
+from aerialdojo_gen.annotations.language.relation_words import relation_words
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
 
@@ -52,18 +52,25 @@ class LocationWords:
         things = [self._thing(i, mention, rng) for mention in claim.things]
         direction = claim.key.removesuffix(" of")
         key = "direction" if claim.kind == "direction" else "side" if direction in DIRECTIONS else claim.key
-        table = wordings()
-        many = len(things) > 1 or (things[0].startswith("the ") and _is_plural(claim.things[0].noun))
-        pronoun = _one(table["pronoun"].get(key, table["pronoun"]["side"]), rng)
-        if many and key != "between":
-            pronoun = pronoun.replace(" its ", " their ") if " its " in pronoun else _with_them(pronoun)
-        text = _one(table.get(level, {}).get(key) or table["relation"][key], rng)
-        turned = table["turned"].get(key, ())
+        index_of = self._claims.geometry.index
+        nodes = [index_of[mention.node] for mention in claim.things]
+        text = self._words(level if level in relation_words() else "relation", key, i, nodes, rng)
+        pronoun = self._words("pronoun", key, i, nodes, rng)
+        if len(things) == 1 and things[0].startswith("the ") and _is_plural(claim.things[0].noun):
+            pronoun = _of_many(pronoun)
         return Location(
             index, claim.kind, claim.key, text.format(*things, d=direction), thing=" and ".join(things),
-            pronoun=pronoun.format(d=direction), turned=_one(turned, rng) if turned else "",
+            pronoun=pronoun.format(d=direction), turned=self._words("turned", key, i, nodes, rng),
             unique=all(mention.unique for mention in claim.things), lead=len(text.partition("{}")[0].split()),
         )  # fmt: skip
+
+    def _words(self, table: str, key: str, i: int, nodes: Sequence[int], rng: np.random.Generator) -> str:
+        """Choose a wording whose conditions hold; empty if the table has none for the key."""
+        words = relation_words()[table].get(key) or (relation_words()["relation"][key] if table == "vague" else ())
+        for k in rng.permutation(len(words)):
+            if all(words[int(k)].holds(self._claims, i, j) for j in nodes):
+                return words[int(k)].say
+        return ""
 
     def _place(self, phrase: str) -> Sequence[str]:
         places = self._claims.places
@@ -74,7 +81,7 @@ class LocationWords:
             return f"the {mention.noun}"
         instances = self._claims.scene.instances
         k = self._claims.geometry.index[mention.node]
-        name: Name = self._names.choose(instances[k].category, mention.noun, rng)
+        name = self._names.choose(instances[k].category, mention.noun, rng, alone=not mention.said)
         said = tuple(word for word in mention.said if word not in name.text.split())
         phrase = NounPhrase(name, own=said)
         if mention.unique:
@@ -87,8 +94,9 @@ def _is_plural(noun: str) -> bool:
     return bool(group_of(noun)) and " of " not in noun
 
 
-def _with_them(pronoun: str) -> str:
-    return pronoun.removesuffix(" it") + " them" if pronoun.endswith(" it") else pronoun
+def _of_many(pronoun: str) -> str:
+    pronoun = pronoun.removesuffix(" it") + " them" if pronoun.endswith(" it") else pronoun
+    return f" {pronoun}".replace(" its ", " their ").strip()
 
 
 def _one(options: Sequence[str], rng: np.random.Generator) -> str:

@@ -19,6 +19,10 @@ _USUAL = 0.35  # How often the catalogue's own name is used where there are othe
 LEADING = frozenset(
     {"broken", "overturned", "fallen", "burnt-out", "ruined", "collapsed", "abandoned", "torn", "wrecked"}
 )
+# First words of names that no other adjective goes before: "a red big motorbike".
+SIZES = frozenset(
+    {"big", "large", "great", "small", "little", "tall", "high", "long", "short", "low", "wide", "old", "wee"}
+)
 # Adjectives that stay before the collective: "a tall stack of grey pallets".
 OF_THE_WHOLE = frozenset({"size"})
 
@@ -94,13 +98,13 @@ class Names:
                 ends[" ".join(parts[k:])] |= categories
         self._free = {noun for noun in users if len(ends[noun]) == 1}
 
-    def choose(self, category: str, name: str, rng: np.random.Generator) -> Name:
-        """Choose a noun for a thing of a category that is usually called `name`."""
+    def choose(self, category: str, name: str, rng: np.random.Generator, alone: bool = True) -> Name:
+        """Choose a noun for a thing of a category that is called `name`; `alone` where no adjective goes with it."""
         words = self._words[category]
         usual = _grouped(words, name)
         if name != words.name:
             return usual  # An imported thing has a name of its own
-        free = [noun for noun in words.nouns if noun in self._free]
+        free = [noun for noun in words.nouns if noun in self._free and (alone or noun.split()[0] not in SIZES)]
         others = [_grouped(words, noun) for noun in free]
         if words.collectives:
             others += [Name(head, group) for head in words.plural_heads for group in words.collectives]
@@ -111,6 +115,7 @@ class Names:
 
 def _grouped(words: Words, noun: str) -> Name:
     name = name_of(noun)
-    if name.group or not words.group or not group_of(noun):
+    # Where the usual name is a plural, its synonyms are, or mass nouns: "a clump of bracken".
+    if name.group or not words.group or not (group_of(noun) or group_of(words.name)):
         return name
     return Name(noun, words.group.removeprefix("a ").removeprefix("an ").removesuffix(" of"))

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim
 from aerialdojo_gen.annotations.language.nouns import OF_THE_WHOLE, Name, NounPhrase
-from aerialdojo_gen.annotations.phrases import LETTERED, phrase_value
+from aerialdojo_gen.annotations.phrases import phrases_of_value
 from aerialdojo_gen.scenes.looks import Look
 
 _ORDER = ("size", "state", "pattern", "shape", "colour", "material")
@@ -27,8 +27,8 @@ class Wording:
     clauses: tuple[str, ...] = ()  # "it lies on its roof"
 
 
-def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], last_word: str) -> list[Wording]:
-    """Word the claims of looks; `last_word` is that of the object's name."""
+def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: str) -> list[Wording]:
+    """Word the claims of the looks of a thing of a category."""
     found = []
     for index, claim in enumerate(claims):
         if claim.kind == "part":
@@ -37,20 +37,12 @@ def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], last_word: s
             found.append(Wording(index, "part", also[1], (), (claim.key, *also[0]), also[2]))
         elif claim.kind in ("colour", "size", "attribute"):
             key, _, value = claim.key.rpartition("=")
-            found.append(_value(index, key or claim.kind, value, last_word))
+            key = key or claim.kind
+            phrases = phrases_of_value(key, value, category)
+            details = tuple(p.removeprefix("with ") for p in phrases if p.startswith("with "))
+            tails = tuple(p for p in phrases if not p.startswith(("+", "with ")))
+            found.append(Wording(index, key, tuple(p[1:] for p in phrases if p.startswith("+")), tails, details))
     return found
-
-
-def _value(index: int, key: str, value: str, last_word: str) -> Wording:
-    phrase = phrase_value(key, value)
-    if phrase.startswith("+"):
-        return Wording(index, key, (phrase[1:],))
-    if phrase.startswith("with a sign reading") and last_word in LETTERED:
-        word = phrase.removeprefix("with a sign reading ")
-        return Wording(index, key, tails=(f"reading {word}", f"that says {word}", f"saying {word}"))
-    if phrase.startswith("with "):
-        return Wording(index, key, details=(phrase.removeprefix("with "),))
-    return Wording(index, key, tails=(phrase,))
 
 
 def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> NounPhrase:

@@ -85,8 +85,10 @@ class Writer:
 
     def _content(self, about: About, plan: Plan, rng: np.random.Generator) -> Content:
         """Choose words for what a text says."""
-        name = self._names.choose(about.instance.category, about.noun, rng)
-        verbs = self._claims.vocabulary.words[about.i].verbs
+        name = self._names.choose(about.instance.category, about.noun, rng, alone=not plan.adjectives)
+        # "Flies its flag" goes with no place.
+        own = self._claims.vocabulary.words[about.i].verbs
+        verbs = [verb for verb in own if " " not in verb[0] or verb[0].startswith("is ")] or [("is", "")]
         other = len(verbs) > 1 and rng.random() > _USUAL_VERB
         verb = verbs[int(rng.integers(1, len(verbs))) if other else 0]
         return Content(
