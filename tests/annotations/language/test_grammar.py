@@ -1,0 +1,113 @@
+"""Every sentence of the grammar, filled in: no slot left, English articles, one space, one full stop."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerialdojo_gen.annotations.language.grammar import SLOTS, expand, frames
+from aerialdojo_gen.annotations.language.locations import Location
+from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of
+from aerialdojo_gen.annotations.language.relation_words import relation_words
+from aerialdojo_gen.annotations.language.sentences import Content, compose
+from aerialdojo_gen.annotations.language.subject import Wording
+from aerialdojo_gen.annotations.language.writer import LENGTHS
+from aerialdojo_gen.annotations.phrases import article
+
+KINDS = {"terse": ("at", "ref"), "vague": ("at",), "normal": ("at", "ref", "at_with", "at_telling")}
+MORE = ("with", "telling", "at", "clause", "near")
+ALL = [f for level, kinds in KINDS.items() for kind in kinds for f in frames(level, kind)]
+ALL += [f for kind in MORE for f in frames("more", kind)]
+
+NOUNS = ("sedan", "overturned car", "row of wheelie bins", "ice cream cart", "hunting stand", "SUV")
+ADJECTIVES = ("red", "orange", "old", "empty", "unloaded")
+PLACES = (
+    Location(0, "place", "in the car park", "in the car park"),
+    Location(1, "relation", "beside", "next to the kiosk", "the kiosk", "next to it", "beside it", True, 2),
+    Location(2, "relation", "near", "near an oak", "an oak", "near it", "close by", False, 1),
+    Location(3, "relation", "between", "between a van and the hut", "a van and the hut", "between them", "", False, 1),
+    Location(4, "direction", "north", "north of the tower", "the tower", "north of it", "", True, 2),
+)
+DETAILS = (
+    Wording(5, "part", details=("a white roof",), clauses=("it lies on its roof",)),
+    Wording(6, "sign", details=("a sign reading “BAKERY”",)),
+)
+
+
+def check(text):
+    """Whether a text is clean English as far as rules can tell."""
+    assert text == " ".join(text.split()), text
+    assert not re.search(r"[{}\[\]|]|\s[,.;:?]|[,.;:][,.;:]|\.\s+[a-z]", text), text
+    assert text[0].isupper() or text[0] == "“", text
+    for determiner, word in re.findall(r"\b(an?) ([\w-]+)", text.lower()):
+        assert determiner == article(word), text
+    assert len(text.split()) <= 60, text
+
+
+def test_no_frame_stands_twice_and_all_slots_are_known():
+    for level, kinds in KINDS.items():
+        texts = [frame.text for kind in kinds for frame in frames(level, kind)]
+        assert len(texts) == len(set(texts))
+    assert all(frame.slots <= SLOTS for frame in ALL)
+
+
+@pytest.mark.parametrize("level", KINDS)
+def test_each_kind_of_first_sentence_has_templates_on_both_sides(level):
+    for kind in KINDS[level]:
+        templates = {frame.template: frame.held_out for frame in frames(level, kind)}
+        assert 0.2 <= np.mean(list(templates.values())) <= 0.5
+
+
+def test_alternatives_nest():
+    assert list(expand("[a|b [c|d]] e")) == ["a e", "b c e", "b d e"]
+    assert list(expand("[very |]good")) == ["very good", "good"]
+
+
+def test_a_collective_keeps_its_adjectives_at_its_things():
+    phrase = NounPhrase(name_of("stack of fish crates"), whole=("tall",), own=("white",))
+    assert phrase.a == "a tall stack of white fish crates"
+    assert NounPhrase(name_of("overturned car"), own=("red",)).a == "an overturned red car"
+    assert NounPhrase(Name("SUV"), tail="full of soil").a == "an SUV full of soil"
+
+
+def test_relations_have_words_whatever_their_conditions():
+    words = relation_words()
+    for table in ("relation", "pronoun"):
+        for key, some in words[table].items():
+            assert any(not one.conditions for one in some), (table, key)
+    for key in words["relation"]:
+        assert key in words["pronoun"], key
+
+
+@given(
+    level=st.sampled_from(sorted(LENGTHS)),
+    noun=st.sampled_from(NOUNS),
+    adjectives=st.lists(st.sampled_from(ADJECTIVES), max_size=2, unique=True),
+    tail=st.sampled_from(["", "full of soil"]),
+    verb=st.sampled_from([("is parked", "parked"), ("stands", "standing"), ("is", "")]),
+    places=st.lists(st.sampled_from(PLACES), min_size=1, max_size=3, unique=True),
+    details=st.lists(st.tuples(st.sampled_from(DETAILS), st.booleans()), max_size=2, unique_by=lambda d: d[0].index),
+    held_out=st.booleans(),
+    seed=st.integers(0, 2**32),
+)
+def test_texts_say_what_they_are_asked_to(level, noun, adjectives, tail, verb, places, details, held_out, seed):
+    phrase = NounPhrase(name_of(noun), own=tuple(adjectives), tail=tail)
+    content = Content(level, phrase, verb, places, details)
+    rng = np.random.default_rng(seed)
+    made = next((m for m in (compose(content, held_out, (), rng) for _ in range(40)) if m is not None), None)
+    if made is None:  # what is said after the noun leaves room for no detail
+        assert level in ("terse", "vague")
+        assert details
+        return
+    text, frame, held = made
+    check(text)
+    assert held == held_out
+    assert "{" in frame
+    assert phrase.name.head.lower() in text.lower()
+    for place in places:
+        assert (place.thing or place.text) in text or (place.thing or place.text).capitalize() in text
+    for wording, _ in details:
+        said = [*wording.details, *(clause[2:] for clause in wording.clauses)]
+        assert any(words in text for words in said), (text, said)

@@ -1,0 +1,102 @@
+"""The texts of the stage `describe` and of the release that they go into."""
+
+import json
+from collections import defaultdict
+
+import pytest
+
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims
+from aerialdojo_gen.annotations.format import Landmark
+from aerialdojo_gen.annotations.language.sides import WRITTEN, of_side
+from aerialdojo_gen.annotations.language.writer import LENGTHS, Writer
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.context import open_scene
+from aerialdojo_gen.scenes.stored import mesh_file
+from aerialdojo_gen.store import shards
+from aerialdojo_gen.store.root import open_root
+
+SCENE = "U_Courtyard_1"
+
+
+def rows_of(smoke, table):
+    return shards.read_scene(smoke, table, SCENE).to_pylist()
+
+
+@pytest.fixture(scope="module")
+def claims(smoke, project):
+    row = rows_of(smoke, "scenes")[0]
+    scene = open_scene(mesh_file(open_root(smoke), row["mesh_path"]), row["mesh_sha256"]).scene
+    marks = [Landmark(id=m["landmark_id"], name=m["name"], node=m["mesh_node"]) for m in rows_of(smoke, "landmarks")]
+    return SceneClaims(Vocabulary(scene, load_catalogue(project / "scene_assets")), marks)
+
+
+@pytest.mark.pipeline
+def test_texts_make_true_claims_that_fit_nothing_else(smoke, claims):
+    objects = {row["object_id"]: row for row in rows_of(smoke, "objects")}
+    made = [row for row in rows_of(smoke, "descriptions") if row["level"] != WRITTEN]
+    for row in made:
+        item = objects[row["object_id"]]
+        i = claims.geometry.index[item["mesh_node"]]
+        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        said = [own[k] for k in row["claims"]]
+        assert all(claims.holds(claim, i) for claim in said), row["text"]
+        assert not claims.distractors(i, said), row["text"]
+        assert LENGTHS[row["level"]][0] <= len(row["text"].split()) <= LENGTHS[row["level"]][1]
+    texts = [row["text"] for row in made]
+    assert len(texts) == len(set(texts)) == 5 * len(objects)
+
+
+@pytest.mark.pipeline
+def test_every_object_has_texts_for_both_sides(smoke):
+    made = defaultdict(list)
+    for row in rows_of(smoke, "descriptions"):
+        if row["level"] != WRITTEN:
+            made[row["object_id"]].append(row["held_out"])
+    assert all(held.count(True) >= 1 and held.count(False) >= 3 for held in made.values())
+
+
+@pytest.mark.pipeline
+def test_parts_that_no_picture_shows_are_not_said(smoke, claims):
+    writer = Writer(claims, [], 1, "describe")
+    parts = 0
+    for item in rows_of(smoke, "objects"):
+        i = claims.geometry.index[item["mesh_node"]]
+        own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+        for text in writer.texts(i, own, set(), 5):
+            assert not any(own[k].kind == "part" for k in text.claims)
+        parts += sum(own[k].kind == "part" for text in writer.texts(i, own, None, 5) for k in text.claims)
+    assert parts > 0
+
+
+@pytest.mark.pipeline
+def test_a_scene_is_described_alike_each_time(smoke, claims):
+    def described():
+        writer = Writer(claims, ["a"], 3, "describe")
+        for item in rows_of(smoke, "objects"):
+            own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
+            yield writer.texts(claims.geometry.index[item["mesh_node"]], own, None, 5)
+
+    assert list(described()) == list(described())
+
+
+@pytest.mark.pipeline
+def test_tasks_have_a_text_of_their_target_and_side(smoke):
+    texts = {row["object_id"]: row["paraphrases"] for row in rows_of(smoke, "release/objects")}
+    for subset in ("train", "test"):
+        target = {row["nav_id"]: row["target_object_id"] for row in rows_of(smoke, f"routes/{subset}")}
+        for task in rows_of(smoke, f"tasks/{subset}"):
+            own = of_side(texts[target[task["nav_id"]]], held_out=subset == "test")
+            if task["modality"] == "semantic":
+                chosen = next(one for one in own if one["text"] == task["description"])
+                assert task["frame_seen_in_train"] == (not chosen["held_out"])
+            else:
+                assert task["description"] is None
+
+
+def test_a_text_by_a_person_stands_for_all_tasks():
+    made = [{"level": "normal", "held_out": held, "text": str(held)} for held in (True, False)]
+    assert [one["text"] for one in of_side(made, held_out=True)] == ["True"]
+    written = {"level": WRITTEN, "held_out": False, "text": "by hand"}
+    assert of_side([written, *made], held_out=True) == of_side([written, *made], held_out=False) == [written]
+    assert of_side(made[1:], held_out=True) == made[1:]
