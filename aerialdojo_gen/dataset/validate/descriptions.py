@@ -74,8 +74,11 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
     words = _words(data)
     instances = words.claims.scene.instances
     for row, i in _placed(words, rows):
+        made = {one["text"] for one in _made(rows, row) if one["claims"]}
         for column, text in (("name", rows.texts("name")[row] or ""), *_texts(rows, row)):
-            wrong = next(iter(words.matcher.faults(i, text)), "") or _recoloured(instances[i], text)
+            # What was made of claims is held to these, not read back.
+            wrong = "" if text in made else next(iter(words.matcher.faults(i, text)), "")
+            wrong = wrong or _recoloured(instances[i], text)
             if wrong := wrong or _turned(words, i, text):
                 yield Finding(row, f"{column} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break

@@ -27,7 +27,7 @@ PLACES = (
     Location(0, "place", "in the car park", "in the car park"),
     Location(1, "relation", "beside", "next to the kiosk", "the kiosk", "next to it", "beside it", True, 2),
     Location(2, "relation", "near", "near an oak", "an oak", "near it", "close by", False, 1),
-    Location(3, "relation", "between", "between a van and the hut", "a van and the hut", "between them", "", False, 1),
+    Location(3, "relation", "between", "between a van and the hut", "a van and the hut", "between them", lead=1),
     Location(4, "direction", "north", "north of the tower", "the tower", "north of it", "", True, 2),
 )
 DETAILS = (
