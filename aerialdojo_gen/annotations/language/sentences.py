@@ -14,8 +14,8 @@ from aerialdojo_gen.annotations.language.nouns import NounPhrase
 from aerialdojo_gen.annotations.language.subject import Wording
 
 _STARTS = re.compile(r"(^|[.?!] +)([a-zé])")
-_GOES_ON = re.compile(r"\{(?:a|the|np)\} [a-z]")
-_LONG_TAIL = 2  # words after the noun
+_GOES_ON = re.compile(r"\{(?:a|the|np)\} (?:[a-z]|\{ing\})")
+_WITH = re.compile(r"\},? with \{w\}")
 _OPENING = 2  # words that no other text of the object begins with
 # How often a kind of first sentence is used where there is something to say with it.
 _KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.2, "at_telling": 1.5}
@@ -110,11 +110,14 @@ def _slots(content: Content, rng: np.random.Generator) -> dict[str, str]:
 
 
 def _fits(frame: Frame, content: Content) -> bool:
-    """Whether a frame goes with the noun phrase and the verb: nothing is "with ..." twice."""
-    doubled = " with " in content.phrase.bare and ("} with {w}" in frame.text or ", with {w}" in frame.text)
-    # "A bird bath visited by a red bird has ..." reads as if the bird had it.
-    doubled = doubled or (len(content.phrase.tail.split()) > _LONG_TAIL and bool(_GOES_ON.search(frame.text)))
-    return not doubled and (bool(content.verb[1]) or "ing" not in frame.slots)
+    """Whether a frame goes with the noun phrase and the verb."""
+    if "ing" in frame.slots and not content.verb[1]:
+        return False
+    phrase = content.phrase
+    # Nothing is "with ..." twice, and no tail stands: "a planter with flowers standing by ...".
+    if phrase.tail or " with " in phrase.bare:
+        return not (_WITH.search(frame.text) or _GOES_ON.search(frame.text))
+    return True
 
 
 def _choose(pool: Sequence[Frame], rng: np.random.Generator) -> Frame | None:

@@ -53,8 +53,9 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
     own: list[str] = []
     for wording in ordered:
         if wording.adjectives:
-            word = wording.adjectives[int(rng.integers(len(wording.adjectives)))]
-            if word not in known:
+            words = wording.adjectives[int(rng.integers(len(wording.adjectives)))].split()
+            # "Light wooden" before "wooden pallets".
+            if word := " ".join(words[:-1] if words[-1] in known else words):
                 (whole if name.group and wording.key in OF_THE_WHOLE else own).append(word)
     tails = [w.tails[int(rng.integers(len(w.tails)))] for w in ordered if w.tails and not w.adjectives]
     return NounPhrase(name, tuple(whole), tuple(own), tails[0] if tails else "")

@@ -86,9 +86,9 @@ class Writer:
     def _content(self, about: About, plan: Plan, rng: np.random.Generator) -> Content:
         """Choose words for what a text says."""
         name = self._names.choose(about.instance.category, about.noun, rng, alone=not plan.adjectives)
-        # "Flies its flag" goes with no place.
+        # "Flies its flag" and "opens" go with few places.
         own = self._claims.vocabulary.words[about.i].verbs
-        verbs = [verb for verb in own if " " not in verb[0] or verb[0].startswith("is ")] or [("is", "")]
+        verbs = [v for v in own if v[0].startswith("is ") or not (" " in v[0] or v[0] == "opens")] or [("is", "")]
         other = len(verbs) > 1 and rng.random() > _USUAL_VERB
         verb = verbs[int(rng.integers(1, len(verbs))) if other else 0]
         return Content(
