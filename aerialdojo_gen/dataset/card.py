@@ -17,10 +17,11 @@ from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.dataset.contents import CARD, TABLES, check_release, counts, meaning, sizes, unit
 from aerialdojo_gen.dataset.croissant import CITE_AS
 from aerialdojo_gen.dataset.provenance import made_of_scenes, makers
-from aerialdojo_gen.dataset.stats.comparison import Comparison
+from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
 from aerialdojo_gen.dataset.stats.tables import Made
+from aerialdojo_gen.dataset.stats.variety import read_variety, variety_table
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -33,9 +34,15 @@ def _column_type(field: pa.Field) -> str:
     return kind + (", or null" if field.nullable else "")
 
 
-def _hf_type(field: pa.Field) -> str:
-    """Type of a column in the words of `datasets`; the pictures' bytes become pictures."""
-    return "image" if pa.types.is_binary(field.type) else str(field.type).replace("double", "float64")
+def _hf_type(kind: pa.DataType, indent: int = 4) -> str:
+    """Type of a column in the words of `datasets`, a key of YAML and its value; bytes become pictures."""
+    if pa.types.is_list(kind) and pa.types.is_struct(kind.value_type):
+        start = "\n" + " " * indent
+        fields = (f"{start}- name: {f.name}{start}  {_hf_type(f.type, indent + 2)}" for f in kind.value_type)
+        return "list:" + "".join(fields)
+    if pa.types.is_list(kind):
+        return f"list: {str(kind.value_type).replace('double', 'float64')}"
+    return f"dtype: {'image' if pa.types.is_binary(kind) else str(kind).replace('double', 'float64')}"
 
 
 def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
@@ -93,7 +100,7 @@ def _difficulty(tasks: pd.DataFrame) -> dict[str, str]:
     return {name: _rows(table) for name, table in made.items()} if "held_out" in made else {}
 
 
-def _rows(table: Comparison) -> str:
+def _rows(table: Comparison | Listing) -> str:
     """Give a table as Markdown without its heading."""
     return "\n".join(table.markdown()[2:]).rstrip()
 
@@ -142,6 +149,7 @@ def render_card(data: Where) -> str:
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),
         worth={table.title: _rows(table) for table in worth_tables(read_goals(root, names), tasks)},
+        variety=_rows(variety_table(measured)) if (measured := read_variety(root, names)) else "",
         least_detour=float(np.min(tasks["plan_detour"].to_numpy())) if len(tasks) else None,
         most_visible=float(np.max(tasks["target_visible_at_start"].to_numpy())) if len(tasks) else None,
         detour=DETOUR,

@@ -7,11 +7,15 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.base.text_table import Column, TextTable
+from aerialdojo_gen.annotations.language.grammar import LEVELS
+from aerialdojo_gen.base.rng import generator, rank
+from aerialdojo_gen.dataset.stats.comparison import Listing
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import Where, open_root
 
 _TOKEN = re.compile(r"[a-zé]+(?:['’-][a-zé]+)*|\d+")
 _OPENING, _LONGEST = 4, 4
@@ -139,6 +143,10 @@ def self_bleu(tokens: Sequence[Sequence[str]], owners: Sequence[object], sample:
     return float(np.exp(logs).mean()) if len(chosen) else 0.0
 
 
+_DEFINITION = (
+    "Frames: texts with slots for noun phrases, places, details. Openings: first four words that a text of another "
+    "object has. Self-BLEU-4: mean over 500 texts of different objects, each against the others."
+)
 _ROWS: tuple[tuple[str, Callable[[Variety], str]], ...] = (
     ("texts", lambda v: f"{v.texts:,}"),
     ("words", lambda v: f"{v.words:,}"),
@@ -154,8 +162,27 @@ _ROWS: tuple[tuple[str, Callable[[Variety], str]], ...] = (
 )
 
 
-def variety_table(measured: Mapping[str, Variety]) -> TextTable:
+def variety_table(measured: Mapping[str, Variety]) -> Listing:
     """Set measures of several sets of texts side by side."""
-    rows = [(label, [say(v) for v in measured.values()]) for label, say in _ROWS]
-    rows += [(f"pattern: {name}", [f"{v.patterns[name]:.1%}" for v in measured.values()]) for name in PATTERNS]
-    return TextTable("", [Column(name) for name in measured], rows, title="Variety of the texts")
+    rows = [(label, *(say(v) for v in measured.values())) for label, say in _ROWS]
+    rows += [(f"pattern: {name}", *(f"{v.patterns[name]:.1%}" for v in measured.values())) for name in PATTERNS]
+    return Listing("Variety of the descriptions", ("measure", *measured), tuple(rows), (_DEFINITION,))
+
+
+def read_variety(data: Where, scenes: Sequence[str]) -> dict[str, Variety]:
+    """Measure a release's descriptions: all, one an object, and by level; empty for a release without paraphrases."""
+    root = open_root(data)
+    found: list[tuple[tuple[str, int], dict[str, Any]]] = []
+    for scene in scenes:
+        rows = store.read_stored(root, "release/objects", scene, ("object_id", "paraphrases"))
+        if "paraphrases" in rows.column_names:
+            found += [((scene, row["object_id"]), text) for row in rows.to_pylist() for text in row["paraphrases"]]
+    # One an object: not the first of each, which are all of one level.
+    one = dict(sorted(found, key=lambda item: rank(0, "variety", *item[0], item[1]["text"])))
+    sets = {"all": found, "one an object": list(one.items())}
+    sets |= {level: [item for item in found if item[1]["level"] == level] for level in LEVELS}
+    return {
+        name: measure([text["text"] for _, text in some], [owner for owner, _ in some], [t["frame"] for _, t in some])
+        for name, some in sets.items()
+        if some
+    }
