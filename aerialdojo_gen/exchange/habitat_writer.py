@@ -35,6 +35,8 @@ LOST: Mapping[str, Sequence[str]] = {
     "routes": ["min_clearance_m", "goal_yaw_rad", *DIFFICULTY_COLUMNS],
     "objects": [
         "description",
+        "claims",
+        "paraphrases",
         "mesh_node",
         "size_x_m",
         "size_y_m",
