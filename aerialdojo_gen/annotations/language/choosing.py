@@ -60,7 +60,7 @@ class About:
         ]  # fmt: skip
         self.looks = {wording.index: wording for wording in said}
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
-        self.details = [w for w in said if w.details and min(len(d.split()) for d in w.details) <= _SHORT_DETAIL]
+        self.details = [w for w in said if w.details and _sayable(w)]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
         self.telling = cache(self._telling)
         self._fits = cache(lambda index, j: scene.holds(claims[index], j, DISTRACTOR_SLACK))
@@ -89,6 +89,12 @@ class About:
             ):
                 return True
         return False
+
+
+def _sayable(wording: Wording) -> bool:
+    """Whether a detail is neither long nor a bare number."""
+    lengths = [len(detail.split()) for detail in wording.details]
+    return min(lengths) > 1 and max(lengths) <= _SHORT_DETAIL
 
 
 def _named(claim: Claim) -> set[str]:

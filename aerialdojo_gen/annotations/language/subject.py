@@ -40,7 +40,8 @@ def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: st
             key = key or claim.kind
             phrases = phrases_of_value(key, value, category)
             details = tuple(p.removeprefix("with ") for p in phrases if p.startswith("with "))
-            tails = tuple(p for p in phrases if not p.startswith(("+", "with ")))
+            # "Drums, one of them toppled, by the gate": no sentence here has room for that.
+            tails = tuple(p for p in phrases if not p.startswith(("+", "with ", "one ")))
             found.append(Wording(index, key, tuple(p[1:] for p in phrases if p.startswith("+")), tails, details))
     return found
 
