@@ -89,8 +89,8 @@ def _evaluate(data: Path, workers: int) -> list[str]:
 
 # What `run` finds missing: the tables of a stage or of two, and what they own.
 _STAGES = (
-    ("scenes", "meshes"), ("landmarks", "objects", "chosen_anchors"), ("references",), ("pairs",), ("verdicts",),
-    ("release",), ("recordings", "frames", "media"), ("anchors",), ("plans",),
+    ("scenes", "meshes"), ("landmarks", "objects", "chosen_anchors"), ("references",), ("descriptions",), ("pairs",),
+    ("verdicts",), ("release",), ("recordings", "frames", "media"), ("anchors",), ("plans",),
 )  # fmt: skip
 
 

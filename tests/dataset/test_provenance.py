@@ -227,4 +227,4 @@ def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(da
     assert "to the paper's counts" not in card
 
 
-BEFORE = ("build-scenes", "annotate-import", "anchor-sample", "reference-images", "pair-objects")
+BEFORE = ("build-scenes", "annotate-import", "anchor-sample", "reference-images", "describe", "pair-objects")

@@ -44,7 +44,7 @@ def rows_of_objects():
         yield {
             "scene": SCENE, "object_id": i, "name": f"thing {i}", "category": "thing", "description": f"It is {i}.",
             "mesh_node": f"thing_{i:03}", "x_m": x, "y_m": y, "z_m": z, "size_x_m": 1.0, "size_y_m": 1.0,
-            "size_z_m": 1.0, "landmark_id": 0, "direction": "north",
+            "size_z_m": 1.0, "landmark_id": 0, "direction": "north", "claims": "[]",
         }  # fmt: skip
 
 
@@ -108,14 +108,21 @@ def data(tmp_path_factory):
             "scene": SCENE, "object_id": i, "reference_image": b"png",
             "box_u0_px": 1, "box_v0_px": 2, "box_u1_px": 30, "box_v1_px": 40, "image_fraction": 0.1,
             "reference_x_m": 1.0, "reference_y_m": 2.0, "reference_z_m": 3.0, "reference_yaw_rad": 0.5,
-            "step_back_m": 0.0, "tells_shown": None, "tells_missing": None,
+            "step_back_m": 0.0, "tells_shown": None, "tells_missing": None, "parts_shown": [],
         }
         for i in range(N_OBJECTS)
+    ]  # fmt: skip
+    descriptions = [
+        {
+            "scene": SCENE, "object_id": i, "paraphrase_id": k, "level": "normal", "text": f"It is {i}, text {k}.",
+            "claims": [0], "frame": f"it is {{np}}, text {k}", "held_out": k >= 3,
+        }
+        for i in range(N_OBJECTS) for k in range(5)
     ]  # fmt: skip
     for table, rows in {
         "scenes": [scene], "landmarks": [landmark], "objects": list(rows_of_objects()),
         "anchors": list(rows_of_anchors()), "viewpoints": [VIEWPOINT], "references": references,
-        "pairs": pairs, "plans": plans,
+        "descriptions": descriptions, "pairs": pairs, "plans": plans,
     }.items():  # fmt: skip
         spec = store.LAYOUT[table].spec
         store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
