@@ -18,7 +18,7 @@ _GOES_ON = re.compile(r"\{(?:a|the|np)\} (?:[a-z]|\{ing\})")
 _WITH = re.compile(r"\},? with \{w\}")
 _OPENING = 2  # words that no other text of the object begins with
 # How often a kind of first sentence is used where there is something to say with it.
-_KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.2, "at_telling": 1.5}
+_KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.0, "at_telling": 1.5}
 # "In front of the ..." begins a text more rarely than "by the ...": many would begin alike.
 _SHORT_LEAD, _RARELY = 2, 0.8
 _LONG = 8  # words of a place: what is longer ends its clause
