@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 from support import annotating
 from support.annotating import AUTHOR, YARD
 
+from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.scenes.model import Scene
@@ -67,7 +68,10 @@ def test_the_document_says_where_everything_is_as_the_task_will(client, desk):
     assert (van["name"], van["landmark"], van["direction"]) == ("red delivery van", "traffic light", "east")
     assert (van["lacks"], van["anchor"]) == ([], None)
     assert document["faults"] == []
-    assert [e["direction"] for e in document["objects"][:2]] == ["east", "northeast"]
+    (mark,) = document["landmarks"]
+    offsets = [np.subtract(e["position_m"], mark["position_m"]) for e in document["objects"]]
+    octants = [round(np.degrees(np.arctan2(y, x)) / 45.0) % 8 for x, y, _ in offsets]
+    assert [e["direction"] for e in document["objects"]] == [DIRECTIONS[k] for k in octants]
     answer = client.get("/api/document", headers={"If-None-Match": f'"{document["version"]}"'})
     assert (answer.status_code, answer.content) == (304, b"")
 
@@ -123,7 +127,7 @@ def test_the_checks_of_the_import_while_typing(client, desk):
     )
     own = desk.scene["delivery_van_000"].attributes["colour"]
     other = next(c for i in desk.scene.instances if (c := i.attributes.get("colour", own)) != own)
-    assert said(f"A {other} delivery van.") == [f"it is called {other!r}, and the mesh is not"]
+    assert said(f"A {other} delivery van.") == [f"{other!r} is not so of delivery_van_000"]
     assert any("full stop" in text for text in said("A red delivery van"))
     assert any("node names are not allowed" in text for text in said("The thing delivery_van_000."))
     # Two walls stand southeast of the traffic light.
