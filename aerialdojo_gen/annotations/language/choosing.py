@@ -56,6 +56,7 @@ class About:
         self.noun = scene.vocabulary.nouns[i].name
         said = [
             w for w in wordings_of(claims, looks, self.instance.category)
+            if w.adjectives or w.tails or w.details
             if w.key != "part" or _seen(looks, claims[w.index].key, shown)
         ]  # fmt: skip
         self.looks = {wording.index: wording for wording in said}
@@ -114,7 +115,8 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         chance = (_COLOUR if wording.key == "colour" else _VALUE)[level]
         keys = {w.key for w in plan.adjectives}
         # One phrase after the noun is enough, and of "brown wooden" one word.
-        again = (wording.tails and any(w.tails for w in plan.adjectives)) or {wording.key, *keys} >= _ONE_OF
+        again = not wording.adjectives and any(not w.adjectives for w in plan.adjectives)
+        again = again or {wording.key, *keys} >= _ONE_OF
         if rng.random() < chance and not again:
             plan.adjectives.append(wording)
     ranked = _ranked(about, level, used, rng)
@@ -135,7 +137,9 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
     spare = [w for w in about.details if w.index not in plan.indices]
     if rng.random() < _MORE_DETAILS[level] and spare and not plan.details:
         _add(plan, about, spare[int(rng.integers(len(spare)))].index, rng)
-    return plan if plan.places else None
+    # Of two phrases after the noun, one would not be said.
+    tails = sum(not wording.adjectives for wording in plan.adjectives)
+    return plan if plan.places and tails <= 1 else None
 
 
 def _ranked(about: About, level: str, used: Collection[int], rng: np.random.Generator) -> list[int]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
-from aerialdojo_gen.annotations.language.nouns import Names, NounPhrase
+from aerialdojo_gen.annotations.language.nouns import Names, noun_phrase
 from aerialdojo_gen.annotations.language.relation_words import relation_words
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
@@ -83,7 +83,7 @@ class LocationWords:
         k = self._claims.geometry.index[mention.node]
         name = self._names.choose(instances[k].category, mention.noun, rng, alone=not mention.said)
         said = tuple(word for word in mention.said if word not in name.text.split())
-        phrase = NounPhrase(name, own=said)
+        phrase = noun_phrase(name, said)
         if mention.unique:
             return phrase.the
         alike = instances[k].category == instances[i].category

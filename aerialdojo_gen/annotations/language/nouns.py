@@ -20,11 +20,13 @@ LEADING = frozenset(
     {"broken", "overturned", "fallen", "burnt-out", "ruined", "collapsed", "abandoned", "torn", "wrecked"}
 )
 # First words of names that no other adjective goes before: "a red big motorbike".
-SIZES = frozenset(
-    {"big", "large", "great", "small", "little", "tall", "high", "long", "short", "low", "wide", "old", "wee"}
-)
+SIZES = frozenset({
+    "big", "large", "great", "giant", "huge", "small", "little", "tall", "high", "long", "short", "low", "wide",
+    "slim", "old", "wee",
+})  # fmt: skip
 # Adjectives that stay before the collective: "a tall stack of grey pallets".
-OF_THE_WHOLE = frozenset({"size"})
+_OF_THE_WHOLE = frozenset({"tall", "high", "low", "short", "long", "thick", "thin", "fat", "slim"})
+_NUMBERS = frozenset({"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"})
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,13 @@ class NounPhrase:
     def the(self) -> str:
         """With the definite article."""
         return f"the {self.bare}"
+
+
+def noun_phrase(name: Name, adjectives: Sequence[str], tail: str = "") -> NounPhrase:
+    """Put adjectives in their places: those of the whole before the collective, numbers before the others."""
+    whole = tuple(word for word in adjectives if name.group and word in _OF_THE_WHOLE)
+    own = sorted((word for word in adjectives if word not in whole), key=lambda word: word.split()[0] not in _NUMBERS)
+    return NounPhrase(name, whole, tuple(own), tail)
 
 
 def name_of(text: str) -> Name:

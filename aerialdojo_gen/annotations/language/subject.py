@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim
-from aerialdojo_gen.annotations.language.nouns import OF_THE_WHOLE, Name, NounPhrase
+from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, noun_phrase
 from aerialdojo_gen.annotations.phrases import phrases_of_value
+from aerialdojo_gen.scenes.colours import COLOURS
 from aerialdojo_gen.scenes.looks import Look
 
+# Small words, which may be said again; so may colours.
+_SMALL = re.compile(r"an?|the|and|or|of|on|in|at|to|by|for|from|with|without|over|under|its?|them|no|up|out|off")
 _ORDER = ("size", "state", "pattern", "shape", "colour", "material")
 
 
@@ -33,8 +37,8 @@ def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: st
     for index, claim in enumerate(claims):
         if claim.kind == "part":
             look = looks.get(claim.key)
-            also = (look.also, look.adjectives, look.clauses) if look is not None else ((), (), ())
-            found.append(Wording(index, "part", also[1], (), (claim.key, *also[0]), also[2]))
+            said = (look.details, look.adjectives, look.clauses) if look is not None else ((claim.key,), (), ())
+            found.append(Wording(index, "part", said[1], (), said[0], said[2]))
         elif claim.kind in ("colour", "size", "attribute"):
             key, _, value = claim.key.rpartition("=")
             key = key or claim.kind
@@ -50,13 +54,23 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
     """Make the noun phrase that says these adjectives and tails, in English order."""
     known = set(name.text.split())
     ordered = sorted(said, key=lambda w: _ORDER.index(w.key) if w.key in _ORDER else 1)
-    whole: list[str] = []
-    own: list[str] = []
-    for wording in ordered:
-        if wording.adjectives:
-            words = wording.adjectives[int(rng.integers(len(wording.adjectives)))].split()
-            # "Light wooden" before "wooden pallets".
-            if word := " ".join(words[:-1] if words[-1] in known else words):
-                (whole if name.group and wording.key in OF_THE_WHOLE else own).append(word)
-    tails = [w.tails[int(rng.integers(len(w.tails)))] for w in ordered if w.tails and not w.adjectives]
-    return NounPhrase(name, tuple(whole), tuple(own), tails[0] if tails else "")
+    adjectives: list[str] = []
+    tail = ""
+    # One phrase fits after the noun: that of what has no adjective goes first.
+    for wording in sorted(ordered, key=lambda w: bool(w.adjectives)):
+        after = fresh(wording.tails, name.text) or (() if wording.adjectives else wording.tails)
+        options = [*wording.adjectives, *(() if tail else after)]
+        chosen = options[int(rng.integers(len(options)))] if options else ""
+        if chosen in wording.tails:
+            tail = chosen
+            continue
+        words = chosen.split()
+        # "Light wooden" before "wooden pallets".
+        adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
+    return noun_phrase(name, [word for word in adjectives if word], tail)
+
+
+def fresh(phrases: Sequence[str], said: str) -> tuple[str, ...]:
+    """Return those of some phrases that say no word of a text again, small words and colours apart."""
+    known = {word.removesuffix("s") for word in said.split() if word not in COLOURS and not _SMALL.fullmatch(word)}
+    return tuple(phrase for phrase in phrases if not known & {word.removesuffix("s") for word in phrase.split()})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from aerialdojo_gen.annotations.language.choosing import About, Plan, choose
 from aerialdojo_gen.annotations.language.locations import LocationWords
 from aerialdojo_gen.annotations.language.nouns import Names
 from aerialdojo_gen.annotations.language.sentences import Content, compose
-from aerialdojo_gen.annotations.language.subject import phrase_of
+from aerialdojo_gen.annotations.language.subject import fresh, phrase_of
 from aerialdojo_gen.base.rng import generator
 
 # Words of a text, by level.
@@ -74,7 +74,8 @@ class Writer:
             plan = choose(about, own, used, rng)
             if plan is None:
                 continue
-            composed = compose(self._content(about, plan, rng), held_out, starts, rng)
+            content = self._content(about, plan, rng)
+            composed = None if content is None else compose(content, held_out, starts, rng)
             if composed is None:
                 continue
             text, frame, held = composed
@@ -83,21 +84,29 @@ class Writer:
                 return Text(own, text, tuple(sorted(plan.indices)), frame, held)
         return None
 
-    def _content(self, about: About, plan: Plan, rng: np.random.Generator) -> Content:
-        """Choose words for what a text says."""
+    def _content(self, about: About, plan: Plan, rng: np.random.Generator) -> Content | None:
+        """Choose words for what a text says; None if a detail would only say again what the noun phrase does."""
         name = self._names.choose(about.instance.category, about.noun, rng, alone=not plan.adjectives)
         # "Flies its flag" and "opens" go with few places.
         own = self._claims.vocabulary.words[about.i].verbs
         verbs = [v for v in own if v[0].startswith("is ") or not (" " in v[0] or v[0] == "opens")] or [("is", "")]
         other = len(verbs) > 1 and rng.random() > _USUAL_VERB
         verb = verbs[int(rng.integers(1, len(verbs))) if other else 0]
+        phrase = phrase_of(name, plan.adjectives, rng)
+        said = phrase.bare
+        details = [
+            (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.telling(w.index))
+            for w in plan.details
+        ]
+        if not all(wording.details for wording, _ in details):
+            return None
         return Content(
             plan.level,
-            phrase_of(name, plan.adjectives, rng),
+            phrase,
             # A hunting stand does not stand.
             ("is", "") if verb[0].removesuffix("s") in name.text.split() else verb,
             [self._locations.of(about.i, k, about.claims[k], plan.level, rng) for k in plan.places],
-            [(wording, about.telling(wording.index)) for wording in plan.details],
+            details,
         )
 
 

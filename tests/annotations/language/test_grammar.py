@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.annotations.language.grammar import SLOTS, expand, frames
 from aerialdojo_gen.annotations.language.locations import Location
-from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of
+from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of, noun_phrase
 from aerialdojo_gen.annotations.language.relation_words import relation_words
 from aerialdojo_gen.annotations.language.sentences import Content, compose
-from aerialdojo_gen.annotations.language.subject import Wording
+from aerialdojo_gen.annotations.language.subject import Wording, phrase_of
 from aerialdojo_gen.annotations.language.writer import LENGTHS
 from aerialdojo_gen.annotations.phrases import article
 
@@ -66,10 +66,18 @@ def test_alternatives_nest():
 
 
 def test_a_collective_keeps_its_adjectives_at_its_things():
-    phrase = NounPhrase(name_of("stack of fish crates"), whole=("tall",), own=("white",))
-    assert phrase.a == "a tall stack of white fish crates"
+    phrase = noun_phrase(name_of("stack of fish crates"), ["white", "tall", "five"])
+    assert phrase.a == "a tall stack of five white fish crates"
     assert NounPhrase(name_of("overturned car"), own=("red",)).a == "an overturned red car"
     assert NounPhrase(Name("SUV"), tail="full of soil").a == "an SUV full of soil"
+
+
+def test_a_noun_phrase_says_no_word_twice_and_all_that_can_only_stand_after_it():
+    cone = Wording(0, "shape", tails=("clipped into a cone", "shaped like a cone"))
+    forms = Wording(1, "state", adjectives=("potted",), tails=("in a pot",))
+    for seed in range(20):
+        phrase = phrase_of(name_of("clipped evergreen"), [forms, cone], np.random.default_rng(seed))
+        assert phrase.a == "a potted clipped evergreen shaped like a cone"
 
 
 def test_relations_have_words_whatever_their_conditions():
