@@ -191,7 +191,7 @@ class Draft:
         """Offer a place for one thing; `kind` is one of the type's slots."""
         self._slots.append(Slot(kind, round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1), room_m, on, settle_m))
 
-    def furnish(self) -> None:
+    def fill_slots(self) -> None:
         """Deal the type's things to the slots, and write them: what has no room in the built scene is left out."""
         used: Counter[tuple[str, str]] = Counter()
         rows: dict[tuple[str, float | str | None, float | None], list[Any]] = {}

@@ -1,4 +1,4 @@
-"""Stages that open country shares: winding ways, relief, clearings, slots in the wild and trees about them."""
+"""Stages that open country shares: winding ways, relief, clearings, slots in the open and trees about them."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def write(draft: Draft) -> None:
     if not draft.landmarks:
         raise NoRoomError("no room for a landmark")
     strewn(draft, "wood", 44, (4.0, 4.0))
-    draft.furnish()
+    draft.fill_slots()
     draft.section("The wood")
     wood(draft, [-w + 1.5, -d + 1.5, w - 1.5, d - 1.5], draft.knob("trees"))
 

@@ -42,7 +42,7 @@ def write(draft: Draft) -> None:
     draft.landmark(spots)
     if not draft.landmarks:
         raise NoRoomError("no room for a landmark")
-    draft.furnish()
+    draft.fill_slots()
 
 
 def _buildings(draft: Draft, lot: Box) -> Box:
