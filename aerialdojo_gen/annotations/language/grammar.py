@@ -47,7 +47,7 @@ def frames(section: str, kind: str) -> tuple[Frame, ...]:
     held = set(by_hash[: -(-len(by_hash) // _HELD_OUT_OF)])
     found: list[Frame] = []
     for template in templates:
-        texts = list(dict.fromkeys(expand(template)))
+        texts = list(dict.fromkeys(" ".join(text.split()) for text in expand(template)))
         unknown = {slot for text in texts for slot in _SLOT.findall(text)} - SLOTS
         if unknown:
             raise AnnotationError(f"{path}: {template!r}: no slot {{{sorted(unknown)[0]}}}")
