@@ -67,7 +67,9 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
         words = chosen.split()
         # "Light wooden" before "wooden pallets".
         adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
-    return noun_phrase(name, [word for word in adjectives if word], tail)
+    # "Five round" says "round" as well.
+    kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
+    return noun_phrase(name, kept, tail)
 
 
 def fresh(phrases: Sequence[str], said: str) -> tuple[str, ...]:

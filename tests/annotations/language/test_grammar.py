@@ -78,6 +78,9 @@ def test_a_noun_phrase_says_no_word_twice_and_all_that_can_only_stand_after_it()
     for seed in range(20):
         phrase = phrase_of(name_of("clipped evergreen"), [forms, cone], np.random.default_rng(seed))
         assert phrase.a == "a potted clipped evergreen shaped like a cone"
+    bales = [Wording(0, "load", adjectives=("five round",)), Wording(1, "part", adjectives=("round",))]
+    phrase = phrase_of(name_of("stack of hay bales"), bales, np.random.default_rng(0))
+    assert phrase.a == "a stack of five round hay bales"
 
 
 def test_relations_have_words_whatever_their_conditions():
