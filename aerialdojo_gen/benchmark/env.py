@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
-from aerialdojo_gen.benchmark.observations import GoalText, mosaic, render_views
+from aerialdojo_gen.benchmark.observations import GoalText, mosaic, observed_goal, render_views
 from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
 from aerialdojo_gen.benchmark.tasks import (
     MODALITIES,
@@ -324,17 +324,18 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         return self._index[task_id]
 
     def _observations(self) -> spaces.Dict:
-        # Over all tasks, so that the space reveals nothing about the current one.
+        """Make the space over all tasks, so that it reveals nothing about the current one."""
         said = {name: {text for text in pc.unique(self._rows[name]).to_pylist() if text} for name in _TEXT}
         if self._paraphrase != "task":
             said["description"] |= {text for *_, text in self.told() if text}
-        longest = {name: max(map(len, texts), default=1) for name, texts in said.items()}
-        texts = set().union(*said.values())
-        characters = "".join(sorted(set(string.printable).union(*texts)))
+        characters = "".join(sorted(set(string.printable).union(*(text for some in said.values() for text in some))))
         goal: dict[str, spaces.Space[Any]] = {
             "modality": spaces.Discrete(len(MODALITIES)),
             "direction": spaces.Discrete(len(DIRECTIONS)),
-            **{name: GoalText(longest[name], min_length=0, charset=characters) for name in _TEXT},
+            **{
+                name: GoalText(max(map(len, said[name]), default=1), min_length=0, charset=characters)
+                for name in _TEXT
+            },
         }
         if self._image_shape is not None:
             goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
@@ -349,11 +350,10 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             "refused": spaces.Discrete(2),
             "goal": spaces.Dict(goal),
         }
-        picture = spaces.Box(0, 255, (s.height, s.width, 3), np.uint8)
-        depth = spaces.Box(0.0, s.max_depth_m, (s.height, s.width), np.float32)
         if s.views and s.rgb:
-            entries["rgb"] = spaces.Dict(dict.fromkeys(s.views, picture))
+            entries["rgb"] = spaces.Dict(dict.fromkeys(s.views, spaces.Box(0, 255, (s.height, s.width, 3), np.uint8)))
         if s.views and s.depth:
+            depth = spaces.Box(0.0, s.max_depth_m, (s.height, s.width), np.float32)
             entries["depth_m"] = spaces.Dict(dict.fromkeys(s.views, depth))
         return spaces.Dict(entries)
 
@@ -364,31 +364,13 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         row = self._rows.slice(at, 1).to_pylist()[0]
         return reference_image(self._data, row["scene"], row["reference_image_id"]).shape
 
-    def _observed_goal(self) -> dict[str, Any]:
-        # A new copy each time, as callers may change it.
-        goal = self._flight.goal
-        seen: dict[str, Any] = {
-            "modality": np.int64(MODALITIES.index(goal.modality)),
-            "target_name": goal.target_name,
-            "landmark": goal.landmark,
-            "direction": np.int64(DIRECTIONS.index(goal.direction)),
-            "description": goal.description or "",
-        }
-        if goal.heading is not None:
-            seen["heading"] = np.int64(DIRECTIONS.index(goal.heading.direction))
-            seen["heading_deg"] = np.array([goal.heading.heading_deg], np.int32)
-        if self._image_shape is not None:
-            seen["image"] = np.zeros(self._image_shape, np.uint8) if goal.image is None else goal.image.copy()
-            seen["image_distance_m"] = np.array([goal.image_distance_m or 0.0], np.float32)
-        return seen
-
     def _observe(self) -> dict[str, Any]:
         seen = self._flight.observe()
         observation: dict[str, Any] = {
             "step": np.array([seen.step], np.int32),
             "remaining_actions": np.array([seen.remaining_actions], np.int32),
             "refused": np.int64(seen.refused),
-            "goal": self._observed_goal(),
+            "goal": observed_goal(self._flight.goal, self._image_shape),
         }
         if "rgb" in self.observation_space.spaces:
             observation["rgb"] = seen.rgb

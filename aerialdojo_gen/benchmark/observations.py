@@ -12,11 +12,13 @@ from gymnasium.vector.utils import read_from_shared_memory
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
-from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.agents.goal import Goal, Sensors
+from aerialdojo_gen.benchmark.tasks import MODALITIES
 from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, scene_renderer
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.schemas import DIRECTIONS
 
 Pictures = dict[str, NDArray[np.uint8]]
 Depths = dict[str, NDArray[np.float32]]
@@ -24,6 +26,24 @@ Depths = dict[str, NDArray[np.float32]]
 
 # The process that has used OpenGL. A fork of it would wait for ever for threads that it does not have.
 _opengl_process: list[int] = []
+
+
+def observed_goal(goal: Goal, image_shape: tuple[int, ...] | None) -> dict[str, Any]:
+    """Return a goal as the environment's observations hold it; a new copy each time, as callers may change it."""
+    seen: dict[str, Any] = {
+        "modality": np.int64(MODALITIES.index(goal.modality)),
+        "target_name": goal.target_name,
+        "landmark": goal.landmark,
+        "direction": np.int64(DIRECTIONS.index(goal.direction)),
+        "description": goal.description or "",
+    }
+    if goal.heading is not None:
+        seen["heading"] = np.int64(DIRECTIONS.index(goal.heading.direction))
+        seen["heading_deg"] = np.array([goal.heading.heading_deg], np.int32)
+    if image_shape is not None:
+        seen["image"] = np.zeros(image_shape, np.uint8) if goal.image is None else goal.image.copy()
+        seen["image_distance_m"] = np.array([goal.image_distance_m or 0.0], np.float32)
+    return seen
 
 
 def renderer_for(scene: Scene, name: str) -> Renderer:
