@@ -58,7 +58,7 @@ def kerb_slots(draft: Draft, ways: Sequence[Way], keep_free: Sequence[BaseGeomet
                     draft.slot("kerb", x, y, yaw, (1.7, 4.6))
                 x, y, yaw = pose_on(way.line, at, side, LANE_M / 2)
                 if k % 2 and not any(one.contains(shapely.Point(x, y)) for one in others):
-                    draft.slot("road", x, y, yaw + side * 90.0 + 180.0, (11.0, 3.1))
+                    draft.slot("road", x, y, yaw - 90.0, (11.0, 3.1))
 
 
 def plot(draft: Draft, way: Way, at_m: float, side: int, size_m: tuple[float, float]) -> Plot | None:
