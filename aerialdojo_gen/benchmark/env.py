@@ -27,8 +27,8 @@ from aerialdojo_gen.benchmark.tasks import (
     Task,
     TaskSampler,
     check_tell,
+    image_shape,
     read_tasks,
-    reference_image,
     select,
 )
 from aerialdojo_gen.dataset.episode import Episode
@@ -152,7 +152,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self._draw = TaskSampler(self._rows["scene"].to_pylist(), episodes_per_scene)
         self._prefetch = prefetch
         self._index: dict[str, int] | None = None
-        self._image_shape = self._find_image_shape()
+        self._image_shape = image_shape(self._data, self._rows)
         self.action_space = spaces.Discrete(N_ACTIONS)
         self.observation_space: spaces.Dict = self._observations()
 
@@ -356,13 +356,6 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             depth = spaces.Box(0.0, s.max_depth_m, (s.height, s.width), np.float32)
             entries["depth_m"] = spaces.Dict(dict.fromkeys(s.views, depth))
         return spaces.Dict(entries)
-
-    def _find_image_shape(self) -> tuple[int, ...] | None:
-        at = pc.index(pc.is_valid(self._rows["reference_image_id"]), True).as_py()
-        if at < 0:
-            return None
-        row = self._rows.slice(at, 1).to_pylist()[0]
-        return reference_image(self._data, row["scene"], row["reference_image_id"]).shape
 
     def _observe(self) -> dict[str, Any]:
         seen = self._flight.observe()

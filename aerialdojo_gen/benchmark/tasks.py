@@ -274,6 +274,15 @@ def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) 
 
 
 @lru_cache(maxsize=256)
+def image_shape(root: DataRoot, rows: pa.Table) -> tuple[int, ...] | None:
+    """Return the shape of the goals' pictures of tasks; None where no goal is a picture."""
+    at = pc.index(pc.is_valid(rows["reference_image_id"]), True).as_py()
+    if at < 0:
+        return None
+    row = rows.slice(at, 1).to_pylist()[0]
+    return reference_image(root, row["scene"], row["reference_image_id"]).shape
+
+
 def reference_image(root: DataRoot, scene: str, image_id: str) -> NDArray[np.uint8]:
     """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only.
 
