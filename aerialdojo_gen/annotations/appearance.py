@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.scenes.claims import false_claims
 from aerialdojo_gen.scenes.colours import colour_name, shown_colours
-from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
 
@@ -100,34 +97,10 @@ def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, M
     return [word for word in words if sum(shares.get(name, 0.0) for name in SHADES[word]) < least]
 
 
-Looks = Mapping[str, tuple[Look, ...]]
 # Attributes that do not name a part.
 _NOT_PARTS = frozenset({"colour", "size", "material", "place"})
 _STEM = 4
 _STOP_WORDS = frozenset({"a", "an", "the", "of", "on", "in", "its", "it", "and", "with", "without", "around", "full"})
-
-
-def false_phrases(
-    text: str, instance: Instance, looks: Looks, materials: Mapping[str, Material], surface: Surface | None = None
-) -> Iterator[str]:
-    """Yield the catalogue's phrases in a text that are false for its instance, or about hidden parts."""
-    normalized = _normalize(text)
-    for look in looks.get(instance.category, ()):
-        said = [phrase for phrase in look.details if f" {_normalize(phrase).strip()} " in normalized]
-        if said:
-            wrong = false_claims(look, instance, materials)[:1]
-            if not wrong and surface is not None and not surface.shows(look, instance):
-                wrong = ["that is under the ground or under water"]
-            for claim in wrong:
-                yield f"{said[0]!r} is not so of {instance.node}: {claim}"
-
-
-def false_colours(text: str, instance: Instance, materials: Mapping[str, Material]) -> Iterator[str]:
-    """Yield the colours of an instance's attribute in a text that its surface does not have."""
-    value = instance.attributes.get("colour", "")
-    if value and f" {_normalize(value).strip()} " in _normalize(text):
-        for word in unsupported_colours(value, instance, materials):
-            yield f"{word!r} is not the colour of {instance.node}: hardly any of its surface is"
 
 
 def repeats(say: str, instance: Instance) -> bool:

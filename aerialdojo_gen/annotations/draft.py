@@ -1,28 +1,27 @@
-"""Draft annotation files for a person to review, and redraft the descriptions of existing ones.
+"""Draft annotation files for a person to review.
 
-Objects are chosen category by category in turn. Each is described by its attributes, its category's looks and as
-many facts about its surroundings as tell it from its distractors. Every draft passes the checks of `annotate-import`.
+Objects are chosen category by category in turn, as far as their claims tell them from their distractors; the stage
+`describe` writes their texts. Every draft passes the checks of `annotate-import`.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from aerialdojo_gen.annotations.ambiguity import Ambiguity
-from aerialdojo_gen.annotations.describing import STAGE, DescriptionWriter
-from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
+from aerialdojo_gen.annotations.claims import SceneClaims
+from aerialdojo_gen.annotations.format import Landmark, Object
 from aerialdojo_gen.annotations.landmarks import spread_m
+from aerialdojo_gen.annotations.language.writer import Writer
+from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import rank
-from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.model import Instance
 
+STAGE = "annotate-draft"
 _ELEVATED_M = 3.0
 MAX_PER_CATEGORY = 5
 SCENERY = "of ground, slabs or scraps"
@@ -49,7 +48,7 @@ class DraftOptions:
 
 
 class AnnotationDrafter:
-    """Chooses and describes the objects of a scene."""
+    """Chooses the objects of a scene."""
 
     def __init__(self, vocabulary: Vocabulary, landmarks: tuple[Landmark, ...], options: DraftOptions) -> None:
         self._vocabulary, self._scene, self._seed, self._options = vocabulary, vocabulary.scene, options.seed, options
@@ -57,10 +56,11 @@ class AnnotationDrafter:
         self.landmarks = landmarks
         self.rejections: Counter[str] = Counter()
         self.confusions: list[tuple[str, Sequence[str]]] = []
-        self._writer = DescriptionWriter(vocabulary, landmarks, options.seed)
-        ambiguity = self._writer.ambiguity
-        candidates = [k for k, w in enumerate(vocabulary.words) if w.target and k not in ambiguity.landmarks]
-        self.things = tuple(k for k in candidates if self._has_direction(k, ambiguity))
+        self._claims = SceneClaims(vocabulary, landmarks)
+        self._matcher = Matcher(self._claims)
+        self._writer = Writer(self._claims, [mark.name for mark in landmarks], options.seed, STAGE)
+        candidates = [k for k, w in enumerate(vocabulary.words) if w.target and k not in self._claims.landmarks]
+        self.things = tuple(k for k in candidates if self._has_direction(k))
         scenery = sum(not w.target for w in vocabulary.words) if self._scene.imported else 0
         self.rejections.update({_NO_DIRECTION: len(candidates) - len(self.things), SCENERY: scenery})
 
@@ -86,11 +86,10 @@ class AnnotationDrafter:
         return f" ({text})" if text else ""
 
     def objects(self, n: int, on_chosen: Callable[[], object] = lambda: None) -> tuple[Object, ...]:
-        """Choose and describe up to `n` objects, round-robin over categories; calls `on_chosen` for each."""
-        ambiguity = self._writer.ambiguity
-        taken: dict[int, str] = {}
+        """Choose up to `n` objects, round-robin over categories; calls `on_chosen` for each."""
+        taken: list[int] = []
         everywhere = self._queues()
-        core = {c: [i for i in queue if self._in_core(i, ambiguity)] for c, queue in everywhere.items()}
+        core = {c: [i for i in queue if self._in_core(i)] for c, queue in everywhere.items()}
         rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
         elevated = {c: [i for i in queue if self._is_elevated(i)] for c, queue in core.items()}
         low = {c: [i for i in queue if i not in elevated[c]] for c, queue in core.items()}
@@ -117,20 +116,19 @@ class AnnotationDrafter:
                 id=k,
                 name=self._nouns[i].short,
                 category=self._scene.instances[i].category,
-                description=taken[i],
                 node=self._scene.instances[i].node,
             )
             for k, i in enumerate(sorted(taken))
         )
 
-    def _count(self, category: str, taken: dict[int, str]) -> int:
+    def _count(self, category: str, taken: list[int]) -> int:
         return sum(self._scene.instances[i].category == category for i in taken)
 
     def _limit(self, category: str) -> int:
         vegetation = self._kinds.get(category) == "vegetation"
         return self._options.max_vegetation if vegetation else self._options.max_per_category or MAX_PER_CATEGORY
 
-    def _is_full(self, category: str, taken: dict[int, str]) -> bool:
+    def _is_full(self, category: str, taken: list[int]) -> bool:
         return self._count(category, taken) >= self._limit(category)
 
     def _queues(self) -> dict[str, list[int]]:
@@ -140,25 +138,25 @@ class AnnotationDrafter:
             queues.setdefault(self._scene.instances[i].category, []).append(i)
         return {c: queues[c] for c in sorted(queues, key=lambda c: (rank(self._seed, STAGE, self._scene.name, c), c))}
 
-    def _has_direction(self, i: int, ambiguity: Ambiguity) -> bool:
+    def _has_direction(self, i: int) -> bool:
         middle = self._scene.instances[i].centroid
         inside = np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])
-        return bool(inside) and ambiguity.bearings[i] is not None
+        return bool(inside) and self._claims.bearings[i] is not None
 
     def _is_elevated(self, i: int) -> bool:
         return float(self._scene.instances[i].bounds[0, 2]) >= _ELEVATED_M
 
-    def _in_core(self, i: int, ambiguity: Ambiguity) -> bool:
+    def _in_core(self, i: int) -> bool:
         if self._options.core_radius_m is None:
             return True
         centre = self._options.centre_m
         if centre is None:
-            x, y = ambiguity.geometry.centres[list(ambiguity.landmarks), :2].mean(axis=0)
+            x, y = self._claims.geometry.centres[list(self._claims.landmarks), :2].mean(axis=0)
             centre = float(x), float(y)
-        away = ambiguity.geometry.centres[i, :2] - np.asarray(centre)
+        away = self._claims.geometry.centres[i, :2] - np.asarray(centre)
         return float(np.hypot(*away)) <= self._options.core_radius_m
 
-    def _take_next(self, queue: list[int], taken: dict[int, str]) -> bool:
+    def _take_next(self, queue: list[int], taken: list[int]) -> bool:
         """Move one instance from a category's queue to the objects, dropping invalid ones; False if none is left."""
         instances = self._scene.instances
         while queue:
@@ -173,49 +171,23 @@ class AnnotationDrafter:
                 ),
             )
             queue.remove(best)
-            why, text = self._try_describe(best, instances[best], taken)
+            why = self._reject(best, instances[best])
             if why:
                 self.rejections[why] += 1
             else:
-                taken[best] = text
+                taken.append(best)
                 return True
         return False
 
-    def _try_describe(self, i: int, instance: Instance, taken: dict[int, str]) -> tuple[str, str]:
+    def _reject(self, i: int, instance: Instance) -> str:
+        """Return why an instance cannot be an object; empty if it can."""
         why = self._options.reject(instance.node) if self._options.reject else ""
         if why:
-            return why, ""
-        noun = self._nouns[i]
-        if self._writer.is_true_name(i, noun.short):
-            text = self._writer.describe(i, set(taken.values()))
-            if text is not None:
-                return "", text
-        distractors = self._writer.ambiguity.distractors(i, f"Look for {noun.a()}.")
-        self.confusions.append((instance.node, [self._scene.instances[j].node for j in distractors]))
-        return _INDISTINGUISHABLE, ""
-
-
-def redraft_annotations(scene: Scene, catalogue: Catalogue, annotations: Annotations, seed: int) -> Annotations:
-    """Redraft the descriptions of existing objects; their ids, nodes and valid names stay."""
-    for node in (*(m.node for m in annotations.landmarks), *(o.node for o in annotations.objects)):
-        if node not in scene:
-            raise AnnotationError(f"{scene.name}: no node {node!r} in the scene: draft the file again")
-    vocabulary = Vocabulary(scene, catalogue)
-    writer = DescriptionWriter(vocabulary, sorted(annotations.landmarks, key=lambda mark: mark.id), seed)
-    index = writer.ambiguity.geometry.index
-    objects: list[Object] = []
-    for entry in annotations.objects:
-        i = index[entry.node]
-        own, kind = vocabulary.nouns[i].short, scene[entry.node].category
-        # A changed layout may have swapped instances: a name that fits another one is replaced.
-        others = {n.short for n, it in zip(vocabulary.nouns, scene.instances, strict=True) if it.category == kind}
-        valid = entry.name not in others - {own} and writer.is_true_name(i, entry.name)
-        name = entry.name if valid else own
-        text = writer.describe(i, {other.description or "" for other in objects}, name)
-        if text is None:
-            raise AnnotationError(
-                f"{scene.name}: {entry.node} (object {entry.id}) cannot be distinguished from others of its "
-                f"category: choose another object ({command('annotate', scene=scene.name)})"
-            )
-        objects.append(entry.model_copy(update={"name": name, "category": kind, "description": text}))
-    return replace(annotations, objects=tuple(objects))
+            return why
+        name, claims = self._nouns[i].short, self._claims.of(i)
+        # Without a phrase about parts, which its pictures may not show.
+        if not self._matcher.faults(i, name) and self._writer.texts(i, claims, (), 1):
+            return ""
+        others = self._claims.distractors(i, claims) or self._claims.candidates(i)
+        self.confusions.append((instance.node, [self._scene.instances[j].node for j in others]))
+        return _INDISTINGUISHABLE

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aerialdojo_gen.annotations.appearance import false_colours, false_phrases, repeats, unsupported_colours
+from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.head_noun import NounChecker
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import valid_looks
@@ -47,7 +46,6 @@ class Vocabulary:
         self.nouns = [
             noun_of(self._drop_false_colour(i), w) for i, w in zip(scene.instances, self.words, strict=True)
         ]
-        self.noun_checker = NounChecker(self.names)
 
     def _drop_false_colour(self, instance: Instance) -> Instance:
         """Remove a colour attribute that the surface does not support."""
@@ -68,13 +66,3 @@ class Vocabulary:
     def looks(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
         return tuple(say for say in self.true_looks(instance) if not repeats(say, instance))
-
-    def faults(self, instance: Instance, text: str) -> list[str]:
-        """Return the false statements of a text about an instance's appearance."""
-        if self.scene.imported:
-            return []
-        return [
-            *self.noun_checker.contradictions(text, instance),
-            *false_phrases(text, instance, self._looks, self.scene.materials, self._surface),
-            *false_colours(text, instance, self.scene.materials),
-        ]

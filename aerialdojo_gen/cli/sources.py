@@ -172,10 +172,6 @@ def annotate_draft(
     seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
     pipeline: PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
-    keep_objects: Annotated[
-        bool,
-        typer.Option("--keep-objects", help="Keep the file's objects and names, and write their descriptions again."),
-    ] = False,
     rewrite: Rewrite = None,
     option: ModelOption = None,
     yes: Yes = False,
@@ -205,10 +201,10 @@ def annotate_draft(
         max_per_category=max_per_category,
     )
     reporter = Reporter(quiet=quiet)
-    fresh = rewrite is None or force or keep_objects or not (roots.annotations / f"{scene}.json").exists()
+    fresh = rewrite is None or force or not (roots.annotations / f"{scene}.json").exists()
     agent = None if rewrite is None else _writer(rewrite, option or [], max_cost)
     if fresh:
-        print(draft_scene(scene, config, roots, options, force=force, keep_objects=keep_objects, reporter=reporter))
+        print(draft_scene(scene, config, roots, options, force=force, reporter=reporter))
     if agent is not None:
         from aerialdojo_gen.studio.annotate.rewrite import Limits, rewrite_scene
 

@@ -15,9 +15,8 @@ from aerialdojo_gen.annotations.draft import (
     SCENERY,
     AnnotationDrafter,
     DraftOptions,
-    redraft_annotations,
 )
-from aerialdojo_gen.annotations.format import Annotations, parse_annotations, write_annotations
+from aerialdojo_gen.annotations.format import Annotations, write_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.cli_context import command
@@ -57,16 +56,13 @@ def draft_scene(
     options: DraftOptions | None = None,
     *,
     force: bool = False,
-    keep_objects: bool = False,
     reporter: Reporter | None = None,
 ) -> Path:
     """Draft a scene's annotations and write them to the annotations folder."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     options = options or DraftOptions()
-    if keep_objects:
-        return _redraft(name, path, roots, options.seed)
     if path.exists() and not force:
-        raise UsageError(f"{path} exists: --force overwrites it, --keep-objects redrafts its descriptions")
+        raise UsageError(f"{path} exists: --force overwrites it")
     counts = paper_counts().get(name)
     n_landmarks, n_objects = options.n_landmarks, options.n_objects
     exact = counts is not None and n_objects != AUTO
@@ -135,18 +131,6 @@ def _nothing_to_draft(name: str, why: str) -> AnnotationError:
 
 def _plural(n: int, what: str) -> str:
     return f"{n:,} {what}{'' if n == 1 else 's'}"
-
-
-def _redraft(name: str, path: Path, roots: ProjectPaths, seed: int) -> Path:
-    if not path.exists():
-        raise UsageError(f"{path} does not exist: there are no objects to keep")
-    source = parse_annotations(path.read_text(encoding="utf-8"))
-    if source.faults:
-        raise AnnotationError(f"{path}: {source.faults[0]}")
-    catalogue = load_catalogue(roots.scene_assets)
-    scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
-    write_annotations(redraft_annotations(scene, catalogue, source.annotations, seed), path)
-    return path
 
 
 def make_reject(scene: Scene, pipeline: Pipeline, roots: ProjectPaths) -> Callable[[str], str]:

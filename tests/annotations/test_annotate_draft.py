@@ -11,9 +11,11 @@ import pytest
 from support.annotation_scenes import PAINTS, box, street
 
 from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.language.writer import Writer
 from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
@@ -63,7 +65,11 @@ def test_drafts_pass_the_checks_and_are_the_same_each_time(plaza, catalogue):
 
 def test_drafts_are_varied_english(plaza, catalogue):
     draft = draft_annotations(plaza, catalogue, 1, 20, seed=3)
-    texts = [entry.description for entry in draft.objects]
+    claims = SceneClaims(Vocabulary(plaza, catalogue), draft.landmarks)
+    writer = Writer(claims, [mark.name for mark in draft.landmarks], 3, "test")
+    numbers = [claims.geometry.index[entry.node] for entry in draft.objects]
+    texts = [text.text for i in numbers for text in writer.texts(i, claims.of(i), (), 1)]
+    assert len(texts) == len(numbers)
     # The boulders are scenery: nobody is sent to look for one of many alike.
     assert {entry.category for entry in draft.objects} == {i.category for i in plaza.instances} & set(
         catalogue.targets
