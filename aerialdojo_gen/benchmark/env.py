@@ -70,8 +70,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
     seed : int
         Of that draw.
     sensors : Sensors, optional
-        What is rendered. Keywords do as well: `views`, `rgb`, `depth`, `width`, `height`.
-    views, rgb, depth, width, height
+        What is rendered. Keywords do as well: `views`, `rgb`, `depth`, `width`, `height`, `light`.
+    views, rgb, depth, width, height, light
         In place of `sensors`; ``views=()`` flies blind, tens of thousands of steps a second.
     success_radius_m : float
         How near to the goal a Stop must be.
@@ -122,6 +122,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         depth: bool = True,
         width: int = 640,
         height: int = 640,
+        light: str = "scene",
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
@@ -139,7 +140,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
                 raise UsageError(f"{name} is at least 1, not {number}")
         self.render_mode = render_mode
         self._data = open_root(data)
-        self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height)
+        self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height, light=light)
         self._tell = check_tell(_names(tell))
         self._paraphrase = check_paraphrase(paraphrase)
         self._flight = Flight(
@@ -271,11 +272,9 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Return the four views in one picture, (2 · H, 2 · W, 3) uint8, where the render mode is ``"rgb_array"``."""
         if self.render_mode is None:
             return None
-        episode = self.episode
-        flight = self._flight
-        return mosaic(
-            render_views(flight.space.scene, _RENDERED, episode.position, episode.yaw_rad, flight.renderer)[0]
-        )
+        at, flight = self.episode, self._flight
+        scene = flight.space.scene
+        return mosaic(render_views(scene, _RENDERED, at.position, at.yaw_rad, flight.renderer, flight.light)[0])
 
     def close(self) -> None:
         """Let go of the scenes, their pictures and what reads ahead; a second call does nothing."""

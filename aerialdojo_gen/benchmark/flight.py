@@ -19,6 +19,7 @@ from aerialdojo_gen.benchmark.viewpoints import View, nodes_of, view_of, viewpoi
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space, prefetch_flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, hold_scenes, release_scene
+from aerialdojo_gen.scenes.light import Light, chosen_light
 from aerialdojo_gen.store.root import Where, open_root
 
 _NONE = np.empty((0, 3))
@@ -34,6 +35,7 @@ class Flight:
     goal: Goal
     episode: Episode
     space: FlightSpace
+    light: Light
 
     def __init__(
         self,
@@ -69,6 +71,7 @@ class Flight:
             self._reader.join()
         self.space = flight_space(mesh, sha256, body.radius_m, self._keep)
         self._opened.add(sha256)
+        self.light = chosen_light(self.space.scene.light, self.sensors.light, 0, row["task_id"])
         self.episode = Episode(self.space, task.start, task.goal, budget)
         return self.episode
 
@@ -115,5 +118,7 @@ class Flight:
     def observe(self) -> Observation:
         """Return the agent's observation before its next action."""
         episode = self.episode
-        rgb, depth_m = render_views(self.space.scene, self.sensors, episode.position, episode.yaw_rad, self.renderer)
+        rgb, depth_m = render_views(
+            self.space.scene, self.sensors, episode.position, episode.yaw_rad, self.renderer, self.light
+        )
         return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb, depth_m)

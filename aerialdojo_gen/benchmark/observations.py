@@ -17,6 +17,7 @@ from aerialdojo_gen.benchmark.tasks import MODALITIES
 from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, scene_renderer
 from aerialdojo_gen.rendering.bodies import draw_bodies
+from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
@@ -46,14 +47,14 @@ def observed_goal(goal: Goal, image_shape: tuple[int, ...] | None) -> dict[str, 
     return seen
 
 
-def renderer_for(scene: Scene, name: str) -> Renderer:
+def renderer_for(scene: Scene, name: str, light: Light | None = None) -> Renderer:
     """Return the renderer of a scene; RenderError in a fork of a process that has used OpenGL."""
     if _opengl_process and os.getpid() not in _opengl_process:
         raise RenderError(
             "this process was forked from one that has drawn by OpenGL: start it by spawn "
             "(gymnasium.make_vec: vector_kwargs={'context': 'spawn'}), or take renderer='pybullet' in both"
         )
-    renderer = scene_renderer(scene, name)
+    renderer = scene_renderer(scene, name, light)
     if renderer.name == "gl":
         _opengl_process[:] = [os.getpid()]
     return renderer
@@ -76,9 +77,10 @@ def used_opengl() -> bool:
 
 
 def render_views(
-    scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto"
-) -> tuple[Pictures, Depths]:
-    """Render the views of a body (world metres, radians).
+    scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto",
+    light: Light | None = None,
+) -> tuple[Pictures, Depths]:  # fmt: skip
+    """Render the views of a body (world metres, radians), by the scene's own light without another.
 
     RGB (H, W, 3) uint8 and planar depth (H, W) metres, by view.
     """
@@ -87,7 +89,7 @@ def render_views(
     if sensors.blind:
         return rgb, depth_m
     pose = np.array([[*position, yaw_rad]])
-    pictures, depths = draw_bodies(renderer_for(scene, renderer), sensors.camera, pose, sensors.views)
+    pictures, depths = draw_bodies(renderer_for(scene, renderer, light), sensors.camera, pose, sensors.views)
     for v, view in enumerate(sensors.views):
         if sensors.rgb:
             rgb[view] = pictures[0, v]

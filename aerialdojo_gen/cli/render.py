@@ -58,6 +58,9 @@ def render(
     sampling: Annotated[str | None, typer.Option(
         "--sampling", help="steps: one frame per pose; time: constant frame rate.")] = None,
     frames: Annotated[str | None, typer.Option("--frames", help="video, or png for one file per frame.")] = None,
+    light: Annotated[str | None, typer.Option(
+        "--light", help="scene (its own), clear, overcast, haze, dusk, wet, or random: one drawn for each "
+        "trajectory.")] = None,
     instances: Annotated[bool, typer.Option("--instances", help="Record instance id maps too.")] = False,
     shard: Annotated[str | None, typer.Option(
         "--shard", metavar="I/N", help="Record the I-th of N parts, e.g. 2/8. All parts copied into one folder "
@@ -86,7 +89,7 @@ def render(
     )
     overrides: dict[str, object] = {
         **profile_keys(profile), "split": split, "limit": limit, "renderer": renderer, "sampling": sampling,
-        "frames": frames, "instances": instances or None,
+        "frames": frames, "light": light, "instances": instances or None,
     }  # fmt: skip
     if estimate:
         _estimate(data, scene, pipeline, workers, limits.share, overrides, as_json)

@@ -29,6 +29,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.scenes.context import context_of, open_contexts
+from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
 Floats = NDArray[np.float64]
@@ -50,12 +51,21 @@ class Renderer(Protocol):
         """Name of the device, as the driver gives it."""
         ...
 
+    @property
+    def light(self) -> Light:
+        """The light that it draws by: at first the scene's own."""
+        ...
+
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
         ...
 
     def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
         """Take several pictures; cheaper than one by one where they share their eye."""
+        ...
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
         ...
 
     def close(self) -> None:
@@ -85,6 +95,7 @@ class PyBulletRenderer:
 
         self._scene = scene
         self._world = RenderWorld(scene)
+        self.light = scene.light
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
         """Take a picture; the instance id map is ray-cast."""
@@ -98,6 +109,11 @@ class PyBulletRenderer:
     def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
         """Take the pictures one by one."""
         return [self.render(camera, pose, instances) for pose in poses]
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
+        self.light = light
+        self._world.relight(light)
 
     def close(self) -> None:
         """Free the memory."""
@@ -135,15 +151,21 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
     raise RenderError(f"unknown renderer {name!r}: one of {', '.join(RENDERERS)}, or auto")
 
 
-def scene_renderer(scene: Scene, name: str, reopen: bool = False) -> Renderer:
-    """Return the renderer of the scene's context, replaced when another name is requested; do not close it."""
+def scene_renderer(scene: Scene, name: str, light: Light | None = None, reopen: bool = False) -> Renderer:
+    """Return the renderer of the scene's context, replaced when another name is requested; do not close it.
+
+    It draws by the scene's own light without another.
+    """
     context = context_of(scene)
     if reopen:
         context.drop("renderer")
     # An OpenGL renderer draws only in the thread that made it.
     if not hasattr(_thread, "thread"):
         _thread.thread = object()
-    return context.part("renderer", lambda: open_renderer(scene, name), name, _thread.thread)
+    renderer = context.part("renderer", lambda: open_renderer(scene, name), name, _thread.thread)
+    if renderer.light != (light or scene.light):
+        renderer.relight(light or scene.light)
+    return renderer
 
 
 def close_renderers() -> None:

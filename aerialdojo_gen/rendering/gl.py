@@ -17,23 +17,23 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.rendering import gl_programs
 from aerialdojo_gen.rendering import gl_shaders as glsl
 from aerialdojo_gen.rendering.bodies import GlBodies
 from aerialdojo_gen.rendering.gl_foreign import backdrop_kinds, foreign_kinds
-from aerialdojo_gen.rendering.gl_geometry import VERTEX, Kind, chunks
+from aerialdojo_gen.rendering.gl_geometry import Kind, own_kinds
 from aerialdojo_gen.rendering.gl_target import clear_depth, read_picture
 from aerialdojo_gen.rendering.gl_tiles import Tiles
-from aerialdojo_gen.rendering.lighting import light_of, sun_view
+from aerialdojo_gen.rendering.lighting import cloud_map, height_map, light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
+from aerialdojo_gen.rendering.shading import SIDE
+from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
 _SHADOW_PX = 2048
 _HINT = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
-_FORMATS = {
-    "position": "3f", "uv": "2f", "normal": "3f", "colour": "4f1", "texel_m": "1f", "layer": "1f", "instance": "1f",
-}  # fmt: skip
 
 
 # Uniforms that change with every picture.
@@ -102,20 +102,36 @@ class GlRenderer:
         self._gl = context()
         self.device = device()
         self._owned: list[Any] = []
-        self._arrays: dict[tuple[Any, ...], tuple[Any, dict[str, Any]]] = {}
+        self._arrays: dict[tuple[tuple[str, ...], int], tuple[Any, dict[str, Any]]] = {}
         self._targets: dict[tuple[int, int, bool, int], Any] = {}
         self._bodies: GlBodies | None = None
-        textured, flat, layers = chunks(scene)
-        kinds = [Kind(textured, ("TEXTURED",), layers), Kind(flat, (), None), *foreign_kinds(scene)]
-        self._sets = [_DrawSet(kind, self) for kind in kinds if len(kind.chunks.low)]
-        self._backdrop = [_DrawSet(kind, self) for kind in backdrop_kinds(scene)]
+        kinds = [*own_kinds(scene), *foreign_kinds(scene)]
+        shared: dict[int, Any] = {}
+        self._sets = [_DrawSet(kind, self, shared) for kind in kinds if len(kind.chunks.low)]
+        self._backdrop = [_DrawSet(kind, self, shared) for kind in backdrop_kinds(scene)]
         max_vertices = max(len(drawn.kind.chunks.vertices) for drawn in (*self._sets, *self._backdrop))
         self._indices = self._own(self._gl.buffer(reserve=4 * max_vertices, dynamic=True))
-        self._light = light_of(scene)
-        camera, pose, near_m, far_m = sun_view(scene, _SHADOW_PX)
+        self._scene = scene
+        self._clouds = self._own(gl_programs.table_texture(self._gl, cloud_map(scene.name)[..., None], "f1"))
+        self._height_map = height_map(scene)
+        self._heights = self._own(gl_programs.table_texture(self._gl, self._height_map.above[..., None], "f1"))
+        self._heights.repeat_x = self._heights.repeat_y = False
+        self._shadow: Any = None
+        self.relight(scene.light)
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
+        self.light = light
+        self._light = light_of(self._scene, light=light)
+        camera, pose, near_m, far_m = sun_view(self._scene, _SHADOW_PX, light)
         self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
         self._bias_m = 0.03 + 1.5 * (near_m + far_m) / 2.0 / camera.focal_px
+        if self._shadow is not None:
+            self._owned.remove(self._shadow)
+            self._shadow.release()
         self._shadow = self._shadow_map()
+        for array, _ in self._arrays.values():
+            self._set_light(array.program)
 
     def _own(self, resource: Any) -> Any:
         self._owned.append(resource)
@@ -148,9 +164,11 @@ class GlRenderer:
         target = gl.framebuffer(depth_attachment=depth)
         self._begin(target)
         for drawn in self._sets:
+            if "HORIZON" in drawn.kind.tags:
+                continue
             program = gl.program(*(glsl.specialise(source, *drawn.kind.tags) for source in glsl.SUN))
-            _set(program, clip_from_world=_columns(self._sun_from_world), textures=0)
-            array = gl.vertex_array(program, [_content(program, drawn.buffer)])
+            gl_programs.set_all(program, clip_from_world=gl_programs.columns(self._sun_from_world), textures=0)
+            array = gl.vertex_array(program, [gl_programs.content(program, drawn.buffer)])
             drawn.begin(gl)
             array.render()
             array.release()
@@ -232,14 +250,20 @@ class GlRenderer:
         eye = world_from_camera[:3, 3].astype(np.float32).tobytes()
         self._begin(target, 1 + instances)
         self._shadow.use(1)
+        self._clouds.use(2)
+        self._heights.use(3)
         tags = ("INSTANCES",) if instances else ()
 
-        place = {"clip_from_world": _columns(clip), "eye": eye, "focal_px": np.float32(camera.focal_px).tobytes()}
+        place = {
+            "clip_from_world": gl_programs.columns(clip),
+            "eye": eye,
+            "focal_px": np.float32(camera.focal_px).tobytes(),
+        }
 
         def draw(drawn: _DrawSet, chosen: NDArray[np.uint32]) -> None:
             drawn.begin(self._gl)
             array, uniforms = self._array((*drawn.kind.tags, *tags), drawn.buffer)
-            _write(uniforms, place)
+            gl_programs.write(uniforms, place)
             # As small as possible: Mesa clears all of it.
             self._indices.orphan(chosen.nbytes)
             self._indices.write(chosen)
@@ -250,7 +274,10 @@ class GlRenderer:
                 draw(drawn, chosen)
         self._gl.disable(self._gl.CULL_FACE)
         sky, uniforms = self._array(("SKY", *tags), None)
-        _write(uniforms, {"world_from_camera": _columns(world_from_camera[:3, :3]), "reach": _half_extent(camera)})
+        gl_programs.write(
+            uniforms,
+            {"world_from_camera": gl_programs.columns(world_from_camera[:3, :3]), "reach": _half_extent(camera)},
+        )
         sky.render(vertices=3)
         # After the sky: depths near the far plane round to it, and the last one drawn wins.
         for drawn in self._backdrop:
@@ -260,19 +287,32 @@ class GlRenderer:
     def _array(self, tags: tuple[str, ...], buffer: Any) -> tuple[Any, dict[str, Any]]:
         """Return the vertex array of a program and buffer, made on first use, and its uniforms."""
         # Two kinds may have one program, and never one buffer.
-        key = (*tags, id(buffer))
+        if self._light.wet:
+            tags = (*tags, "WET")
+        key = (tags, id(buffer))
         if key not in self._arrays:
             sky = "SKY" in tags
             sources = glsl.SKY if sky else glsl.SURFACES
             program = self._own(self._gl.program(*(glsl.specialise(source, *tags) for source in sources)))
-            _set(
-                program, sun_from_world=_columns(self._sun_from_world), sun=self._light.sun, bias_m=self._bias_m,
-                horizon=self._light.horizon, zenith=self._light.zenith, textures=0, shadow=1,
-            )  # fmt: skip
-            content, indices = ([], None) if sky else ([_content(program, buffer)], self._indices)
+            self._set_light(program)
+            content, indices = ([], None) if sky else ([gl_programs.content(program, buffer)], self._indices)
             uniforms = {name: program[name] for name in _PER_PICTURE if name in program}
             self._arrays[key] = self._own(self._gl.vertex_array(program, content, index_buffer=indices)), uniforms
         return self._arrays[key]
+
+    def _set_light(self, program: Any) -> None:
+        """Set what stays the same from picture to picture."""
+        light, at = self._light, self._height_map
+        rows, columns = at.above.shape
+        side = light.sun[:2] / (np.linalg.norm(light.sun[:2]) + 1e-9) * SIDE
+        gl_programs.set_all(
+            program, sun_from_world=gl_programs.columns(self._sun_from_world), sun=light.sun, bias_m=self._bias_m,
+            side=side,
+            horizon=light.horizon / 255.0, zenith=light.zenith / 255.0, lowest_m=at.lowest_m,
+            sun_rgb=light.sun_rgb, sky_rgb=light.sky_rgb,
+            ground_rgb=light.ground_rgb, air=light.rows[6], place=np.array([at.west_m, at.south_m]),
+            extent=1.0 / (at.cell_m * np.array([columns, rows])), textures=0, shadow=1, clouds=2, heights=3,
+        )  # fmt: skip
 
     def _target(self, width: int, height: int, instances: bool, slot: int) -> Any:
         key = (width, height, instances, slot)
@@ -309,10 +349,12 @@ class GlRenderer:
 class _DrawSet:
     """A kind of surface in the renderer's memory."""
 
-    def __init__(self, kind: Kind, renderer: GlRenderer) -> None:
+    def __init__(self, kind: Kind, renderer: GlRenderer, shared: dict[int, Any]) -> None:
         self.kind = replace(kind, layers=None)
         self.buffer = renderer._own(renderer._gl.buffer(kind.chunks.vertices.tobytes()))
-        self.textures = renderer.texture_array(kind)
+        if id(kind.layers) not in shared:
+            shared[id(kind.layers)] = renderer.texture_array(kind)
+        self.textures = shared[id(kind.layers)]
 
     def begin(self, gl: Any) -> None:
         """Set the OpenGL state of this kind."""
@@ -342,30 +384,3 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
 def _half_extent(camera: Camera) -> bytes:
     """Half the picture's width and height at a depth of 1, for the sky's shader."""
     return (np.array([camera.width, camera.height]) / 2.0 / camera.focal_px).astype(np.float32).tobytes()
-
-
-def _columns(matrix: Floats) -> bytes:
-    return np.ascontiguousarray(matrix.T, dtype=np.float32).tobytes()
-
-
-def _write(uniforms: dict[str, Any], values: dict[str, bytes]) -> None:
-    for name, uniform in uniforms.items():
-        uniform.write(values[name])
-
-
-def _set(program: Any, **values: Any) -> None:
-    """Set the uniforms that the program has: a compiler drops unused ones."""
-    for name, value in values.items():
-        if name in program:
-            if isinstance(value, bytes):
-                program[name].write(value)
-            else:
-                program[name].value = tuple(value.tolist()) if isinstance(value, np.ndarray) else value
-
-
-def _content(program: Any, buffer: Any) -> tuple[Any, ...]:
-    """Vertex layout of the buffer: the fields that the program reads, and padding for the others."""
-    fields = [(name, name in program) for name in _FORMATS]
-    sizes = {name: VERTEX.fields[name][0].itemsize for name in _FORMATS} if VERTEX.fields else {}
-    layout = " ".join(_FORMATS[name] if used else f"{sizes[name]}x" for name, used in fields)
-    return (buffer, layout, *(name for name, used in fields if used))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.rendering.gl_geometry import Kind, cut, is_foreign, packed
-from aerialdojo_gen.scenes.model import Instance, Material, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Scene
 
 # Fourth byte of the vertex colour of an unlit material.
 _UNLIT = 255
@@ -22,8 +22,9 @@ def foreign_kinds(scene: Scene) -> list[Kind]:
 
 
 def backdrop_kinds(scene: Scene) -> list[Kind]:
-    """Pack the backdrop: all materials, both sides."""
-    return _kinds(scene.backdrop, scene.materials, False, ("FOREIGN", "BACKDROP"))
+    """Pack sky domes: all materials, both sides."""
+    domes = [instance for instance in scene.backdrop if instance.surface != HORIZON]
+    return _kinds(domes, scene.materials, False, ("FOREIGN", "BACKDROP"))
 
 
 def _kinds(

@@ -16,13 +16,23 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
-from aerialdojo_gen.scenes.model import Material, Part, Scene
+from aerialdojo_gen.rendering.lighting import is_shiny
+from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
+from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 Floats = NDArray[np.float64]
 
 CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
 _MORTON_BITS = 16
+# Cosine between a face and the mean about a corner beyond which the corner is sharp: that of a box is 0.58.
+_SHARP = 0.7
+# Materials whose pattern has no scale: they are drawn with grain at every distance.
+_GRAINED = frozenset({*NATURAL, "asphalt", "hedge"})
+# What is drawn first hides most.
+_ORDER: tuple[tuple[str, ...], ...] = (
+    ("TEXTURED",), (), ("TEXTURED", "SHINY"), ("SHINY",), ("TEXTURED", "NATURAL"), ("TEXTURED", "NATURAL", "SHINY"),
+)  # fmt: skip
 
 # Three vertices a triangle, none shared: normal, colour and instance are those of the face.
 VERTEX = np.dtype(
@@ -77,24 +87,56 @@ class Kind:
         return "MASK" not in self.tags
 
 
-def chunks(scene: Scene) -> tuple[Chunks, Chunks, NDArray[np.uint8] | None]:
-    """Pack a scene's catalogue materials: textured and flat chunks, and texture layers (n, e, e, 3) uint8."""
+def own_kinds(scene: Scene) -> list[Kind]:
+    """Pack a scene's catalogue materials and its horizon by what draws them; all share one texture array."""
     names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
     layer = {name: float(k) for k, name in enumerate(names)}
-    textured, flat = [], []
-    for k, instance in enumerate(scene.instances):
+    rows: dict[tuple[str, ...], list[NDArray[np.void]]] = {tags: [] for tags in _ORDER}
+    far: list[tuple[NDArray[np.void], tuple[str, ...]]] = []
+    beyond = [instance for instance in scene.backdrop if instance.surface == HORIZON]
+    for k, instance in (*enumerate(scene.instances), *((-1, instance) for instance in beyond)):
         for part in instance.parts:
             material = scene.materials[part.material]
             if is_foreign(part, material):
                 continue
-            rows = packed(part, material, k)
-            if material.texture is None:
-                flat.append(rows)
+            found = packed(part, material, k)
+            if material.texture is not None:
+                found["texel_m"] = material.tile_m / material.texture.shape[1]
+                found["layer"] = layer[part.material]
+            if k < 0:
+                far.append((found, (*_tags(material), "HORIZON")))
             else:
-                rows["texel_m"] = material.tile_m / material.texture.shape[1]
-                rows["layer"] = layer[part.material]
-                textured.append(rows)
-    return cut(textured), cut(flat), _layers(scene, names)
+                rows[_tags(material)].append(found)
+    # Land of several materials is smooth across their seams.
+    smooth(*(found for found, _ in far))
+    for found, tags in far:
+        rows.setdefault(tags, []).append(found)
+    layers = _layers(scene, names)
+    return [Kind(cut(some), tags, layers if "TEXTURED" in tags else None) for tags, some in rows.items()]
+
+
+def _tags(material: Material) -> tuple[str, ...]:
+    """Variant of the program that draws a material of the catalogue."""
+    tags = ()
+    if material.texture is not None:
+        tags = ("TEXTURED", "NATURAL") if material.name.split(":")[0] in _GRAINED else ("TEXTURED",)
+    return (*tags, "SHINY") if is_shiny(material) else tags
+
+
+def smooth(*parts: NDArray[np.void]) -> None:
+    """Give corners the mean normal of the faces about them, but at sharp edges, in place."""
+    if not parts:
+        return
+    whole = np.concatenate(parts)
+    at = np.ascontiguousarray(whole["position"].reshape(-1, 3)).view("V12").ravel()
+    _, point = np.unique(at, return_inverse=True)
+    normal = whole["normal"].reshape(-1, 3)
+    mean = np.stack([np.bincount(point, normal[:, axis]) for axis in range(3)], axis=1)
+    mean = (mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9))[point]
+    soft = np.einsum("ij,ij->i", mean, normal) > _SHARP
+    found = np.where(soft[:, None], mean, normal).reshape(-1, 3, 3)
+    for part, some in zip(parts, np.split(found, np.cumsum([len(p) for p in parts])[:-1]), strict=True):
+        part["normal"] = some
 
 
 def is_foreign(part: Part, material: Material) -> bool:

@@ -6,9 +6,27 @@ in less time than a target of colours and one of depths, and it is read back in 
 
 from __future__ import annotations
 
-from aerialdojo_gen.rendering import shading
+from aerialdojo_gen.rendering import lighting, shading
 
 _HEAD = "#version 400 core\n"
+# Contrast of a natural texture at its larger scales.
+_GRAIN = 0.55
+
+# The sky in a direction, as `aerialdojo_gen.rendering.shading` has it.
+_SKY = """
+uniform vec3 horizon;
+uniform vec3 zenith;
+uniform vec3 air;  // square of the range of haze, share of clouds, wetness
+uniform sampler2D clouds;
+vec3 sky_at(vec3 dir) {
+    float z = max(dir.z, 0.0);
+    float thick = textureLod(clouds, dir.xy * (CLOUD_SCALE / (z + CLOUD_FLAT)), 0.0).r;
+    thick = clamp((thick - 0.86 + 0.8 * air.y) * 3.2, 0.0, 1.0) * min(z * 7.0, 1.0);
+    vec3 blue = mix(horizon, zenith, sqrt(z));
+    vec3 white = horizon * 0.25 + 0.741 - 0.133 * air.y * thick;
+    return mix(blue, white, thick * (0.85 - 0.35 * air.y));
+}
+"""
 
 _VERTEX = (
     _HEAD
@@ -17,7 +35,12 @@ uniform mat4 clip_from_world;
 uniform mat4 sun_from_world;
 uniform vec3 eye;
 uniform vec3 sun;
+uniform vec2 side;
+uniform vec2 place;  // the map of heights: its south-western corner, and one over its extent
+uniform vec2 extent;
+uniform float lowest_m;
 uniform float bias_m;
+uniform float focal_px;
 in vec3 position;
 in vec3 normal;
 in vec4 colour;
@@ -27,7 +50,6 @@ in float texel_m;
 in float layer;
 out vec2 v_uv;
 flat out vec2 v_texture;
-flat out vec3 v_normal;
 #endif
 #ifdef INSTANCES
 in float instance;
@@ -40,14 +62,21 @@ out vec2 v_uv;
 flat out float v_layer;
 #endif
 out vec3 v_ray;
+#ifdef HORIZON
+out vec3 v_light;
+out vec3 v_normal;
+#else
+flat out vec3 v_light;
+flat out vec3 v_normal;
 out vec4 v_sun;
+out vec3 v_heights;
+#endif
 #ifdef FOREIGN
 out vec3 v_colour;
 flat out float v_lit;
 #else
 flat out vec3 v_colour;
 #endif
-flat out vec2 v_light;
 void main() {
     gl_Position = clip_from_world * vec4(position, 1.0);
     vec3 n = normal;
@@ -61,14 +90,17 @@ void main() {
     gl_Position.z = gl_Position.w * 0.9999999;
 #endif
     v_ray = position - eye;
+    v_normal = n;
+    v_colour = colour.rgb;
+    v_light = vec3(0.5 + 0.5 * n.z, 1.0 + dot(n.xy, side), max(dot(n, sun), 0.0));
+#ifndef HORIZON
     vec4 s = sun_from_world * vec4(position + n * bias_m, 1.0);
     v_sun = vec4((s.xyz + s.w) * 0.5, s.w);
-    v_colour = colour.rgb * 255.0;
-    v_light = vec2(AMBIENT + FROM_ABOVE * n.z + FROM_EAST * n.x + FROM_NORTH * n.y, SUN * max(dot(n, sun), 0.0));
+    v_heights = vec3((position.xy + n.xy * BEFORE - place.xy) * extent, (lowest_m - position.z - BEFORE) / DEEP);
+#endif
 #ifdef TEXTURED
     v_uv = uv;
-    v_texture = vec2(layer, texel_m);
-    v_normal = n;
+    v_texture = vec2(layer, focal_px * focal_px * texel_m * texel_m);
 #endif
 #ifdef ATLAS
     v_uv = uv;
@@ -83,15 +115,17 @@ void main() {
 
 _FRAGMENT = (
     _HEAD
+    + _SKY
     + """
 uniform sampler2D shadow;
-uniform vec3 horizon;
-uniform float focal_px;
+uniform sampler2D heights;
+uniform vec3 sun_rgb;
+uniform vec3 sky_rgb;
+uniform vec3 ground_rgb;
 #ifdef TEXTURED
 uniform sampler2DArray textures;
 in vec2 v_uv;
 flat in vec2 v_texture;
-flat in vec3 v_normal;
 #endif
 #ifdef ATLAS
 uniform sampler2DArray textures;
@@ -99,57 +133,104 @@ in vec2 v_uv;
 flat in float v_layer;
 #endif
 in vec3 v_ray;
+#ifdef HORIZON
+in vec3 v_light;
+in vec3 v_normal;
+#else
+flat in vec3 v_light;
+flat in vec3 v_normal;
 in vec4 v_sun;
+in vec3 v_heights;
+#endif
 #ifdef FOREIGN
 in vec3 v_colour;
 flat in float v_lit;
 #else
 flat in vec3 v_colour;
 #endif
-flat in vec2 v_light;
 layout(location = 0) out uvec2 out_pixel;
 #ifdef INSTANCES
 flat in float v_instance;
 layout(location = 1) out float out_instance;
 #endif
 void main() {
-    float range_m = length(v_ray);
+    float range_2 = dot(v_ray, v_ray), range_m = sqrt(range_2);
     vec3 base = v_colour;
-#ifdef TEXTURED
     float facing = -dot(v_normal, v_ray) / range_m;
-    float texels = range_m / (focal_px * v_texture.y * sqrt(max(facing, 0.02)));
+#ifdef TEXTURED
+#ifdef NATURAL
+    // The same pattern eight times as large, and again: ground has grain at every distance.
+    float lod = max(0.5 * log2(range_2 / (v_texture.y * max(facing, 0.02))), 0.0);
+    float octave = lod < 2.4 ? 0.0 : lod < 5.4 ? 1.0 : 2.0;
+    vec2 at = v_uv * (lod < 2.4 ? 1.0 : lod < 5.4 ? 0.125 : 0.015625);
+    vec3 grain = textureLod(textures, vec3(at, v_texture.x), lod - 3.0 * octave).rgb;
+    base += (grain - base) * (lod < 2.4 ? 1.0 - 0.2 * lod : GRAIN);
+#else
+    float texels = sqrt(range_2 / (v_texture.y * max(facing, 0.02)));
     float keep = clamp((FADE - texels) / (FADE - 1.0), 0.0, 1.0);
-    base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb * 255.0, keep);
+    base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb, keep);
+#endif
 #endif
 #ifdef ATLAS
     vec4 texel = texture(textures, vec3(v_uv, v_layer));
-    base = texel.rgb * 255.0;
+    base = texel.rgb;
 #endif
 #ifdef MASK
     // Mipmaps average alpha: a lower threshold at a distance, or trees would lose their leaves.
     if (texel.a < 0.5 - 0.2 * clamp(textureQueryLod(textures, v_uv).y / 4.0, 0.0, 1.0)) discard;
 #endif
 #ifdef BACKDROP
-    out_pixel = uvec2(packUnorm4x8(vec4(base / 255.0, 1.0)), ENDLESS);
+    out_pixel = uvec2(packUnorm4x8(vec4(base, 1.0)), ENDLESS);
 #ifdef INSTANCES
     out_instance = 0.0;
 #endif
     return;
 #endif
-    // The mean of four comparisons, weighted as a linear filter would.
-    vec3 at = v_sun.xyz / v_sun.w;
-    vec4 lit_by = step(vec4(at.z), textureGather(shadow, at.xy));
-    vec2 share = fract(at.xy * vec2(textureSize(shadow, 0)) - 0.5);
-    vec2 column = mix(lit_by.wx, lit_by.zy, share.x);
-    float lit = v_light.y * mix(column.x, column.y, share.y);
-    float haze = 1.0 - exp(range_m * (-1.0 / HAZE_RANGE));
-#ifdef FOREIGN
-    base *= mix(1.0, v_light.x + lit, v_lit);
-    vec3 value = mix(base, horizon, haze * haze);
+#ifdef HORIZON
+    vec3 from_sky = mix(ground_rgb, sky_rgb, v_light.x) * v_light.y;
+    float lit = v_light.z;
 #else
-    vec3 value = mix(base * (v_light.x + lit), horizon, haze * haze);
+    // The mean of four comparisons, weighted as a linear filter would.
+    vec3 at_sun = v_sun.xyz / v_sun.w;
+    vec4 lit_by = step(vec4(at_sun.z), textureGather(shadow, at_sun.xy));
+    vec2 part = fract(at_sun.xy * vec2(textureSize(shadow, 0)) - 0.5);
+    vec2 column = mix(lit_by.wx, lit_by.zy, part.x);
+    float lit = v_light.z * mix(column.x, column.y, part.y);
+    // What is deep below its surroundings sees less of the sky.
+    float deep = clamp(textureLod(heights, v_heights.xy, 0.0).r * (REACH / DEEP) + v_heights.z, 0.0, 1.0);
+    vec3 from_sky = mix(ground_rgb, sky_rgb, v_light.x) * (v_light.y * (1.0 - SHADED * deep));
 #endif
-    out_pixel = uvec2(packUnorm4x8(vec4(value / 255.0, 1.0)), floatBitsToUint(1.0 / gl_FragCoord.w));
+    vec3 albedo = base * base;
+#ifdef WET
+    float level = clamp(4.0 * v_normal.z - 3.0, 0.0, 1.0) * air.z;
+    albedo *= 1.0 - (1.0 - WETNESS) * level;
+#endif
+    vec3 linear = albedo * (from_sky + sun_rgb * lit);
+    vec3 value = linear / (linear + TOE) * GAIN;
+    value = mix(vec3(dot(value, vec3(0.3, 0.6, 0.1))), value, VIVID);
+#ifdef FOREIGN
+    value = mix(base, value, v_lit);
+#endif
+#if defined(SHINY) || defined(WET)
+#ifdef SHINY
+    float mirror = 1.0;
+#else
+    float mirror = level * 0.6;
+#endif
+    float glance = 1.0 - facing;
+    mirror *= MIRROR_LEAST + (MIRROR_MOST - MIRROR_LEAST) * glance * glance * glance;
+    value = mix(value, sky_at(v_ray / range_m + 2.0 * facing * v_normal), mirror);
+#endif
+    float haze = range_2 / (range_2 + air.x);
+#ifdef HORIZON
+    // The land's end is the sky.
+    haze = max(haze, smoothstep(END * 0.5, END, range_m));
+    value = mix(value, mix(horizon, zenith, sqrt(max(v_ray.z, 0.0) / range_m)), haze);
+    out_pixel = uvec2(packUnorm4x8(vec4(value, 1.0)), ENDLESS);
+#else
+    value = mix(value, horizon, haze);
+    out_pixel = uvec2(packUnorm4x8(vec4(value, 1.0)), floatBitsToUint(1.0 / gl_FragCoord.w));
+#endif
 #ifdef INSTANCES
     out_instance = v_instance;
 #endif
@@ -211,17 +292,15 @@ void main() {
 
 _SKY_FRAGMENT = (
     _HEAD
+    + _SKY
     + """
-uniform vec3 horizon;
-uniform vec3 zenith;
 in vec3 v_ray;
 layout(location = 0) out uvec2 out_pixel;
 #ifdef INSTANCES
 layout(location = 1) out float out_instance;
 #endif
 void main() {
-    float up = pow(max(v_ray.z, 0.0) / length(v_ray), 0.55);
-    out_pixel = uvec2(packUnorm4x8(vec4(mix(horizon, zenith, up) / 255.0, 1.0)), ENDLESS);
+    out_pixel = uvec2(packUnorm4x8(vec4(sky_at(normalize(v_ray)), 1.0)), ENDLESS);
 #ifdef INSTANCES
     out_instance = 0.0;
 #endif
@@ -238,13 +317,21 @@ SKY = (_SKY_VERTEX, _SKY_FRAGMENT)
 def specialise(source: str, *defined: str) -> str:
     """Give a program its constants and its variant."""
     constants = {
-        "AMBIENT": shading._AMBIENT,
-        "FROM_ABOVE": shading._FROM_ABOVE,
-        "FROM_EAST": shading._FROM_EAST,
-        "FROM_NORTH": shading._FROM_NORTH,
-        "SUN": shading._SUN,
-        "HAZE_RANGE": shading._HAZE_RANGE_M,
+        "SHADED": shading._SHADED,
+        "DEEP": shading._DEEP_M,
+        "BEFORE": shading._BEFORE_M,
+        "TOE": shading._TOE,
+        "GAIN": shading._GAIN,
+        "MIRROR_LEAST": shading._MIRROR_LEAST,
+        "MIRROR_MOST": shading._MIRROR_MOST,
+        "WETNESS": shading._WET,
         "FADE": shading._FADE_TEXELS,
+        "CLOUD_FLAT": shading._CLOUD_FLAT,
+        "CLOUD_SCALE": shading._CLOUD_SCALE,
+        "GRAIN": _GRAIN,
+        "REACH": lighting.REACH_M,
+        "VIVID": shading._VIVID,
+        "END": shading._END_M,
     }
     lines = [f"#define {name} {value:.6f}" for name, value in constants.items()]
     # The bits of an endless depth.

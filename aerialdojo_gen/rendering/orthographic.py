@@ -17,8 +17,8 @@ from aerialdojo_gen.scenes.model import Material, Scene
 
 Floats = NDArray[np.float64]
 
-# As in aerialdojo_gen.rendering.shading: light from everywhere, from above, from east, from north, from the sun.
-_AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
+# A map's light, as shares of a colour: from everywhere, from above, from the sun's side, from the sun.
+_AMBIENT, _FROM_ABOVE, _FROM_SIDE, _SUN = 0.55, 0.11, 0.05, 0.47
 # Cut faces show the inside: the material's colour, darker.
 _CUT_LEVEL = 0.38
 _EARTH = (107.0, 96.0, 84.0)
@@ -94,7 +94,7 @@ class OrthographicPictures:
         normal[away & double_sided] *= -1.0
         cut = away & ~double_sided
         colour = self._colours(face, points, pixel_m)
-        level = _AMBIENT + normal @ np.array([_FROM_EAST, _FROM_NORTH, _FROM_ABOVE])
+        level = _AMBIENT + normal @ np.array([*(_FROM_SIDE * self._sun[:2]), _FROM_ABOVE])
         level += _SUN * self._sunlit(points, normal)
         level[self._unlit[face]] = 1.0
         out[hit] = colour * np.where(cut, _CUT_LEVEL, level)[:, None]

@@ -1,8 +1,8 @@
 """Deferred shading: from albedo, depth and surface of every pixel to the picture.
 
 The rasteriser delivers unlit texture colour, depth and the material's number; normals follow from depth. Sun, shadow,
-sky light, haze and the sky itself are added here, so that every rendering backend gives the same picture. Light is
-computed in sRGB values: not physical, but it looks as in a game.
+light from the sky, haze and the sky with its clouds are added here, so that every rendering backend gives nearly the
+same picture. No light goes by north or east: agents are told no heading, and walls must not say it.
 """
 
 from __future__ import annotations
@@ -14,17 +14,26 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap
+from aerialdojo_gen.rendering.lighting import REACH_M, HeightMap, Lighting, ShadowMap
 
 Floats = NDArray[np.float64]
 
-# Light on a surface, as shares of its colour: ambient, from above, a little from east and north so that the shaded
-# faces of a building differ, and from the sun.
-_AMBIENT, _FROM_ABOVE, _FROM_EAST, _FROM_NORTH, _SUN = 0.55, 0.11, 0.05, 0.03, 0.47
-# Haze grows with the square of distance up to about this range, metres.
-_HAZE_RANGE_M = 420.0
-# A texture fades into its mean colour between one and nine texels a pixel.
+# How much brighter the sky is on the sun's side, and how much of its light a place under others loses at most.
+SIDE, _SHADED = 0.16, 0.62
+# A place so far below the mean height about it, metres, sees that little of the sky; from so far before a surface.
+_DEEP_M, _BEFORE_M = 5.0, 0.7
+# Tone mapping: x / (x + _TOE) * _GAIN of linear light is near sRGB, and rolls off towards white.
+_TOE, _GAIN = 0.155, 1.019
+# Share of a colour's saturation that is kept; and where land ends in the haze of the sky, metres.
+_VIVID, _END_M = 0.85, 1600.0
+# Least and greatest share of the sky that water and glass mirror; where they are looked at head-on, and along.
+_MIRROR_LEAST, _MIRROR_MOST = 0.10, 0.85
+# What is wet is darker.
+_WET = 0.62
+# A texture of what is built fades into its mean colour between one and nine texels a pixel.
 _FADE_TEXELS = 9.0
+# Clouds: how much longer than the zenith's the way to them is at the horizon, their size, and where they begin.
+_CLOUD_FLAT, _CLOUD_SCALE = 0.12, 0.11
 
 
 def shade(
@@ -35,6 +44,8 @@ def shade(
     surface: NDArray[np.int32],
     light: Lighting,
     shadow: ShadowMap,
+    clouds: NDArray[np.uint8],
+    heights: HeightMap,
 ) -> NDArray[np.uint8]:
     """Light a picture: albedo (H, W, 3) uint8, planar depth and surface (H, W) give sRGB (H, W, 3) uint8."""
     out = np.empty_like(albedo)
@@ -47,14 +58,82 @@ def shade(
         light.colour,
         light.texel_m,
         light.unlit,
-        np.stack([light.sun, light.zenith, light.horizon]),
+        light.shiny,
+        light.rows,
         shadow.depth_m,
         np.ascontiguousarray(shadow.world_from_camera),
         shadow.camera.focal_px,
         0.03 + 1.5 * shadow.texel_m,
+        clouds,
+        heights.above,
+        np.array([heights.west_m, heights.south_m, heights.cell_m, heights.lowest_m, REACH_M / 255.0]),
         out,
     )
     return out
+
+
+@njit(cache=True)
+def tone(linear: float) -> float:
+    """Brightness, 0-255, of linear light."""
+    return linear / (linear + _TOE) * _GAIN * 255.0
+
+
+def lit_in_haze(base: Floats, normal: Floats, unit: Floats, distance: Floats, light: Lighting) -> Floats:
+    """Light surfaces of the horizon: colours (n, 3) 0-255, normals, directions (unit) and distances to them."""
+    flat = light.sun[:2] / (np.linalg.norm(light.sun[:2]) + 1e-9)
+    up, side = 0.5 + 0.5 * normal[:, 2:], 1.0 + SIDE * (normal[:, :2] @ flat)[:, None]
+    from_sky = (light.ground_rgb + (light.sky_rgb - light.ground_rgb) * up) * side
+    linear = (base / 255.0) ** 2 * (from_sky + light.sun_rgb * np.maximum(normal @ light.sun, 0.0)[:, None])
+    value = linear / (linear + _TOE) * _GAIN * 255.0
+    grey = value @ np.array([0.3, 0.6, 0.1])
+    value = grey[:, None] + (value - grey[:, None]) * _VIVID
+    haze = np.maximum(distance**2 / (distance**2 + light.haze_m**2), _smoothstep(2.0 * distance / _END_M - 1.0))
+    sky = light.horizon + (light.zenith - light.horizon) * np.sqrt(np.maximum(unit[:, 2:], 0.0))
+    return np.asarray(value + (sky - value) * haze[:, None])
+
+
+def _smoothstep(t: Floats) -> Floats:
+    t = np.clip(t, 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+@njit(cache=True)
+def _bilinear(table: NDArray[np.uint8], u: float, v: float) -> float:
+    """A table's value between its cells' middles; beyond the border that of the nearest cell."""
+    rows, columns = table.shape
+    u, v = min(max(u - 0.5, 0.0), columns - 1.0), min(max(v - 0.5, 0.0), rows - 1.0)
+    j, i = min(int(u), columns - 2), min(int(v), rows - 2)
+    a, b = u - j, v - i
+    low = table[i, j] * (1.0 - a) + table[i, j + 1] * a
+    return float(low * (1.0 - b) + (table[i + 1, j] * (1.0 - a) + table[i + 1, j + 1] * a) * b)
+
+
+@njit(cache=True)
+def _cloud(x: float, y: float, z: float, share: float, clouds: NDArray[np.uint8]) -> float:
+    """Thickness of the clouds, 0 to 1, in a direction (a unit vector) above the horizon."""
+    n = clouds.shape[0]
+    far = _CLOUD_SCALE / (z + _CLOUD_FLAT)
+    u, v = x * far * n - 0.5, y * far * n - 0.5
+    j, i = math.floor(u), math.floor(v)
+    a, b = u - j, v - i
+    j0, j1, i0, i1 = int(j) % n, int(j + 1) % n, int(i) % n, int(i + 1) % n
+    low = clouds[i0, j0] * (1.0 - a) + clouds[i0, j1] * a
+    thick = (low * (1.0 - b) + (clouds[i1, j0] * (1.0 - a) + clouds[i1, j1] * a) * b) / 255.0
+    thick = min(max((thick - 0.86 + 0.8 * share) * 3.2, 0.0), 1.0)
+    return thick * min(z * 7.0, 1.0)
+
+
+@njit(cache=True)
+def _sky(x: float, y: float, z: float, rows: Floats, clouds: NDArray[np.uint8], out: Floats) -> None:
+    """Colour of the sky, 0-255, in a direction (a unit vector); below the horizon that of haze."""
+    z = max(z, 0.0)
+    up = math.sqrt(z)
+    thick = _cloud(x, y, z, rows[6, 1], clouds)
+    # White clouds in the sun, grey ones under a closed sky.
+    for c in range(3):
+        blue = rows[5, c] + (rows[4, c] - rows[5, c]) * up
+        white = rows[5, c] * 0.25 + 189.0 - 34.0 * rows[6, 1] * thick
+        out[c] = blue + (white - blue) * thick * (0.85 - 0.35 * rows[6, 1])
 
 
 @njit(cache=True)
@@ -103,16 +182,21 @@ def _shade(
     colour: Floats,
     texel: Floats,
     unlit: NDArray[np.bool_],
-    sky: Floats,
+    shiny: Floats,
+    rows: Floats,
     shadow: NDArray[np.float32],
     sun_pose: Floats,
     sun_focal: float,
     bias_m: float,
+    clouds: NDArray[np.uint8],
+    heights: NDArray[np.uint8],
+    place: Floats,
     out: NDArray[np.uint8],
 ) -> None:
     height, width = depth.shape
-    sun, zenith, horizon = sky[0], sky[1], sky[2]
-    base = np.empty(3)
+    sun = rows[0]
+    flat = math.sqrt(sun[0] * sun[0] + sun[1] * sun[1]) + 1e-9
+    base, sky = np.empty(3), np.empty(3)
     w = np.zeros((height, width))
     for row in range(height):
         for col in range(width):
@@ -128,10 +212,9 @@ def _shade(
             stretch = math.sqrt(dx * dx + dy * dy + dz * dz)
             k = surface[row, col]
             if k < 0:
-                # Below the horizon, beyond the ground's edge: haze.
-                up = max(0.0, dz / stretch) ** 0.55
+                _sky(dx / stretch, dy / stretch, dz / stretch, rows, clouds, sky)
                 for c in range(3):
-                    out[row, col, c] = np.uint8(horizon[c] + (zenith[c] - horizon[c]) * up + 0.5)
+                    out[row, col, c] = np.uint8(sky[c] + 0.5)
                 continue
             z = depth[row, col]
             # The plane n . P = d through the pixel has 1 / z = n . (x, y, 1) / d: its slopes are n's x and y.
@@ -151,22 +234,47 @@ def _shade(
                 sharpness = min(1.0, max(0.0, (_FADE_TEXELS - texels) / (_FADE_TEXELS - 1.0)))
                 for c in range(3):
                     base[c] += (albedo[row, col, c] - base[c]) * sharpness
+            px, py, pz = pose[0, 3] + dx * z, pose[1, 3] + dy * z, pose[2, 3] + dz * z
             lit = nx * sun[0] + ny * sun[1] + nz * sun[2]
             if lit <= 0.0:
                 lit = 0.0
             else:
                 # Offset by more than a texel of the map, against self-shadowing.
-                px = pose[0, 3] + dx * z + nx * bias_m
-                py = pose[1, 3] + dy * z + ny * bias_m
-                pz = pose[2, 3] + dz * z + nz * bias_m
-                lit *= _sunlit(px, py, pz, shadow, sun_pose, sun_focal)
-            level = _AMBIENT + _FROM_ABOVE * nz + _FROM_EAST * nx + _FROM_NORTH * ny + _SUN * lit
-            if unlit[k]:
-                level = 1.0
-            range_m = z * stretch / _HAZE_RANGE_M
-            haze = 1.0 - math.exp(-range_m)
-            haze *= haze
+                at = px + nx * bias_m, py + ny * bias_m, pz + nz * bias_m
+                lit *= _sunlit(at[0], at[1], at[2], shadow, sun_pose, sun_focal)
+            u = (px + nx * _BEFORE_M - place[0]) / place[2]
+            v = (py + ny * _BEFORE_M - place[1]) / place[2]
+            deep = (place[3] + _bilinear(heights, u, v) * place[4] - pz - _BEFORE_M) / _DEEP_M
+            open_ = (1.0 - _SHADED * min(max(deep, 0.0), 1.0)) * (1.0 + SIDE * (nx * sun[0] + ny * sun[1]) / flat)
+            up = 0.5 + 0.5 * nz
+            level = min(max(4.0 * nz - 3.0, 0.0), 1.0) * rows[6, 2]
+            mirror = max(shiny[k], level * 0.6)
+            if mirror > 0.0:
+                turn = 2.0 * facing * stretch
+                _sky(
+                    (dx + nx * turn) / stretch,
+                    (dy + ny * turn) / stretch,
+                    (dz + nz * turn) / stretch,
+                    rows,
+                    clouds,
+                    sky,
+                )
+                glance = 1.0 - facing
+                mirror *= _MIRROR_LEAST + (_MIRROR_MOST - _MIRROR_LEAST) * glance * glance * glance
+            range_2 = (z * stretch) ** 2
+            haze = range_2 / (range_2 + rows[6, 0])
+            dark = 1.0 - (1.0 - _WET) * level
+            if not unlit[k]:
+                for c in range(3):
+                    from_sky = (rows[3, c] + (rows[2, c] - rows[3, c]) * up) * open_
+                    value = base[c] / 255.0
+                    base[c] = tone(value * value * dark * (from_sky + rows[1, c] * lit))
+                grey = 0.3 * base[0] + 0.6 * base[1] + 0.1 * base[2]
+                for c in range(3):
+                    base[c] = grey + (base[c] - grey) * _VIVID
             for c in range(3):
-                value = base[c] * level
-                value += (horizon[c] - value) * haze
+                value = base[c]
+                if mirror > 0.0:
+                    value += (sky[c] - value) * mirror
+                value += (rows[5, c] - value) * haze
                 out[row, col, c] = np.uint8(min(255.0, value + 0.5))

@@ -13,9 +13,11 @@ from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
+from aerialdojo_gen.rendering.lighting import Lighting
+from aerialdojo_gen.rendering.shading import lit_in_haze
 from aerialdojo_gen.scenes.colours import texel
 from aerialdojo_gen.scenes.context import context_of
-from aerialdojo_gen.scenes.model import Material, Part, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -71,6 +73,16 @@ class SurfaceTexels:
                 uv = self.uv_at(face[rows], points[rows])
                 out[rows] = texture[texel(uv, texture.shape[0], texture.shape[1])]
         return self.with_vertex_colours(face, points, out)
+
+    def mean_colours(self, face: Ints) -> Floats:
+        """Mean colours (n, 3) of the materials of faces (n,)."""
+        return np.array([m.colour for m in self.materials], dtype=np.float64)[self.material[face]]
+
+    def normals(self, face: Ints) -> Floats:
+        """Unit normals (n, 3) of faces (n,)."""
+        a, b, c = (self.vertices[self.faces[face, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30))
 
     def with_vertex_colours(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
         """Replace colours (n, 3) by interpolated vertex colours where a part has them."""
@@ -142,12 +154,15 @@ def masked_caster(scene: Scene, caster: TriangleRayCaster | None = None) -> Tria
 
 
 class Backdrop:
-    """Paints a scene's backdrop."""
+    """Paints what is behind a scene: sky domes as they are, and with a light the horizon too, lit."""
 
-    def __init__(self, scene: Scene) -> None:
-        parts = [part for instance in scene.backdrop for part in instance.parts]
+    def __init__(self, scene: Scene, light: Lighting | None = None) -> None:
+        shown = [i for i in scene.backdrop if light is not None or i.surface != HORIZON]
+        parts = [part for instance in shown for part in instance.parts]
         self._texels = SurfaceTexels(parts, scene.materials) if parts else None
         self._caster = TriangleRayCaster(*soup(parts)) if parts else None
+        self._lit = np.repeat([i.surface == HORIZON for i in shown for _ in i.parts], [len(p.faces) for p in parts])
+        self.light = light
 
     def paint(
         self, rgb: NDArray[np.uint8], missing: NDArray[np.bool_], camera: Camera, world_from_camera: Floats
@@ -161,8 +176,15 @@ class Backdrop:
         eye = world_from_camera[:3, 3]
         distance, face = self._caster.first_hit(eye, directions)
         hit = np.flatnonzero(face >= 0)
-        along = distance[hit] / np.linalg.norm(directions[hit], axis=1)
-        rgb[rows[hit], columns[hit]] = self._texels.colours(face[hit], eye + along[:, None] * directions[hit])
+        rows, columns, face, distance = rows[hit], columns[hit], face[hit], distance[hit]
+        unit = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
+        colours = self._texels.colours(face, eye + distance[:, None] * unit).astype(np.float64)
+        if self.light is not None:
+            # Its textures are finer than a pixel almost everywhere: their mean stands for them.
+            lit = self._lit[face]
+            base, normal = self._texels.mean_colours(face[lit]), self._texels.normals(face[lit])
+            colours[lit] = lit_in_haze(base, normal, unit[lit], distance[lit], self.light)
+        rgb[rows, columns] = np.clip(colours + 0.5, 0.0, 255.0).astype(np.uint8)
 
 
 def downscale(texture: NDArray[np.uint8], longest: int) -> NDArray[np.uint8]:

@@ -15,12 +15,13 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import encode_png
 from aerialdojo_gen.geometry.cameras import Camera
-from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, light_of, sun_view
+from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, cloud_map, height_map, light_of, sun_view
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.rendering.texels import Backdrop, downscale
 from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
 
@@ -62,9 +63,10 @@ class RenderWorld:
 
     def __init__(self, scene: Scene) -> None:
         found = surfaces(scene)
+        self._scene = scene
         self._vertices = np.concatenate([s.vertices for s in found])
-        self._light: Lighting = light_of(scene, [s.material for s in found])
-        self._backdrop = Backdrop(scene)
+        self._materials = [s.material for s in found]
+        self._clouds, self._heights = cloud_map(scene.name), height_map(scene)
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise RenderError("PyBullet's DIRECT client did not start: too many renderers are open in this process")
@@ -75,7 +77,13 @@ class RenderWorld:
             textures: dict[str, int] = {}
             for k, surface in enumerate(found):
                 self._add(surface, k, scene.materials[surface.material], textures, folder)
-        camera, pose, near_m, far_m = sun_view(scene)
+        self.relight(scene.light)
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
+        self._light: Lighting = light_of(self._scene, self._materials, light)
+        self._backdrop = Backdrop(self._scene, self._light)
+        camera, pose, near_m, far_m = sun_view(self._scene, light=light)
         self._shadow = ShadowMap(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
 
     def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
@@ -107,7 +115,9 @@ class RenderWorld:
     def render(self, camera: Camera, world_from_camera: Floats) -> Picture:
         """Take a picture from a pose (4, 4)."""
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
-        rgb = shade(camera, world_from_camera, albedo, depth, surface, self._light, self._shadow)
+        rgb = shade(
+            camera, world_from_camera, albedo, depth, surface, self._light, self._shadow, self._clouds, self._heights
+        )
         self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         return Picture(rgb, depth)
 

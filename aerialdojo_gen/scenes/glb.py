@@ -20,7 +20,8 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.scenes.anatomy import parse_anatomy
 from aerialdojo_gen.scenes.glb_materials import linear_colours, material_entry, read_material, srgb_colours
-from aerialdojo_gen.scenes.model import SURFACES, Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.light import WEATHERS
+from aerialdojo_gen.scenes.model import BACKDROPS, SURFACES, Instance, Material, Part, Scene
 
 _MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125
@@ -100,13 +101,14 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
         )
         scene = Scene(
             name=extras["name"],
-            instances=tuple(i for i in instances if i.surface != "dome"),
+            instances=tuple(i for i in instances if i.surface not in BACKDROPS),
             materials={m.name: m for m in materials},
             bounds=np.array(extras["bounds_m"], dtype=np.float64),
             sky=tuple(extras["sky"]),
             sun=tuple(extras["sun"]),
+            weather=extras.get("weather", WEATHERS[0]),
             imported=bool(extras.get("imported", False)),
-            backdrop=tuple(i for i in instances if i.surface == "dome"),
+            backdrop=tuple(i for i in instances if i.surface in BACKDROPS),
             attribution=str(document["asset"].get("copyright", "")),
         )
         _check(scene)
@@ -173,6 +175,7 @@ class _Writer:
             "bounds_m": scene.bounds.tolist(),
             "sky": list(scene.sky),
             "sun": list(scene.sun),
+            **({} if scene.weather == WEATHERS[0] else {"weather": scene.weather}),
             **({"imported": True} if scene.imported else {}),
         }
         children = list(range(1, len(self._nodes) + 1))
@@ -245,6 +248,8 @@ def _check(scene: Scene) -> None:
     for colour in (scene.sky, *(m.colour for m in scene.materials.values())):
         if len(colour) != 3 or not all(type(c) is int and 0 <= c <= 255 for c in colour):
             raise ValueError("a colour is none")
+    if scene.weather not in WEATHERS:
+        raise ValueError("a weather of no kind")
     numbers = [*scene.sun, *(m.tile_m for m in scene.materials.values())]
     if len(scene.sun) != 3 or not all(isinstance(n, int | float) and abs(n) < 1e9 for n in numbers):
         raise ValueError("sun or tiles are no numbers")

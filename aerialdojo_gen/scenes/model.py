@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.anatomy import Anatomy
+from aerialdojo_gen.scenes.light import Light, Weather
 
-# Closed body; open sheet, solid from both sides; open ground, below which no body flies; backdrop.
-SURFACES = ("solid", "sheet", "ground", "dome")
+# Land beyond the flight volume: drawn, and nothing else.
+HORIZON = "horizon"
+# Closed body; open sheet, solid from both sides; open ground, below which no body flies; sky; land beyond.
+SURFACES = ("solid", "sheet", "ground", "dome", HORIZON)
+BACKDROPS = ("dome", HORIZON)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +114,7 @@ class Scene:
     bounds: NDArray[np.float64]  # (2, 3) float64
     sky: tuple[int, int, int] = (150, 190, 230)  # sRGB of the sky, 0-255
     sun: tuple[float, float, float] = (0.45, -0.35, 0.82)  # Unit vector from the scene towards the sun, world frame
+    weather: Weather = "clear"
     imported: bool = False  # Whether it is an imported mesh, with categories of its own
     backdrop: tuple[Instance, ...] = ()
     attribution: str = ""  # Source and licence of imported data
@@ -123,6 +128,11 @@ class Scene:
             self._by_node[instance.node] = instance
         for instance in self.backdrop:
             del self._by_node[instance.node]
+
+    @property
+    def light(self) -> Light:
+        """The scene's own light."""
+        return Light(self.sun, self.weather)
 
     @property
     def ceiling_m(self) -> float:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.geometry.portable import unit
+from aerialdojo_gen.scenes.light import LightHead, sun_at
 from aerialdojo_gen.scenes.materials import read_toml
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -34,6 +35,12 @@ def _above(sun: tuple[float, float, float]) -> tuple[float, float, float]:
 
 _Direction = Annotated[float, Field(ge=-1e6, le=1e6)]
 Sun = Annotated[tuple[_Direction, _Direction, _Direction], AfterValidator(_above)]
+
+
+HorizonKind = Literal[
+    "", "none", "city", "town", "suburb", "works", "fields", "woods", "mountains", "alps", "snow", "desert", "canyon",
+    "coast", "tropics", "flood",
+]  # fmt: skip
 
 
 class Level(BaseModel):
@@ -70,6 +77,17 @@ class Origin(BaseModel):
     z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0  # The height that is z = 0, metres
 
 
+class HorizonHead(BaseModel):
+    """What lies beyond the flight volume."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: HorizonKind = ""  # The scene type's own where empty
+    seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0
+    hills_m: Annotated[float, Field(ge=0, le=1000)] | None = None  # Height of the farthest hills; the kind's own
+    ground: Annotated[str, Field(max_length=60)] = ""  # Material of the land; that of the scene's edge
+
+
 class SceneHead(BaseModel):
     """What a scene's file says of the scene as a whole."""
 
@@ -80,6 +98,8 @@ class SceneHead(BaseModel):
     ceiling_m: Height  # Highest z that a drone may fly at, metres
     sky: Colour = "#96bee6"
     sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
+    light: LightHead = LightHead()
+    horizon: HorizonHead = HorizonHead()
     palette: dict[str, str] = {}  # Materials by the file's names for them
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}  # Least number of instances by category
     attribution: Annotated[str, Field(max_length=500)] = ""
@@ -89,7 +109,10 @@ class SceneHead(BaseModel):
 
     @property
     def sun_direction(self) -> tuple[float, float, float]:
-        """Unit vector towards the sun, world frame."""
+        """Unit vector towards the sun, world frame: of `light` where that says a latitude."""
+        light = self.light
+        if light.latitude_deg is not None:
+            return sun_at(light.latitude_deg, light.date, light.hour)
         x, y, z = unit(np.array(self.sun))
         return float(x), float(y), float(z)
 

@@ -18,6 +18,7 @@ from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
+from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
@@ -263,13 +264,17 @@ class Site:
             raise AssetError(f"{self.name}: moves: no prop {missing!r} is placed{nearest(missing, self._nodes)}")
         ground = self._ground()
         instances = (ground, *self.instances)
-        specs = sorted({p.material for i in instances for p in i.parts})
-        materials = {s: self.catalogue.materials[s] for s in specs}
         x, y = self.head.size_m
         floor = float(ground.bounds[0, 2])
         bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.head.ceiling_m]])
+        beyond = make_horizon(self.name, self.head.horizon, ground, bounds, self.catalogue.materials)
+        specs = sorted({p.material for i in (*instances, *beyond) for p in i.parts})
+        materials = {s: self.catalogue.materials[s] for s in specs}
         sky, sun = parse_colour(self.head.sky), self.head.sun_direction
-        return Scene(self.name, instances, materials, bounds, sky, sun, attribution=self.head.attribution)
+        return Scene(
+            self.name, instances, materials, bounds, sky, sun, self.head.light.weather, backdrop=beyond,
+            attribution=self.head.attribution,
+        )  # fmt: skip
 
     def _ground(self) -> Instance:
         meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)

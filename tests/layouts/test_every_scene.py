@@ -31,6 +31,10 @@ from support.layout_checks import (
 )  # fmt: skip
 
 from aerialdojo_gen.base.paper_figures import paper_counts
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.horizon.build import MAX_TRIANGLES
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
@@ -149,6 +153,22 @@ def test_it_keeps_to_its_bounds_and_its_budget(scene: Scene) -> None:
     # Of air over the lowest ground there is more where there are hills.
     relief_m = float(np.ptp(scene["ground"].vertices[:, 2]))
     assert 12.0 <= scene.ceiling_m <= 30.0 + relief_m
+
+
+def test_the_land_goes_on_to_the_horizon(scene: Scene) -> None:
+    """From anywhere in the flight volume, below the horizon there is no sky; and what lies beyond is cheap."""
+    beyond = [part for instance in scene.backdrop for part in instance.parts]
+    assert 0 < sum(len(part.faces) for part in beyond) <= MAX_TRIANGLES
+    assert "horizon" not in scene
+    caster = TriangleRayCaster(*soup([*(part for i in scene.instances for part in i.parts), *beyond]))
+    draws = generator(0, "horizon", scene.name)
+    down = draws.normal(size=(4000, 3)) * [1.0, 1.0, 0.2]
+    down[:, 2] = -np.abs(down[:, 2]) - 1e-4
+    eyes = draws.uniform(scene.bounds[0], scene.bounds[1], (4000, 3))
+    ground = TriangleRayCaster(scene["ground"].vertices, scene["ground"].faces)
+    above = ground.first_hit(eyes, np.tile([0.0, 0.0, -1.0], (4000, 1)))[1] >= 0
+    assert above.mean() > 0.3
+    assert (caster.first_hit(eyes[above], down[above])[1] >= 0).all()
 
 
 def test_its_props_stand_on_something(scene: Scene) -> None:

@@ -282,6 +282,9 @@ class RenderConfig(Section):
         "auto", description="auto: the fastest that draws a known scene right on this machine"
     )
     instances: bool = Field(False, description="record instance id maps too")
+    light: Literal["scene", "clear", "overcast", "haze", "dusk", "wet", "random"] = Field(
+        "scene", description="the scene's own light, a weather, or one drawn for each trajectory"
+    )
     frames: Literal["video", "png"] = Field("video", description="videos, or a folder of PNG files each")
     sampling: Literal["steps", "time"] = Field("steps", description="a frame a pose, or a constant frame rate")
     views: tuple[Literal["front", "left", "right", "down"], ...] = Field(

@@ -12,6 +12,7 @@ from aerialdojo_gen.base.constants import FOV_DEG, RADIUS_M, WHEELBASE_M
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.scenes.light import LIGHTS, OWN
 from aerialdojo_gen.store.schemas import APPROACH, VIEWS
 
 # The actions that an agent can choose: all but Approach.
@@ -35,6 +36,9 @@ class Sensors:
         Horizontal field of view, degrees.
     max_depth_m : float
         Range of the depth camera, metres.
+    light : str
+        ``"scene"`` for the scene's own, ``"random"`` for one of each task, or ``"clear"``, ``"overcast"``,
+        ``"haze"``, ``"dusk"``, ``"wet"``.
     """
 
     views: tuple[str, ...] = VIEWS
@@ -44,6 +48,7 @@ class Sensors:
     height: int = 640
     fov_deg: float = FOV_DEG
     max_depth_m: float = 65.535
+    light: str = OWN
 
     def __post_init__(self) -> None:
         """Refuse what no body carries; give views their one form."""
@@ -53,6 +58,8 @@ class Sensors:
                 raise UsageError(unknown("no view", view, VIEWS))
         if len(set(self.views)) != len(self.views):
             raise UsageError(f"a view stands twice in {', '.join(self.views)}")
+        if self.light not in LIGHTS:
+            raise UsageError(unknown("no light", self.light, LIGHTS))
         if self.max_depth_m <= 0.0:
             raise UsageError(f"a range of depth is above 0 m, not {self.max_depth_m} m")
         try:

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.pictures import PAGE_JPEG, TEXTURE_PNG, encode_jpeg, en
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.lighting import light_of
 from aerialdojo_gen.rendering.texels import downscale
-from aerialdojo_gen.scenes.model import Material, Part, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 
 VERSION = 1
 _FLAT = (0, 0)
@@ -26,7 +26,7 @@ _LARGEST_PX = 4096
 # Larger textures, in bytes of pixels, are sent as JPEG.
 _PNG_BYTES = 4 << 20
 _NOTHING = np.zeros((0, 3), dtype=np.int64)
-_Look = tuple[int, int, bool, bool, bool, bool]
+_Look = tuple[int, int, bool, bool, bool, str]
 
 
 class _Body:
@@ -46,10 +46,11 @@ def scene_payload(scene: Scene) -> bytes:
     light = light_of(scene)
     body = _Body()
     groups: dict[_Look, list[tuple[int, Part]]] = {}
-    for behind, instances in ((False, scene.instances), (True, scene.backdrop)):
+    for backdrop, instances in ((False, scene.instances), (True, scene.backdrop)):
         for k, instance in enumerate(instances):
+            kind = instance.surface if backdrop else ""
             for part in instance.parts:
-                groups.setdefault(_look(scene.materials[part.material], behind), []).append((k, part))
+                groups.setdefault(_look(scene.materials[part.material], kind), []).append((k, part))
     boxes = [i.bounds for i in scene.instances]
     header = {
         "version": VERSION,
@@ -59,6 +60,10 @@ def scene_payload(scene: Scene) -> bytes:
         "sun": light.sun.tolist(),
         "zenith": (light.zenith / 255.0).tolist(),
         "horizon": (light.horizon / 255.0).tolist(),
+        "sun_rgb": light.sun_rgb.tolist(),
+        "sky_rgb": light.sky_rgb.tolist(),
+        "ground_rgb": light.ground_rgb.tolist(),
+        "haze_m": light.haze_m,
         "nodes": [
             {"node": i.node, "category": i.category, "variant": i.variant, "attributes": i.attributes}
             for i in scene.instances
@@ -71,11 +76,11 @@ def scene_payload(scene: Scene) -> bytes:
     return struct.pack("<I", len(head)) + head + bytes(body.data)
 
 
-def _look(material: Material, behind: bool) -> _Look:
-    """Return the key by which parts are merged into one draw call."""
+def _look(material: Material, kind: str) -> _Look:
+    """Return the key by which parts are merged into one draw call; `kind` is that of a backdrop."""
     texture = _texture(material)
     size = _FLAT if texture is None else (texture.shape[0], texture.shape[1])
-    return (*size, material.mask is not None, material.double_sided, material.unlit, behind)
+    return (*size, material.mask is not None, material.double_sided, material.unlit, kind)
 
 
 def _texture(material: Material) -> NDArray[np.uint8] | None:
@@ -89,14 +94,16 @@ def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: d
     """Merge parts into one draw call, in the order of the scene's instances."""
     vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
-    size, (holes, both_sides, unlit, behind) = look[:2], look[2:]
-    flags = {"holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": behind}
+    size, (holes, both_sides, unlit, kind) = look[:2], look[2:]
+    flags = {
+        "holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": kind == "dome", "beyond": kind == HORIZON
+    }  # fmt: skip
     group: dict[str, Any] = {
         **{key: True for key, value in flags.items() if value},
         "size": list(size),
         "position": body.add(vertices.astype("<f4").tobytes()),
         "index": body.add(index.astype("<u4").tobytes()),
-        "ranges": body.add((_NOTHING if behind else _ranges(parts)).astype("<u4").tobytes()),
+        "ranges": body.add((_NOTHING if kind else _ranges(parts)).astype("<u4").tobytes()),
     }
     if size == _FLAT:
         colours = np.full((sum(counts), 4), 255, dtype=np.uint8)

@@ -19,6 +19,7 @@ from aerialdojo_gen.rendering.placement import places
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
 from aerialdojo_gen.rendering.sample import choose_trajectories, tables
 from aerialdojo_gen.rendering.trajectory import FramePoses
+from aerialdojo_gen.scenes.light import chosen_light
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.files import sha256_of, size_of
 from aerialdojo_gen.store.root import DataRoot
@@ -75,7 +76,8 @@ class _Trajectory:
     def _views(self, here: Path) -> dict[str, set[str]]:
         """Record the views into a folder; returns their quality flags."""
         config = self.config
-        renderer, solid = scene_renderer(self.scene, config.renderer), scene_solid(self.scene)
+        light = chosen_light(self.scene.light, config.light, 0, self.nav_id)
+        renderer, solid = scene_renderer(self.scene, config.renderer, light), scene_solid(self.scene)
         flags = record_views(renderer, solid, config.views, self.poses, config, here)
         wrong = [view for view in config.views if flags[view]]
         if not wrong:
@@ -85,7 +87,7 @@ class _Trajectory:
             wrong = list(config.views)
         for file in {place.file for place in places(config) if place.view in wrong}:
             remove(here / file)
-        renderer = scene_renderer(self.scene, config.renderer, reopen=True)
+        renderer = scene_renderer(self.scene, config.renderer, light, reopen=True)
         return flags | record_views(renderer, solid, wrong, self.poses, config, here)
 
     def _rows(self, here: Path, folder: str, flags: dict[str, set[str]]) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ export async function readPayload(buffer) {
   const groups = await Promise.all(header.groups.map(async (group) => ({
     size: group.size,
     holes: group.holes, bothSides: group.both_sides, unlit: group.unlit, behind: group.behind,
+    beyond: group.beyond,
     position: at(buffer, base, group.position, Float32Array),
     index: at(buffer, base, group.index, Uint32Array),
     ranges: at(buffer, base, group.ranges, Uint32Array),

@@ -1,8 +1,9 @@
-// The project's look in WebGL: what aerialdojo_gen/rendering/shading.py does, in sRGB values as there.
+// The project's look in WebGL: what aerialdojo_gen/rendering/shading.py does, without its shade under things and its mirrors.
 import * as THREE from "three";
 
 const LIGHT = /* glsl */ `
-  uniform vec3 sun, horizon;
+  uniform vec3 sun, horizon, sunRgb, skyRgb, groundRgb;
+  uniform float hazeM;
   uniform sampler2D shadowMap;
   uniform mat4 shadowMatrix;
   uniform float shadowBias, shadowSize, shadowOn;
@@ -20,12 +21,18 @@ const LIGHT = /* glsl */ `
     vec3 n = normalize(cross(dFdx(rel), dFdy(rel)));
     float lit = max(0.0, dot(n, sun));
     if (lit > 0.0) lit *= sunlit(cameraPosition + rel + n * shadowBias);
-    float level = 0.55 + 0.11 * n.z + 0.05 * n.x + 0.03 * n.y + 0.47 * lit;
+    float side = 1.0 + 0.16 * dot(n.xy, sun.xy) / (length(sun.xy) + 1e-9);
+    vec3 light = base * base * (mix(groundRgb, skyRgb, 0.5 + 0.5 * n.z) * side + sunRgb * lit);
+    light = light / (light + 0.155) * 1.019;
+    light = mix(vec3(dot(light, vec3(0.3, 0.6, 0.1))), light, 0.85);
     #ifdef UNLIT
-      level = 1.0;
+      light = base;
     #endif
-    float haze = 1.0 - exp(-length(rel) / 420.0);
-    return mix(base * level, horizon, haze * haze);
+    float range = dot(rel, rel), haze = range / (range + hazeM * hazeM);
+    #ifdef BEYOND
+      haze = max(haze, smoothstep(800.0, 1600.0, sqrt(range)));
+    #endif
+    return mix(light, horizon, haze);
   }`;
 
 const VERTEX = /* glsl */ `
@@ -83,6 +90,10 @@ export function lightUniforms(payload) {
   return {
     sun: { value: new THREE.Vector3(...payload.sun) },
     horizon: { value: new THREE.Vector3(...payload.horizon) },
+    sunRgb: { value: new THREE.Vector3(...payload.sun_rgb) },
+    skyRgb: { value: new THREE.Vector3(...payload.sky_rgb) },
+    groundRgb: { value: new THREE.Vector3(...payload.ground_rgb) },
+    hazeM: { value: payload.haze_m },
     shadowMap: { value: null },
     shadowMatrix: { value: new THREE.Matrix4() },
     shadowBias: { value: 0.05 },
@@ -115,13 +126,13 @@ export function groupMesh(group, uniforms, anisotropy) {
     glslVersion: THREE.GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms: own,
     defines: {
       ...(group.uv && { TEXTURED: 1 }), ...(group.holes && { HOLES: 1 }), ...(group.unlit && { UNLIT: 1 }),
-      ...(group.behind && { BEHIND: 1 }),
+      ...(group.behind && { BEHIND: 1 }), ...(group.beyond && { BEYOND: 1 }),
     },
     side: group.bothSides || group.behind ? THREE.DoubleSide : THREE.FrontSide,
   });
   const mesh = new THREE.Mesh(geometry, material);
   if (group.behind) mesh.frustumCulled = false;
-  mesh.userData.shades = !group.behind;
+  mesh.userData.shades = !group.behind && !group.beyond;
   mesh.matrixAutoUpdate = false;
   return mesh;
 }
@@ -134,7 +145,7 @@ export function skyMesh(payload) {
     vertexShader: `out vec3 dir; void main() { dir = position;
       gl_Position = projectionMatrix * vec4(mat3(viewMatrix) * position, 1.0); }`,
     fragmentShader: `in vec3 dir; uniform vec3 zenith, horizon; out vec4 pixel; void main() {
-      pixel = vec4(mix(horizon, zenith, pow(max(0.0, normalize(dir).z), 0.55)), 1.0); }`,
+      pixel = vec4(mix(horizon, zenith, sqrt(max(0.0, normalize(dir).z))), 1.0); }`,
   });
   const sky = new THREE.Mesh(new THREE.IcosahedronGeometry(100, 3), material);
   sky.frustumCulled = false;
