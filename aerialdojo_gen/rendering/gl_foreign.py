@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.rendering.gl_geometry import Kind, cut, is_foreign, packed
+from aerialdojo_gen.rendering.shading import MUTE
 from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Scene
 
 # Fourth byte of the vertex colour of an unlit material.
@@ -69,7 +70,7 @@ def _layers(materials: list[Material], key: _Key) -> NDArray[np.uint8]:
     layers = np.empty((len(materials), key[0], key[1], 4 if key[2] else 3), dtype=np.uint8)
     for k, material in enumerate(materials):
         assert material.texture is not None
-        texture = material.texture
+        texture = material.texture if material.unlit else cv2.transform(material.texture, MUTE)
         if material.mask is not None:
             alpha = np.where(material.mask, 255, 0).astype(np.uint8)
             # Fill holes with the mean colour, or filtering would give leaves dark edges.

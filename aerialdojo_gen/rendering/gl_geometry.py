@@ -17,6 +17,7 @@ from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import is_shiny
+from aerialdojo_gen.rendering.shading import MUTE, muted
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
@@ -154,7 +155,8 @@ def packed(part: Part, material: Material, instance: int) -> NDArray[np.void]:
     rows["position"] = corners[solid]
     rows["uv"] = part.uv[part.faces[solid]]
     rows["normal"] = (normal[solid] / length[solid, None])[:, None]
-    rows["colour"][..., :3] = material.colour if part.colours is None else part.colours[part.faces[solid]]
+    colours = np.array(material.colour) if part.colours is None else part.colours[part.faces[solid]]
+    rows["colour"][..., :3] = colours if material.unlit else muted(colours)
     rows["instance"] = instance
     return rows
 
@@ -201,7 +203,6 @@ def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
     layers = np.empty((len(textures), edge, edge, 3), dtype=np.uint8)
     for k, texture in enumerate(textures):
         larger = max(texture.shape[:2]) > edge
-        layers[k] = cv2.resize(
-            texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST
-        )
+        sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)
+        layers[k] = cv2.transform(sized, MUTE)
     return layers

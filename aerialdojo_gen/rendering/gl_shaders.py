@@ -64,7 +64,14 @@ flat out float v_layer;
 out vec3 v_ray;
 #ifdef HORIZON
 out vec3 v_light;
-out vec3 v_normal;
+flat out vec3 v_normal;
+out vec4 v_air;  // colour and thickness of the haze before it
+uniform vec3 horizon;
+uniform vec3 zenith;
+uniform vec3 air;
+uniform vec3 sun_rgb;
+uniform vec3 sky_rgb;
+uniform vec3 ground_rgb;
 #else
 flat out vec3 v_light;
 flat out vec3 v_normal;
@@ -93,10 +100,18 @@ void main() {
     v_normal = n;
     v_colour = colour.rgb;
     v_light = vec3(0.5 + 0.5 * n.z, 1.0 + dot(n.xy, side), max(dot(n, sun), 0.0));
-#ifndef HORIZON
+#ifdef HORIZON
+    v_light = mix(ground_rgb, sky_rgb, v_light.x) * v_light.y + sun_rgb * v_light.z;
+    float range_2 = dot(v_ray, v_ray), range_m = sqrt(range_2);
+    // The land's end is the sky.
+    v_air = vec4(mix(horizon, zenith, sqrt(max(v_ray.z, 0.0) / range_m)),
+                 max(range_2 / (range_2 + air.x), smoothstep(END * 0.5, END, range_m)));
+#else
     vec4 s = sun_from_world * vec4(position + n * bias_m, 1.0);
     v_sun = vec4((s.xyz + s.w) * 0.5, s.w);
+#ifdef TEXTURED
     v_heights = vec3((position.xy + n.xy * BEFORE - place.xy) * extent, (lowest_m - position.z - BEFORE) / DEEP);
+#endif
 #endif
 #ifdef TEXTURED
     v_uv = uv;
@@ -135,7 +150,8 @@ flat in float v_layer;
 in vec3 v_ray;
 #ifdef HORIZON
 in vec3 v_light;
-in vec3 v_normal;
+flat in vec3 v_normal;
+in vec4 v_air;
 #else
 flat in vec3 v_light;
 flat in vec3 v_normal;
@@ -154,20 +170,20 @@ flat in float v_instance;
 layout(location = 1) out float out_instance;
 #endif
 void main() {
-    float range_2 = dot(v_ray, v_ray), range_m = sqrt(range_2);
+    float range_2 = dot(v_ray, v_ray), nearness = inversesqrt(range_2);
     vec3 base = v_colour;
-    float facing = -dot(v_normal, v_ray) / range_m;
+    float facing = -dot(v_normal, v_ray) * nearness;
 #ifdef TEXTURED
 #ifdef NATURAL
-    // The same pattern eight times as large, and again: ground has grain at every distance.
-    float lod = max(0.5 * log2(range_2 / (v_texture.y * max(facing, 0.02))), 0.0);
-    float octave = lod < 2.4 ? 0.0 : lod < 5.4 ? 1.0 : 2.0;
-    vec2 at = v_uv * (lod < 2.4 ? 1.0 : lod < 5.4 ? 0.125 : 0.015625);
-    vec3 grain = textureLod(textures, vec3(at, v_texture.x), lod - 3.0 * octave).rgb;
-    base += (grain - base) * (lod < 2.4 ? 1.0 - 0.2 * lod : GRAIN);
+    // The same pattern eight times as large, and again: ground has grain at every distance. By the square of the
+    // texels a pixel, for a logarithm takes long.
+    float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
+    vec2 at = v_uv * (texels_2 < 28.0 ? 1.0 : texels_2 < 1800.0 ? 0.125 : 0.015625);
+    vec3 grain = texture(textures, vec3(at, v_texture.x)).rgb;
+    base += (grain - base) * max(1.0 - 0.016 * texels_2, GRAIN);
 #else
-    float texels = sqrt(range_2 / (v_texture.y * max(facing, 0.02)));
-    float keep = clamp((FADE - texels) / (FADE - 1.0), 0.0, 1.0);
+    float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
+    float keep = clamp((FADE * FADE - texels_2) * (1.0 / (FADE * FADE - 1.0)), 0.0, 1.0);
     base = mix(base, texture(textures, vec3(v_uv, v_texture.x)).rgb, keep);
 #endif
 #endif
@@ -186,9 +202,9 @@ void main() {
 #endif
     return;
 #endif
+    vec3 albedo = base * base;
 #ifdef HORIZON
-    vec3 from_sky = mix(ground_rgb, sky_rgb, v_light.x) * v_light.y;
-    float lit = v_light.z;
+    vec3 linear = albedo * v_light;
 #else
     // The mean of four comparisons, weighted as a linear filter would.
     vec3 at_sun = v_sun.xyz / v_sun.w;
@@ -197,20 +213,26 @@ void main() {
     vec2 column = mix(lit_by.wx, lit_by.zy, part.x);
     float lit = v_light.z * mix(column.x, column.y, part.y);
     // What is deep below its surroundings sees less of the sky.
+#ifdef TEXTURED
     float deep = clamp(textureLod(heights, v_heights.xy, 0.0).r * (REACH / DEEP) + v_heights.z, 0.0, 1.0);
-    vec3 from_sky = mix(ground_rgb, sky_rgb, v_light.x) * (v_light.y * (1.0 - SHADED * deep));
+#else
+    float deep = 0.0;
 #endif
-    vec3 albedo = base * base;
+    vec3 from_sky = mix(ground_rgb, sky_rgb, v_light.x) * (v_light.y * (1.0 - SHADED * deep));
 #ifdef WET
     float level = clamp(4.0 * v_normal.z - 3.0, 0.0, 1.0) * air.z;
     albedo *= 1.0 - (1.0 - WETNESS) * level;
 #endif
     vec3 linear = albedo * (from_sky + sun_rgb * lit);
+#endif
     vec3 value = linear / (linear + TOE) * GAIN;
-    value = mix(vec3(dot(value, vec3(0.3, 0.6, 0.1))), value, VIVID);
 #ifdef FOREIGN
     value = mix(base, value, v_lit);
 #endif
+#ifdef HORIZON
+    value = mix(value, v_air.rgb, v_air.a);
+    out_pixel = uvec2(packUnorm4x8(vec4(value, 1.0)), ENDLESS);
+#else
 #if defined(SHINY) || defined(WET)
 #ifdef SHINY
     float mirror = 1.0;
@@ -219,15 +241,9 @@ void main() {
 #endif
     float glance = 1.0 - facing;
     mirror *= MIRROR_LEAST + (MIRROR_MOST - MIRROR_LEAST) * glance * glance * glance;
-    value = mix(value, sky_at(v_ray / range_m + 2.0 * facing * v_normal), mirror);
+    value = mix(value, sky_at(v_ray * nearness + 2.0 * facing * v_normal), mirror);
 #endif
     float haze = range_2 / (range_2 + air.x);
-#ifdef HORIZON
-    // The land's end is the sky.
-    haze = max(haze, smoothstep(END * 0.5, END, range_m));
-    value = mix(value, mix(horizon, zenith, sqrt(max(v_ray.z, 0.0) / range_m)), haze);
-    out_pixel = uvec2(packUnorm4x8(vec4(value, 1.0)), ENDLESS);
-#else
     value = mix(value, horizon, haze);
     out_pixel = uvec2(packUnorm4x8(vec4(value, 1.0)), floatBitsToUint(1.0 / gl_FragCoord.w));
 #endif
@@ -330,7 +346,6 @@ def specialise(source: str, *defined: str) -> str:
         "CLOUD_SCALE": shading._CLOUD_SCALE,
         "GRAIN": _GRAIN,
         "REACH": lighting.REACH_M,
-        "VIVID": shading._VIVID,
         "END": shading._END_M,
     }
     lines = [f"#define {name} {value:.6f}" for name, value in constants.items()]

@@ -8,6 +8,7 @@ same picture. No light goes by north or east: agents are told no heading, and wa
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ _DEEP_M, _BEFORE_M = 5.0, 0.7
 _TOE, _GAIN = 0.155, 1.019
 # Share of a colour's saturation that is kept; and where land ends in the haze of the sky, metres.
 _VIVID, _END_M = 0.85, 1600.0
+_GREY = np.array([0.3, 0.6, 0.1])
+MUTE: Floats = _VIVID * np.eye(3) + (1.0 - _VIVID) * np.tile(_GREY, (3, 1))
 # Least and greatest share of the sky that water and glass mirror; where they are looked at head-on, and along.
 _MIRROR_LEAST, _MIRROR_MOST = 0.10, 0.85
 # What is wet is darker.
@@ -78,15 +81,18 @@ def tone(linear: float) -> float:
     return linear / (linear + _TOE) * _GAIN * 255.0
 
 
+def muted(colours: NDArray[Any]) -> Floats:
+    """Give colours (..., 3), 0-255, a little less saturation: light makes it up."""
+    return np.asarray(np.rint(colours.astype(np.float64) @ MUTE.T))
+
+
 def lit_in_haze(base: Floats, normal: Floats, unit: Floats, distance: Floats, light: Lighting) -> Floats:
     """Light surfaces of the horizon: colours (n, 3) 0-255, normals, directions (unit) and distances to them."""
     flat = light.sun[:2] / (np.linalg.norm(light.sun[:2]) + 1e-9)
     up, side = 0.5 + 0.5 * normal[:, 2:], 1.0 + SIDE * (normal[:, :2] @ flat)[:, None]
     from_sky = (light.ground_rgb + (light.sky_rgb - light.ground_rgb) * up) * side
-    linear = (base / 255.0) ** 2 * (from_sky + light.sun_rgb * np.maximum(normal @ light.sun, 0.0)[:, None])
+    linear = (base @ MUTE.T / 255.0) ** 2 * (from_sky + light.sun_rgb * np.maximum(normal @ light.sun, 0.0)[:, None])
     value = linear / (linear + _TOE) * _GAIN * 255.0
-    grey = value @ np.array([0.3, 0.6, 0.1])
-    value = grey[:, None] + (value - grey[:, None]) * _VIVID
     haze = np.maximum(distance**2 / (distance**2 + light.haze_m**2), _smoothstep(2.0 * distance / _END_M - 1.0))
     sky = light.horizon + (light.zenith - light.horizon) * np.sqrt(np.maximum(unit[:, 2:], 0.0))
     return np.asarray(value + (sky - value) * haze[:, None])
@@ -230,8 +236,8 @@ def _shade(
                 base[c] = colour[k, c]
             if texel[k] > 0.0:
                 # The rasteriser samples the nearest texel: fade into the mean colour with distance, against noise.
-                texels = z * stretch / focal / math.sqrt(max(facing, 0.02)) / texel[k]
-                sharpness = min(1.0, max(0.0, (_FADE_TEXELS - texels) / (_FADE_TEXELS - 1.0)))
+                texels_2 = (z * stretch / focal / texel[k]) ** 2 / max(facing, 0.02)
+                sharpness = min(1.0, max(0.0, (_FADE_TEXELS**2 - texels_2) / (_FADE_TEXELS**2 - 1.0)))
                 for c in range(3):
                     base[c] += (albedo[row, col, c] - base[c]) * sharpness
             px, py, pz = pose[0, 3] + dx * z, pose[1, 3] + dy * z, pose[2, 3] + dz * z
@@ -264,14 +270,13 @@ def _shade(
             range_2 = (z * stretch) ** 2
             haze = range_2 / (range_2 + rows[6, 0])
             dark = 1.0 - (1.0 - _WET) * level
-            if not unlit[k]:
-                for c in range(3):
+            grey = 0.3 * base[0] + 0.6 * base[1] + 0.1 * base[2]
+            for c in range(3):
+                if not unlit[k]:
+                    base[c] = grey + (base[c] - grey) * _VIVID
                     from_sky = (rows[3, c] + (rows[2, c] - rows[3, c]) * up) * open_
                     value = base[c] / 255.0
                     base[c] = tone(value * value * dark * (from_sky + rows[1, c] * lit))
-                grey = 0.3 * base[0] + 0.6 * base[1] + 0.1 * base[2]
-                for c in range(3):
-                    base[c] = grey + (base[c] - grey) * _VIVID
             for c in range(3):
                 value = base[c]
                 if mirror > 0.0:
