@@ -118,7 +118,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
 
 def _tags(material: Material) -> tuple[str, ...]:
     """Variant of the program that draws a material of the catalogue."""
-    tags = ()
+    tags: tuple[str, ...] = ()
     if material.texture is not None:
         tags = ("TEXTURED", "NATURAL") if material.name.split(":")[0] in _GRAINED else ("TEXTURED",)
     return (*tags, "SHINY") if is_shiny(material) else tags

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -102,11 +101,12 @@ def base_material(border: Sequence[Stretch], kind: Kind) -> str:
     """Choose the material of the land: what most of the scene's edge is made of, if that is natural ground."""
     if kind.ground:
         return kind.ground
-    length: Counter[str] = Counter()
+    length: dict[str, float] = {}
     for one in border:
         if one.material.split(":")[0] in _NATURAL:
-            length[one.material] += float(np.linalg.norm(one.points[-1] - one.points[0]))
-    return length.most_common(1)[0][0] if length else (kind.fields or ("grass",))[0]
+            span_m = float(np.linalg.norm(one.points[-1] - one.points[0]))
+            length[one.material] = length.get(one.material, 0.0) + span_m
+    return max(length, key=lambda name: length[name]) if length else (kind.fields or ("grass",))[0]
 
 
 def make_land(border: Sequence[Stretch], kind: Kind, top_m: float, noise: Noise) -> Land:

@@ -215,14 +215,13 @@ def _tree(species: str, crown: str, draw: float, near: bool) -> list[tuple[str, 
         trunk = [("#5a4534", _turned([(0.22, -1.0), (0.18, high * 0.2)], 3, None))] if near else []
         return [*((crown, cone) for cone in cones), *trunk]
     if species == "palm":
-        trunk = ("#7d6a50", _turned([(0.22, -1.0), (0.15, high)], 3, None))
-        return [trunk, (crown, _fronds(high, 3.2))]
+        return [("#7d6a50", _turned([(0.22, -1.0), (0.15, high)], 3, None)), (crown, _fronds(high, 3.2))]
     r = high * (0.26 + 0.1 * draw)
-    trunk = ("#5a4534", _turned([(0.26, -1.0), (0.2, high * 0.4)], 3, None))
+    stem = ("#5a4534", _turned([(0.26, -1.0), (0.2, high * 0.4)], 3, None))
     if near:
         profile = [(r * 0.55, high * 0.3), (r, high * 0.52), (r * 0.78, high * 0.8)]
-        return [trunk, (crown, _turned(profile, 6, high))]
-    return [trunk, (crown, _turned([(r * 0.6, high * 0.28), (r, high * 0.6)], 5, high))]
+        return [stem, (crown, _turned(profile, 6, high))]
+    return [stem, (crown, _turned([(r * 0.6, high * 0.28), (r, high * 0.6)], 5, high))]
 
 
 def _fronds(high: float, reach: float) -> Mesh:
