@@ -239,10 +239,10 @@ def _inner(strips: _Strips, v: Floats) -> list[_Faces]:
 
 
 def _walls(strips: _Strips, v: Floats, base: str) -> list[_Faces]:
-    """Upright faces, seen from both sides, where the land on the two sides of a seam differs in height."""
+    """Faces, seen from both sides, where the land on the two sides of a seam does not meet."""
     out = []
     after = np.roll(np.arange(len(v)), -1)
-    gap = np.abs(v[:, 1, :, 2] - v[after, 0, :, 2])
+    gap = np.linalg.norm(v[:, 1] - v[after, 0], axis=-1)
     for k in np.flatnonzero(gap.max(axis=1) > 1e-3):
         for r in range(len(RINGS_M) - 1):
             if gap[k, r : r + 2].max() > 1e-3:
