@@ -132,6 +132,9 @@ def cloud_map(scene: str) -> NDArray[np.uint8]:
     return out
 
 
+NO_CLOUDS: NDArray[np.uint8] = np.zeros((1, 1), np.uint8)
+
+
 @dataclass(frozen=True, eq=False)
 class HeightMap:
     """Height of the highest surface about each place, blurred: what is below it sees less of the sky."""
@@ -145,7 +148,7 @@ class HeightMap:
     @classmethod
     def nowhere(cls) -> HeightMap:
         """A map on which nothing is below anything."""
-        return cls(0.0, 0.0, 1.0, -1e6, np.zeros((2, 2), np.uint8))
+        return cls(0.0, 0.0, 1.0, -1e6, np.zeros((1, 1), np.uint8))
 
 
 def height_map(scene: Scene) -> HeightMap:

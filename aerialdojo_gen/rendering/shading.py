@@ -118,6 +118,8 @@ def _bilinear(table: NDArray[np.uint8], u: float, v: float) -> float:
 def _cloud(x: float, y: float, z: float, share: float, clouds: NDArray[np.uint8]) -> float:
     """Thickness of the clouds, 0 to 1, in a direction (a unit vector) above the horizon."""
     n = clouds.shape[0]
+    if n == 1:
+        return 0.0
     far = _CLOUD_SCALE / (z + _CLOUD_FLAT)
     u, v = x * far * n - 0.5, y * far * n - 0.5
     j, i = math.floor(u), math.floor(v)
@@ -202,7 +204,7 @@ def _shade(
     height, width = depth.shape
     sun = rows[0]
     flat = math.sqrt(sun[0] * sun[0] + sun[1] * sun[1]) + 1e-9
-    base, sky = np.empty(3), np.empty(3)
+    base, sky, mapped = np.empty(3), np.empty(3), heights.shape[0] > 1
     w = np.zeros((height, width))
     for row in range(height):
         for col in range(width):
@@ -248,9 +250,11 @@ def _shade(
                 # Offset by more than a texel of the map, against self-shadowing.
                 at = px + nx * bias_m, py + ny * bias_m, pz + nz * bias_m
                 lit *= _sunlit(at[0], at[1], at[2], shadow, sun_pose, sun_focal)
-            u = (px + nx * _BEFORE_M - place[0]) / place[2]
-            v = (py + ny * _BEFORE_M - place[1]) / place[2]
-            deep = (place[3] + _bilinear(heights, u, v) * place[4] - pz - _BEFORE_M) / _DEEP_M
+            deep = 0.0
+            if mapped:
+                u = (px + nx * _BEFORE_M - place[0]) / place[2]
+                v = (py + ny * _BEFORE_M - place[1]) / place[2]
+                deep = (place[3] + _bilinear(heights, u, v) * place[4] - pz - _BEFORE_M) / _DEEP_M
             open_ = (1.0 - _SHADED * min(max(deep, 0.0), 1.0)) * (1.0 + SIDE * (nx * sun[0] + ny * sun[1]) / flat)
             up = 0.5 + 0.5 * nz
             level = min(max(4.0 * nz - 3.0, 0.0), 1.0) * rows[6, 2]
