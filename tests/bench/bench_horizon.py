@@ -63,9 +63,9 @@ def main() -> None:
         print(f"{name}: mean {mean[0]:.2f} % to {mean[1]:.4f} %, most {most[0]:.1f} % to {most[1]:.4f} %, "
               f"{triangles:,} triangles", flush=True)  # fmt: skip
     whole = np.concatenate(every)
-    some, many = (100 * (whole > limit).mean(axis=0) for limit in (0.0, 0.01))
-    print(f"{len(whole)} views: any sky in {some[0]:.1f} % to {some[1]:.2f} %, more than 1 % in {many[0]:.1f} % to "
-          f"{many[1]:.2f} %; mean {100 * whole.mean(axis=0)[0]:.2f} % to {100 * whole.mean(axis=0)[1]:.5f} %")  # fmt: skip
+    some, many, mean = (100 * values.mean(axis=0) for values in (whole > 0.0, whole > 0.01, whole))
+    print(f"{len(whole)} views: any sky in {some[0]:.1f} % to {some[1]:.2f} %")
+    print(f"more than 1 % in {many[0]:.1f} % to {many[1]:.2f} %; mean {mean[0]:.2f} % to {mean[1]:.5f} %")
 
 
 if __name__ == "__main__":

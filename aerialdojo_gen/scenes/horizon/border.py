@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.model import Instance, Part
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,7 @@ def _pieces(part: Part, bounds: Floats, side: int) -> list[tuple[float, Floats, 
     across = 1 - axis
     corners = part.vertices[part.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    corners = corners[normal[:, 2] > 0.05 * np.linalg.norm(normal, axis=1)]
+    corners = corners[normal[:, 2] > 0.05 * norm(normal)]
     on = np.abs(corners[:, :, across] - bounds[int(upper), across]) < _ON_M
     found = []
     for a, b in ((0, 1), (1, 2), (2, 0)):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.geometry.portable import norm, power
 from aerialdojo_gen.scenes.horizon.border import OUTWARDS, Stretch
 from aerialdojo_gen.scenes.horizon.kinds import Kind
 
@@ -84,7 +85,7 @@ class _Strips:
             after = border[(k + 1) % len(border)]
             if after.side == one.side:
                 continue
-            start = np.arctan2(out[1], out[0])
+            start = (one.side - 1) * np.pi / 2
             for n in range(_FAN):
                 angle = start + np.pi / 2 * np.array([n, n + 1]) / _FAN
                 near = one if n < _FAN / 2 else after
@@ -104,7 +105,7 @@ def base_material(border: Sequence[Stretch], kind: Kind) -> str:
     length: dict[str, float] = {}
     for one in border:
         if one.material.split(":")[0] in _NATURAL:
-            span_m = float(np.linalg.norm(one.points[-1] - one.points[0]))
+            span_m = float(norm(one.points[-1] - one.points[0]))
             length[one.material] = length.get(one.material, 0.0) + span_m
     return max(length, key=lambda name: length[name]) if length else (kind.fields or ("grass",))[0]
 
@@ -121,7 +122,7 @@ def make_land(border: Sequence[Stretch], kind: Kind, top_m: float, noise: Noise)
     parts = [*_quads(strips, vertices, kind, base, noise), *_inner(strips, vertices), *_walls(strips, vertices, base)]
     parts.append(_end(vertices, top_m, kind))
     corners = np.concatenate([p[0] for p in parts])
-    keep = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) > 1e-7
+    keep = norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) > 1e-7
     material = [name for p in parts for name in p[1]]
     open_land, water = (np.concatenate([p[k] for p in parts])[keep] for k in (2, 3))
     points, index = np.unique(corners[keep].reshape(-1, 3), axis=0, return_inverse=True)
@@ -133,8 +134,9 @@ def _positions(strips: _Strips, noise: Noise) -> Floats:
     d = RINGS_M[None, None, :, None]
     straight = strips.foot[:, :, None, :2] + strips.way[:, :, None] * d
     across = np.stack([-strips.way[..., 1], strips.way[..., 0]], axis=-1)[:, :, None]
-    angle = np.arctan2(strips.way[..., 1], strips.way[..., 0])[:, :, None] * 2.0
-    wind = noise(100.0 * np.cos(angle) + RINGS_M, 100.0 * np.sin(angle) + 0.0 * RINGS_M, 160.0, 3.0)
+    # Opposite sides wind alike: what crosses the site goes on as it is.
+    x, y = strips.way[:, :, None, 0], strips.way[:, :, None, 1]
+    wind = noise(100.0 * (x * x - y * y) + RINGS_M, 200.0 * x * y + 0.0 * RINGS_M, 160.0, 3.0)
     return np.asarray(
         straight + across * (np.minimum(0.3 * RINGS_M, 50.0) * _smooth(RINGS_M / 60.0) * wind)[..., None]
     )
@@ -143,7 +145,7 @@ def _positions(strips: _Strips, noise: Noise) -> Floats:
 def _shore_distance(strips: _Strips, grid: Floats) -> Floats:
     """Distance (n, 2, rings) along a ring from the nearest strip of water; inf without any."""
     left = grid[:, 0]
-    step = np.linalg.norm(np.roll(left, -1, axis=0) - left, axis=-1)
+    step = norm(np.roll(left, -1, axis=0) - left)
     n = len(step)
     far = np.full((n, len(RINGS_M)), np.inf)
     wet = strips.water | np.roll(strips.water, 1)
@@ -164,7 +166,7 @@ def _heights(strips: _Strips, grid: Floats, kind: Kind, noise: Noise) -> Floats:
     hills = 0.55 + 0.6 * noise(x, y, 620.0) + 0.3 * noise(x, y, 240.0, 1.0)
     if kind.steep:
         ridge = 1.0 - np.abs(noise(x, y, 540.0)) * 1.5 + 0.25 * noise(x, y, 170.0, 1.0)
-        hills = np.maximum(ridge, 0.1) ** 1.4
+        hills = power(np.maximum(ridge, 0.1), 1.4)
     relief = kind.near_m * (noise(x, y, 90.0, 2.0) + 0.4 * noise(x, y, 35.0, 4.0)) * _smooth(d / 90.0)
     relief = relief + kind.hills_m * np.maximum(hills, 0.0) * _smooth((d - _HILLS_M) / 900.0)
     land = z0 + (level + relief - z0) * _smooth(d / _BLEND_M)
@@ -242,7 +244,7 @@ def _walls(strips: _Strips, v: Floats, base: str) -> list[_Faces]:
     """Faces, seen from both sides, where the land on the two sides of a seam does not meet."""
     out = []
     after = np.roll(np.arange(len(v)), -1)
-    gap = np.linalg.norm(v[:, 1] - v[after, 0], axis=-1)
+    gap = norm(v[:, 1] - v[after, 0])
     for k in np.flatnonzero(gap.max(axis=1) > 1e-3):
         for r in range(len(RINGS_M) - 1):
             if gap[k, r : r + 2].max() > 1e-3:

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.scenes.horizon.kinds import Kind
 from aerialdojo_gen.scenes.horizon.land import Land, Noise
@@ -50,7 +51,7 @@ class _Draws:
     def away(self, xy: Floats) -> Floats:
         """Distance (n,) of places from the edge."""
         low, high = self._bounds[0, :2], self._bounds[1, :2]
-        return np.asarray(np.linalg.norm(xy - np.clip(xy, low, high), axis=1))
+        return norm(xy - np.clip(xy, low, high))
 
     def spread(self, per_ha: float, reach_m: float, rng: np.random.Generator, step_m: float) -> Floats:
         """Places (n, 2) in a jittered grid about the scene, thinner with distance."""
@@ -190,7 +191,7 @@ def _trees(draws: _Draws, kind: Kind, noise: Noise, rng: np.random.Generator, ta
     # Outside woods one of five stands.
     xy = xy[wood | (rng.uniform(size=len(xy)) < 0.3)]
     if len(taken):
-        near = np.linalg.norm(xy[:, None] - taken[None, :, :2], axis=2) < taken[None, :, 2] + 2.0
+        near = norm(xy[:, None] - taken[None, :, :2]) < taken[None, :, 2] + 2.0
         xy = xy[~near.any(axis=1)]
     z, fits = draws.ground(xy)
     away = draws.away(xy)
