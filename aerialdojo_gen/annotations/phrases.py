@@ -178,11 +178,6 @@ def noun_of(instance: Instance, words: Words) -> Noun:
     return Noun(tuple(before), words.name, tail, words.group)
 
 
-def place_of(instance: Instance) -> str:
-    """Return an instance's phrase of place from its layout: ``"in the car park"``; may be empty."""
-    return instance.attributes.get(_PLACE, "")
-
-
 def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
     """Phrase one value of a category, the usual way first: with the prefix ``+`` if it goes before the noun."""
     _, table, _ = _tables()
