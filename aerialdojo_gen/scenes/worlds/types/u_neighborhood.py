@@ -14,7 +14,7 @@ from aerialdojo_gen.scenes.worlds.street_maps import HALF_M, Plot, Point, Way, k
 from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid
 from aerialdojo_gen.scenes.worlds.wilds import strewn, winding
 
-_MIN_HOUSES = 5
+_MIN_HOUSES = 4
 _FENCES = ["picket", "hedge", "wall", "railing"]
 Layout = tuple[list[Way], list[tuple[float, float, float]]]
 
@@ -67,7 +67,7 @@ def _houses(draft: Draft, ways: list[Way]) -> list[shapely.Polygon]:
                 if style["garage"]:
                     drives.append(found.strip(style["garage"] * (style["width_m"] / 2 + 1.8), 2.3, 3.0))
                 at += wide + draft.number(0.3, 1.5, "gap", *key)
-    if len(lots) < _MIN_HOUSES:
+    if len(lots) < (2 if draft.topology == "terraces" else _MIN_HOUSES):
         raise NoRoomError("room for few houses")
     draft.make("house_lots", lots=lots, path=draft.material("path"), drive=draft.material("drive"))
     return drives
