@@ -164,12 +164,13 @@ class Draft:
         inside = shapely.box(-self.width_m / 2, -self.depth_m / 2, self.width_m / 2, self.depth_m / 2).contains(area)
         return bool(inside) and not any(taken.intersects(area) for taken in self._taken)
 
-    def landmark(self, spots: Iterable[tuple[float, float, float]]) -> None:
-        """Place the type's landmarks at the first free of some poses (x, y, yaw), each another category."""
+    def landmark(self, spots: Iterable[tuple[float, float, float]], of: Iterable[str] | None = None) -> None:
+        """Place the type's landmarks, or some `of` them, at the first free of some poses, each another category."""
         low, high = self.kind.n_landmarks
         wanted = self.whole(low, high, "n_landmarks")
         weights = self.kind.landmarks
-        order = sorted(weights, key=lambda c: -math.log(self.rng("landmark", c).random()) / weights[c])
+        left = [what for what in (weights if of is None else of) if what not in self.landmarks]
+        order = sorted(left, key=lambda c: -math.log(self.rng("landmark", c).random()) / weights[c])
         for x, y, yaw in spots:
             if not order or len(self.landmarks) == wanted:
                 return

@@ -1,0 +1,178 @@
+"""Stages of coasts: islands in the sea, landings, piers with berths, huts over the water, what is afloat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.wilds import smoothed, step
+
+Point = tuple[float, float]
+
+
+def ahead(at: Point, yaw_deg: float, by_m: float, left_m: float = 0.0) -> Point:
+    """Point ahead of a pose by a distance, and to its left by another."""
+    c, s = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+    return round(at[0] + c * by_m - s * left_m, 2), round(at[1] + s * by_m + c * left_m, 2)
+
+
+def towards(at: Point, to: Point) -> float:
+    """Direction from a point to another, degrees."""
+    return math.degrees(math.atan2(to[1] - at[1], to[0] - at[0]))
+
+
+def coast(
+    draft: Draft, name: str, at: Point, radii_m: Point, bays: Sequence[tuple[float, float, float]] = ()
+) -> shapely.Polygon:
+    """Name an island's coastline: a wavy ellipse with bays (direction, share of the radius, half width)."""
+    rng, points = draft.rng("coast", name), []
+    waves = [(k, float(rng.uniform(0.02, 0.16 / k)), float(rng.uniform(0, 360))) for k in (2, 3, 5)]
+    for k in range(36):
+        deg = 10.0 * k
+        share = 1.0 + sum(a * math.cos(math.radians(n * deg + phase)) for n, a, phase in waves)
+        for bay, depth, half in bays:
+            off = abs((deg - bay + 180.0) % 360.0 - 180.0)
+            share *= 1.0 - depth * max(0.0, 1.0 - (off / half) * (off / half))
+        angle = math.radians(deg)
+        x, y = at[0] + radii_m[0] * share * math.cos(angle), at[1] + radii_m[1] * share * math.sin(angle)
+        points.append((round(min(max(x, 4 - draft.width_m / 2), draft.width_m / 2 - 4), 1),
+                       round(min(max(y, 4 - draft.depth_m / 2), draft.depth_m / 2 - 4), 1)))  # fmt: skip
+    draft.lines[name] = {"points": [list(p) for p in points], "smooth": 1}
+    return shapely.Polygon(smoothed(points, 1).coords).buffer(0)
+
+
+def islands(
+    draft: Draft, parts: Sequence[Any], land: BaseGeometry, relief_m: float, *,
+    heights: Mapping[str, str], total: str, inland: Mapping[str, Any] | None = None,
+) -> None:  # fmt: skip
+    """Raise land out of the sea: its shore by how far inland a place is, and formulas of hills; paint both."""
+    ragged = [1.4, draft.whole(0, 999, "ragged"), 2.4]  # Of several polygons it would keep one
+    uneven = [part if "blob" in part else {**part, "ragged": ragged} for part in parts]
+    draft.areas["land"] = uneven[0] if len(parts) == 1 else {"union": uneven}
+    draft.floors["sea"] = 0.0
+    shore = f"0.5*eased(inland, 0, 3.5) + 0.09*clip(inland, 0, 14) + {relief_m}*eased(inland, 6, 20)*(1 + 0.8*noise)"
+    step(
+        draft, "ground_by_formula", cell_m=2.0, noise_m=draft.number(16, 30, "noise"),
+        inland={"inland": "land", **(inland or {})}, let={"shore": shore, **heights},
+        height=f"choose(inland, max(shore + {total}, 0.25*eased(inland, 0, 1)), 0)",
+    )  # fmt: skip
+    draft.head["placing"] = {"settle_m": 0.5, "margin_m": 0.4}
+    draft.level_things = True
+    draft.section("The land and the sea")
+    box = [round(v, 1) for v in land.bounds]
+    draft.make("paint_heath", layers=[
+        {"material": draft.material("patch", k), "count": 14, "radius_m": [3.0, 8.0], "box": box, "ragged": 0.45,
+         "within": {"area": "land", "grow_m": -5}, "seed": draft.whole(0, 999, "heath", k)} for k in range(2)
+    ])  # fmt: skip
+    draft.make(
+        "paint_beach", land="land", width_m=draft.number(4, 9, "beach"), material=draft.material("beach"),
+        seed=draft.whole(0, 999, "beach_seed"),
+    )  # fmt: skip
+    draft.make("paint_cliffs", material=draft.material("cliff"), steeper_deg=41, within="land")
+    sea = {role: draft.material(role) for role in ("deep", "shallow", "lagoon", "wet")}
+    draft.make("paint_sea", land="land", shallow_m=draft.number(6, 13, "shallow"), **sea)
+
+
+def landing(land: BaseGeometry, at: Point, yaw_deg: float) -> Point:
+    """Where the way from a point on land in a direction comes to the sea."""
+    way = shapely.LineString([at, ahead(at, yaw_deg, 200.0)]).intersection(land)
+    first = way if way.geom_type == "LineString" else way.geoms[0]
+    if first.is_empty:
+        raise NoRoomError("no way to the shore")
+    return tuple(first.coords[-1])
+
+
+def is_open(draft: Draft, land: BaseGeometry, area: BaseGeometry, margin_m: float = 2.0) -> bool:
+    """Whether an area is free water."""
+    return draft.is_free(area) and land.distance(area) > margin_m
+
+
+def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m: float, z: str = "jetty") -> bool:
+    """Build a jetty out from a point of the shore, where the water is free; offer slots on it, and berths."""
+    draft.floors[z] = draft.floors.get(z, 1.4)
+    width, foot = 2.6, ahead(at, yaw_deg, -2.2)
+    body = shapely.LineString([ahead(at, yaw_deg, 2.5), ahead(at, yaw_deg, length_m + 7)])
+    if not is_open(draft, land, body.buffer(5.5, cap_style="flat"), 0.3):
+        return False
+    draft.make(
+        "pier", at=list(foot), yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z=z, bay_m=3.8,
+        floor=draft.material("boards"), category="jetty",
+    )  # fmt: skip
+    # The berths have ground of their own, which nothing that drifts may take.
+    for side in (1.0, -1.0):
+        for k in range(max(1, int((length_m - 4.0) // 11.5))):
+            x, y = ahead(at, yaw_deg, 9.0 + 11.5 * k, side * (width / 2 + 2.5))
+            draft.slot("berth", x, y, yaw_deg + (180.0 if side > 0 else 0.0), (10.6, 4.2), on="sea")
+    x, y = ahead(at, yaw_deg, length_m + 4.2)
+    draft.slot("berth", x, y, yaw_deg + 90.0, (14.2, 5.4), on="sea")
+    for k in range(int(length_m // 4.6)):
+        side = -0.75 if k % 2 else 0.75
+        x, y = ahead(at, yaw_deg, 3.4 + 4.6 * k, side)
+        draft.slot("jetty", x, y, yaw_deg + (90.0 if side < 0 else -90.0), (2.0, 2.9), on=z)
+    draft.take(shapely.LineString([foot, ahead(at, yaw_deg, length_m + 7)]).buffer(6.5, cap_style="flat"))
+    return True
+
+
+def huts_over_water(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, rows: int) -> bool:
+    """Lead a boardwalk out from the shore, with huts on stilts at both sides of it."""
+    length = 6.0 + 9.0 * rows
+    body = shapely.LineString([ahead(at, yaw_deg, 4.0), ahead(at, yaw_deg, length + 2)])
+    if not is_open(draft, land, body.buffer(9.5, cap_style="flat"), 0.2):
+        return False
+    draft.floors["boardwalk"] = 1.72
+    middles = [7.5 + 9.0 * k for k in range(rows)]
+    draft.make(
+        "pier", at=list(ahead(at, yaw_deg, -2.2)), yaw_deg=round(yaw_deg, 1), length_m=length + 2.2, width_m=3.2,
+        z=1.7, bay_m=3.8, rail="wood:#9a8058", gates=[[m + 0.8, m + 3.6] for m in middles], category="jetty",
+        floor=draft.material("boards"),
+    )  # fmt: skip
+    huts = [(*ahead(at, yaw_deg, m, side * 6.3), round((yaw_deg - side * 90.0) % 360, 1)) for m in middles
+            for side in (1.0, -1.0)]  # fmt: skip
+    draft.make(
+        "stilt_huts", at=[list(h) for h in huts], walls=walls(draft, 4, "huts"), on="boardwalk", width_m=5.4,
+        porch_m=2.1, steps=False,
+    )  # fmt: skip
+    for k in range(rows):
+        x, y = ahead(at, yaw_deg, 3.4 + 9.0 * k, -0.9 if k % 2 else 0.9)
+        draft.slot("jetty", x, y, yaw_deg + 90.0 * (1 if k % 2 else -1), (2.0, 2.0), on="boardwalk")
+    x, y = ahead(at, yaw_deg, length - 1.2)
+    draft.slot("jetty", x, y, yaw_deg, (2.0, 2.4), on="boardwalk")
+    draft.take(shapely.LineString([at, ahead(at, yaw_deg, length + 3)]).buffer(10.5, cap_style="flat"))
+    return True
+
+
+def walls(draft: Draft, number: int, *key: object) -> list[str]:
+    """Draw materials of several houses' walls."""
+    return [draft.material("wall", *key, k) for k in range(number)]
+
+
+def afloat(draft: Draft, land: BaseGeometry, number: int, reach_m: float = 200.0) -> None:
+    """Offer slots (``sea``) on open water, far from one another."""
+    rng, w, d = draft.rng("afloat"), draft.width_m / 2 - 9.0, draft.depth_m / 2 - 9.0
+    chosen: list[shapely.Point] = []
+    for _ in range(number * 14):
+        spot = shapely.Point(float(rng.uniform(-w, w)), float(rng.uniform(-d, d)))
+        yaw = float(rng.uniform(0, 360))
+        if len(chosen) == number or land.distance(spot) > reach_m or any(spot.distance(c) < 15.0 for c in chosen):
+            continue
+        if is_open(draft, land, spot.buffer(7.2), 1.6):
+            chosen.append(spot)
+            draft.slot("sea", spot.x, spot.y, yaw, (14.2, 6.0), on="sea")
+
+
+def beach_slots(draft: Draft, land: BaseGeometry, step_m: float = 6.5, inland_m: float = 4.8) -> None:
+    """Offer slots (``beach``) along the shore, fronts to the sea, where the ground is free."""
+    inner = land.buffer(-inland_m)
+    for part in getattr(inner, "geoms", [inner]):
+        ring = part.exterior
+        for k in range(int(ring.length // step_m)):
+            p = ring.interpolate((k + draft.number(0.2, 0.8, "beach", k, round(part.area))) * step_m)
+            q = ring.interpolate(ring.project(p) + 0.5)
+            yaw = towards((p.x, p.y), (q.x, q.y)) + (-90.0 if ring.is_ccw else 90.0)
+            if draft.is_free(p.buffer(2.2)):
+                draft.slot("beach", p.x, p.y, yaw, (5.4, 4.0))
