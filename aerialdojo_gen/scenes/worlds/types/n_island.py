@@ -154,7 +154,6 @@ def _growth(draft: Draft) -> None:
     ]
     kinds += [{"of": one, "spacing_m": 2.6, "limit": 15, "scale": draft.number(1, 1.5, "low", one)} for one in low]
     draft.make("undergrowth", area="inner", kinds=kinds)
-    draft.make("strew", of="driftwood", area={"area": "land", "grow_m": -2.6}, spacing_m=14, limit=5)
 
 
 def _cone(at: Point, radius_m: float, height_m: float, lobes: int) -> dict[str, str]:
