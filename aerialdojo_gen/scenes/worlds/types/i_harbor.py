@@ -171,14 +171,14 @@ def _halls(port: _Port, x0: float, x1: float, y: float, depth_m: float) -> None:
 def _houses(port: _Port, x0: float, x1: float, y: float) -> None:
     """Put up a row of narrow houses, fronts to the water."""
     draft = port.draft
-    pitch = draft.number(6.8, 8.6, "pitch")
+    pitch, high = draft.number(6.8, 8.6, "pitch"), draft.knob("storeys")
     xs = [x0 + pitch * (k + 0.5) for k in range(int((x1 - x0) // pitch))]
     draft.make(
         "house_row", at=port.line([(x, y) for x in xs]), yaw_deg=port.yaw(-90), on="quay",
         style={"width_m": 6.2, "depth_m": 6.4, "storey_m": 2.7, "roof_m": draft.number(2.2, 3.0, "roof_m"),
                "overhang_m": 0.15},
         walls=walls(draft, 7, "houses"), roofs=[draft.material("roof", k) for k in range(3)],
-        doors=["#d9a24a", "#5a6f94", "#b8493c"], storeys=[draft.whole(1, draft.knob("storeys"), "storeys", k) for k in range(5)],
+        doors=["#d9a24a", "#5a6f94", "#b8493c"], storeys=[draft.whole(1, high, "storeys", k) for k in range(5)],
         chimneys=[True, False, False],
     )  # fmt: skip
     draft.take(port.box(x0, y - 3.6, x1, y + 3.6).shape())

@@ -69,7 +69,7 @@ def write(draft: Draft) -> None:
     for head in isle.heads:
         about(draft, "lookout", head, (5.2, 7.4), 5, (3.4, 3.4))
     draft.level_things = False  # The land is gentle enough for small things
-    strewn(draft, "wild", 30, (3.6, 3.6))
+    strewn(draft, "inland", 30, (3.6, 3.6))
     draft.fill_slots()
     _growth(draft)
 
