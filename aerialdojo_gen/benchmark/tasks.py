@@ -273,7 +273,6 @@ def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) 
     return Goal(*words, image, rules, heading, distance_m)
 
 
-@lru_cache(maxsize=256)
 def image_shape(root: DataRoot, rows: pa.Table) -> tuple[int, ...] | None:
     """Return the shape of the goals' pictures of tasks; None where no goal is a picture."""
     at = pc.index(pc.is_valid(rows["reference_image_id"]), True).as_py()
@@ -283,6 +282,7 @@ def image_shape(root: DataRoot, rows: pa.Table) -> tuple[int, ...] | None:
     return reference_image(root, row["scene"], row["reference_image_id"]).shape
 
 
+@lru_cache(maxsize=256)
 def reference_image(root: DataRoot, scene: str, image_id: str) -> NDArray[np.uint8]:
     """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only.
 

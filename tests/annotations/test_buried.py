@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.annotation_scenes import box
 
-from aerialdojo_gen.annotations.appearance import false_phrases, repeats
+from aerialdojo_gen.annotations.appearance import repeats
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
@@ -44,17 +44,11 @@ def said(catalogue, scene: Scene) -> tuple[str, ...]:
     return Vocabulary(scene, catalogue).looks(scene.instances[0])
 
 
-def test_what_is_under_water_is_not_told_and_not_let_pass(catalogue):
+def test_what_is_under_water_is_not_told(catalogue):
     dry, flooded = (stand(catalogue, "hatchback", level) for level in (0.0, 0.8))
     assert {WHEELS, ROOF} <= set(said(catalogue, dry))
     assert ROOF in said(catalogue, flooded)
     assert WHEELS not in said(catalogue, flooded)
-    looks = {"hatchback": catalogue["hatchback"].looks}
-    for scene, faults in ((dry, 0), (flooded, 1)):
-        text = f"A green hatchback. It has {WHEELS}, and {ROOF}."
-        found = list(false_phrases(text, scene.instances[0], looks, scene.materials, Surface(scene)))
-        assert len(found) == faults
-        assert all(f"{WHEELS!r} is not so of thing_000: that is under the ground" in message for message in found)
 
 
 @pytest.mark.parametrize("category", ["hatchback", "street_lamp", "igloo", "swing_set", "garden_shed"])

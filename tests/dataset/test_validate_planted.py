@@ -147,7 +147,7 @@ def test_a_mesh_that_says_something_else(planted, change, found_by):
     wanted = [f"scene={planted.scene}"] if found_by != "image_redrawn" else objects_of(*pictured(planted))
     assert found[found_by] == wanted
     # What is drawn otherwise is seen in the pictures too, and is not what the words say.
-    assert set(found) <= {found_by, "image_redrawn", "object_words"}
+    assert set(found) <= {found_by, "image_redrawn", "object_words", "object_claims"}
 
 
 VAN, TRUCK, MAILBOX, HYDRANT, SHELTER, BIN = 0, 1, 4, 5, 7, 8
