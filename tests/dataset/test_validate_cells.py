@@ -16,8 +16,8 @@ from aerialdojo_gen.store import shards as store
 UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "target_visible_at_start"}
 # What others say or refer to is told at them.
 TOLD_ELSEWHERE = {
-    "landmark_id": "unknown_landmark", "selected": "selected_anchor", "description": "task_goal", "name": "task_goal",
-    "reference_image_id": "task_goal",
+    "landmark_id": "unknown_landmark", "selected": "selected_anchor", "description": "task_text", "name": "task_goal",
+    "paraphrases": "task_text", "reference_image_id": "task_goal",
 }  # fmt: skip
 
 
@@ -25,6 +25,8 @@ def other(value, kind):
     """Another value of a column's type, near the first where that is hardest to see."""
     if pa.types.is_list(kind):
         return [value[0], other(value[1], kind.value_type), *value[2:]]
+    if isinstance(value, dict):
+        return value | {"text": value["text"][:-3] + "xyz"}
     if value is None:
         return "x" if pa.types.is_string(kind) else b"x" if pa.types.is_binary(kind) else 1
     if isinstance(value, bool):
@@ -72,6 +74,8 @@ def test_no_value_is_too_strange_to_be_judged(planted, value):
         rows = planted.rows(key)
         for field in store.LAYOUT[key].spec.schema:
             kind = field.type.value_type if pa.types.is_list(field.type) else field.type
+            if pa.types.is_struct(kind):
+                continue  # its fields are not nullable
             try:
                 strange = pa.scalar(value, kind).as_py()
             except (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError):

@@ -33,7 +33,7 @@ def test_a_clean_release_passes_every_check(planted):
 @pytest.mark.parametrize(
     ("found_by", "key", "name", "value", "wanted"),
     [
-        ("null_value", "release/objects", "description", None, lambda row: row["object_id"] == 3),
+        ("null_value", "release/objects", "name", None, lambda row: row["object_id"] == 3),
         ("not_finite", "routes/train", "min_clearance_m", float("nan"), lambda _: True),
         ("unknown_word", "tasks/test", "direction", "northish", lambda _: True),
         ("wrong_part", "release/anchors", "scene", "U_Other_0", lambda row: not row["selected"]),

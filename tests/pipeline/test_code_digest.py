@@ -145,7 +145,7 @@ def test_libraries_that_shape_the_bytes_count():
     assert {"numba", "fcl", "numpy", "pyarrow"} <= libraries["plan"]
     assert {"moderngl", "pybullet", "av", "cv2"} <= libraries["render"]
     assert not {"av", "moderngl", "pybullet"} & libraries["filter"]
-    assert not {"av", "moderngl", "pybullet", "numba", "embreex"} & libraries["split"]
+    assert not {"av", "moderngl", "pybullet", "embreex"} & libraries["split"]
     assert all(not {"pydantic", "tqdm", "typer", "gymnasium"} & found for found in libraries.values())
     for name in NAMES:
         assert all(re.search(r" \d+(\.\d+)+", version) for version in stage_code(name).libraries.values()), name

@@ -191,7 +191,9 @@ def _read_words(data: SceneData) -> _Words:
     if catalogue is None:
         raise UncheckedError("no catalogue of props: the pipeline names no scene_assets")
     named = zip(marks.ints("landmark_id").tolist(), map(str, marks.texts("name")), nodes, strict=True)
-    landmarks = sorted((Landmark(id=k, name=name, node=node) for k, name, node in named), key=lambda mark: mark.id)
+    landmarks = sorted(
+        (Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named), key=lambda mark: mark.id
+    )
     claims = SceneClaims(Vocabulary(scene, catalogue), landmarks, geometry)
     return _Words(claims, Matcher(claims))
 

@@ -22,7 +22,7 @@ _SHARED = (
 )  # fmt: skip
 _SAID_OF_ROUTE = (
     "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_scene", "task_setting",
-    "task_budget", "task_start", "task_goal", "telling_number", "telling_text", "telling_id",
+    "task_budget", "task_start", "task_goal", "task_text", "telling_number", "telling_text", "telling_id",
 )  # fmt: skip
 
 
@@ -228,6 +228,25 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
         # The other modality's goal is null, and `goal_of_modality` sees to that.
         for row in np.flatnonzero(unequal(own, expected) & fit & _valid(own) & _valid(expected)):
             yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(expected[int(row)].as_py()))
+
+
+@check("tasks", needs=("routes", "objects"), after=("goal_of_modality", "telling_text", "telling_id"))
+def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """A task's description is one of its target's, and `frame_seen_in_train` says whether that is not held out."""
+    target = np.append(data.target_of_route, -1)[data.route_of_task]
+    fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
+    told = [
+        {one["text"]: not one["held_out"] for one in texts or ()}
+        for texts in data["objects"].column("paraphrases").to_pylist()
+    ]
+    seen = rows.column("frame_seen_in_train").to_pylist()
+    for row, text in enumerate(rows.texts("description")):
+        if text is None or not fit[row]:
+            continue
+        if text not in told[target[row]]:
+            yield Finding(row, f"description = {text!r}", "one of the target's paraphrases")
+        elif seen[row] is not None and seen[row] != told[target[row]][text]:
+            yield Finding(row, f"frame_seen_in_train = {seen[row]}", str(told[target[row]][text]))
 
 
 @check("tasks", after=_SAID_OF_ROUTE)
