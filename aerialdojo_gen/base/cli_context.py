@@ -13,7 +13,7 @@ from pathlib import Path
 PROGRAM = "aerialdojo-gen"
 # Commands that do not take both --pipeline and --data.
 _TAKES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("add-map", "add-scene", "add-terrain", "config", "leaderboard"), ()),
+    **dict.fromkeys(("add-map", "add-scene", "add-terrain", "config", "leaderboard", "vary"), ()),
     "annotate-draft": ("pipeline",),
     **dict.fromkeys(
         ("export", "import-benchmark", "pull", "push-to-hub", "report", "run", "show", "train", "view"), ("data",)

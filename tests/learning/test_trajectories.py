@@ -241,7 +241,7 @@ def test_the_cache_gives_what_was_drawn_and_survives_damage(smoke, seen, tmp_pat
 
 
 def test_the_cache_stays_within_its_bound(smoke, seen, tmp_path):
-    size = 130_000
+    size = 300_000
     kept = Trajectories(
         smoke, split="all", views=VIEWS, size=(40, 24), limit=6, cache_gb=size / 1e9, cache_dir=tmp_path
     )

@@ -84,8 +84,8 @@ def test_semantic_and_image_goals_read_as_the_agent_reads_them(smoke, ids, pictu
     image = picture_task(find_task(smoke, f"{ids[0]}-i"), "image", frames=0)
     assert pictured.instance["task_id"] == f"{ids[0]}-s"
     assert image.instance["task_id"] == f"{ids[0]}-i"
-    assert pictured.target["description"] in pictured.goal
-    assert pictured.target["description"] not in image.goal
+    assert pictured.instance["description"] in pictured.goal
+    assert pictured.instance["description"] not in image.goal
     assert "picture shows the target" in image.goal
     assert image.frames == []
     for shown in (pictured, image):
@@ -139,7 +139,9 @@ def test_the_page_needs_nothing_from_outside(pictured, page):
     sources = re.findall(r'\b(?:src|href)="([^"]{0,40})', page)
     assert len(sources) == 3 + 1 + 2
     assert all(source.startswith(("data:image/png;base64,", "data:image/jpeg;base64,")) for source in sources)
-    assert markup.escape(pictured.target["description"]) in page.replace("&#39;", "&#x27;").replace("&#34;", "&quot;")
+    assert markup.escape(pictured.instance["description"]) in page.replace("&#39;", "&#x27;").replace(
+        "&#34;", "&quot;"
+    )
     for k in range(len(pictured.poses)):
         assert f"<td>{k}</td>" in page
 
