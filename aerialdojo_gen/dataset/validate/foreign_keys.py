@@ -240,13 +240,18 @@ def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
         for texts in data["objects"].column("paraphrases").to_pylist()
     ]
     seen = rows.column("frame_seen_in_train").to_pylist()
-    for row, text in enumerate(rows.texts("description")):
+    own, names = rows.texts("description"), rows.texts("nav_id")
+    # An image task is of the navigation task that its twin describes.
+    said = {name: text for name, text in zip(names, own, strict=True) if text is not None}
+    for row, name in enumerate(names):
+        text = own[row] if own[row] is not None else said.get(name)
         if text is None or not fit[row]:
             continue
-        if text not in told[target[row]]:
+        known = told[target[row]]
+        if text not in known and own[row] is not None:
             yield Finding(row, f"description = {text!r}", "one of the target's paraphrases")
-        elif seen[row] is not None and seen[row] != told[target[row]][text]:
-            yield Finding(row, f"frame_seen_in_train = {seen[row]}", str(told[target[row]][text]))
+        elif text in known and seen[row] is not None and seen[row] != known[text]:
+            yield Finding(row, f"frame_seen_in_train = {seen[row]}", str(known[text]))
 
 
 @check("tasks", after=_SAID_OF_ROUTE)
