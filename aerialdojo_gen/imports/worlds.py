@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -14,11 +12,14 @@ import pyarrow.csv
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import PIPELINE, write_pipeline
 from aerialdojo_gen.imports.drafting import draft_scene
+from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.worlds.kinds import type_names
@@ -29,6 +30,7 @@ from aerialdojo_gen.store.root import open_root
 
 DRAWS = "draws.csv"
 _MAX_WORLDS = 100_000
+_MEMORY_MB = 1500
 _COLUMNS = ("world", "draw", "reason", "what")
 
 
@@ -81,15 +83,23 @@ def vary(
     if count(names, seeds) > _MAX_WORLDS:
         raise UsageError(f"{count(names, seeds):,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
     worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
+    names_of = {world.name: k for k, world in enumerate(worlds)}
     for inner in ("scenes", "annotations"):
         make_folder(project / inner)
     write_pipeline(project)
-    done = []
-    for one in _each(worlds, project, options, workers):
-        done.append(one)
-        on_done(one)
-    _write_draws(project, done)
-    return done
+    done: list[VariedWorld] = []
+    work = [_Work(world, project, options) for world in worlds]
+    try:
+        with Interrupts() as interrupts, make_executor("local", workers) as pool:
+            for one in pool.map(_write_world, work, memory_mb=_MEMORY_MB):
+                interrupts.check()
+                if isinstance(one, AerialDojoError):
+                    raise one
+                done.append(one)
+                on_done(one)
+    finally:
+        _write_draws(project, done)
+    return sorted(done, key=lambda one: names_of[one.name])
 
 
 def count(types: Sequence[str], seeds: range) -> int:
@@ -99,24 +109,25 @@ def count(types: Sequence[str], seeds: range) -> int:
     return len(seeds) * len(choose_scenes(list(types), type_names(home() / "scene_assets"), "type"))
 
 
-def _each(worlds: Sequence[World], project: Path, options: VaryOptions, workers: int) -> Iterator[VariedWorld]:
-    if workers <= 1 or len(worlds) == 1:
-        yield from (_write_world(world, project, options) for world in worlds)
-        return
-    # Spawned, because a forked child of a process that has drawn pictures may hang.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(worlds)), mp_context=context) as pool:
-        waiting = [pool.submit(_write_world, world, project, options) for world in worlds]
-        try:
-            for future in waiting:
-                yield future.result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+@dataclass(frozen=True)
+class _Work:
+    """A world to make."""
+
+    world: World
+    project: Path
+    options: VaryOptions
+
+    @property
+    def label(self) -> str:
+        """Its name in messages."""
+        return self.world.name
 
 
-def _write_world(world: World, project: Path, options: VaryOptions) -> VariedWorld:
+def _write_world(work: _Work) -> VariedWorld:
+    world, project, options = work.world, work.project, work.options
     plan, annotations = project / "scenes" / f"{world.name}.toml", project / "annotations" / f"{world.name}.json"
     if plan.exists() and annotations.exists():
+        _check_same(world, plan)
         return VariedWorld(world.name, made=False)
     made = make_world(world, home() / "scene_assets", _catalogue())
     with atomic_file(project, f"scenes/{world.name}.toml") as path:
@@ -127,6 +138,16 @@ def _write_world(world: World, project: Path, options: VaryOptions) -> VariedWor
     draft = DraftOptions(n_objects=options.n_objects, seed=world.seed)
     draft_scene(world.name, pipeline, paths, draft, force=True)
     return VariedWorld(world.name, made=True, refused=made.refused)
+
+
+def _check_same(world: World, plan: Path) -> None:
+    """Raise a `UsageError` if a plan that is there was made from something else."""
+    made_of = read_toml(plan, AssetError).get("world", {})
+    drawn = made_of.get("knobs", {})
+    other = [f"{name} = {drawn.get(name)}" for name, value in world.knobs.items() if drawn.get(name) != value]
+    other += [] if made_of.get("version") == world.version else [f"generator version {made_of.get('version')}"]
+    if other:
+        raise UsageError(f"{plan} is there with {other[0]}: take another folder for --out, or delete it")
 
 
 @cache

@@ -235,9 +235,12 @@ def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's description is one of its target's, and `frame_seen_in_train` says whether that is not held out."""
     target = np.append(data.target_of_route, -1)[data.route_of_task]
     fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
+    objects = data["objects"]
+    paraphrases, firsts = objects.column("paraphrases").to_pylist(), objects.texts("description")
+    # A release of an older version has one description an object.
     told = [
-        {one["text"]: not one["held_out"] for one in texts or ()}
-        for texts in data["objects"].column("paraphrases").to_pylist()
+        {one["text"]: not one["held_out"] for one in texts or ()} or {first: True}
+        for texts, first in zip(paraphrases, firsts, strict=True)
     ]
     seen = rows.column("frame_seen_in_train").to_pylist()
     own, names = rows.texts("description"), rows.texts("nav_id")
