@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
+from aerialdojo_gen.annotations.language.sides import described
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.dataset.contents import no_release, parts_there
 from aerialdojo_gen.store.root import Where, open_root
@@ -24,10 +25,11 @@ def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) ->
 
 
 def pictured_objects(where: Where, scene: str) -> list[dict[str, Any]]:
-    """Read a scene's objects with their pictures: rows of `objects` and `references` together."""
+    """Read a scene's objects with their pictures: rows of `objects`, `descriptions` and `references` together."""
     root = open_root(where)
     if not shards(root, "references", scene):
         rows: list[dict[str, Any]] = read_scene(root, "release/objects", scene).to_pylist()
         return rows
-    objects = {row["object_id"]: row for row in read_scene(root, "objects", scene).to_pylist()}
+    told = described(read_scene(root, "objects", scene), read_scene(root, "descriptions", scene))
+    objects = {row["object_id"]: row for row in told.to_pylist()}
     return [objects[row["object_id"]] | row for row in read_scene(root, "references", scene).to_pylist()]

@@ -40,4 +40,4 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke
             assert root.is_whole(row["path"], row["bytes"], row["sha256"], reread=True)
     again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert again.returncode == 0, again.stderr
-    assert "nothing to do: all 9 stages are up to date" in again.stderr, again.stderr
+    assert "nothing to do: all 10 stages are up to date" in again.stderr, again.stderr

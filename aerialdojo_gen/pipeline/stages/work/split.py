@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.language.sides import of_side
+from aerialdojo_gen.annotations.language.sides import described, of_side
 from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.pipeline.stage import Job, Output
@@ -19,8 +19,6 @@ from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_i
 from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
-from aerialdojo_gen.store.schemas.release import PARAPHRASES
-from aerialdojo_gen.store.schemas.staged import PARAPHRASE
 
 _LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
 
@@ -136,17 +134,6 @@ def _said(routes: pa.Table, train: NDArray[np.bool_], objects: pa.Table) -> tupl
     return pa.array(texts, pa.string()), pa.array(seen, pa.bool_())
 
 
-def _described(objects: pa.Table, descriptions: pa.Table) -> pa.Table:
-    """Give objects their paraphrases, and as description the first of them."""
-    rows: dict[int, list[dict[str, Any]]] = {}
-    for row in descriptions.to_pylist():
-        rows.setdefault(row["object_id"], []).append({name.name: row[name.name] for name in PARAPHRASE})
-    found = [rows[k] for k in objects["object_id"].to_pylist()]
-    objects = objects.append_column("paraphrases", pa.array(found, PARAPHRASES.type))
-    firsts = pa.array([texts[0]["text"] for texts in found], pa.string())
-    return objects.set_column(objects.column_names.index("description"), "description", firsts)
-
-
 def _kept(routes: pa.Table) -> Kept:
     detour, visible = (
         routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
@@ -170,7 +157,7 @@ def run(job: Job, config: SplitConfig) -> Output:
     routes = routes_table(
         job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
     )
-    objects = _described(objects, job.read("descriptions"))
+    objects = described(objects, job.read("descriptions"))
     references = _take(job.read("references"), "object_id", objects.column("object_id"))
     names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
     references = references.append_column("reference_image_id", pa.array(names, pa.string()))
