@@ -26,7 +26,7 @@ _MIN_SEEN = 1 / 3  # of the free volume, by each landmark
 _VIEWS = 300
 
 
-def faults(scene: Scene, catalogue: Catalogue, reach_m: float = 1.2) -> Iterator[tuple[str, str]]:
+def faults(scene: Scene, catalogue: Catalogue, reach_m: float = 1.5) -> Iterator[tuple[str, str]]:
     """Yield what is wrong with a scene: a reason that is counted, and what it is about."""
     if not _MIN_TRIANGLES <= scene.n_triangles <= _MAX_TRIANGLES:
         yield "triangles", f"{scene.n_triangles:,}"

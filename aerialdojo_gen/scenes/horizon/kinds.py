@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -79,7 +80,7 @@ _OTHERWISE = "fields"
 
 def kind_of(scene: str, head: HorizonHead) -> Kind | None:
     """Give the country that a plan asks for, or that its type has; None for ``"none"``."""
-    words = scene.split("_")
+    words = re.split(r"[_-]", scene)  # ``N_Coast_0``, and of worlds ``N_Coast-1000``
     name = head.kind or _OF_TYPE.get(words[1] if len(words) > 1 else "", _OTHERWISE)
     if name == "none":
         return None

@@ -16,6 +16,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
 from aerialdojo_gen.scenes.worlds.paints import repainted
@@ -54,7 +55,7 @@ class Draft:
         self.palette_name = self._one_of({name: p.held_out for name, p in kind.palettes.items()}, "palette")
         spans = kind.topologies[self.topology].size_m or kind.size_m
         self.width_m, self.depth_m = (self.whole(*span, "size", axis) for axis, span in zip("xy", spans, strict=True))
-        self.head: Entry = {}
+        self.head: Entry = self._light()
         self.lines: dict[str, Any] = {}
         self.areas: dict[str, Any] = {}
         self.floors: dict[str, float] = {}
@@ -118,6 +119,32 @@ class Draft:
     def _one_of(self, held_out: Mapping[str, bool], key: str) -> str:
         return self.pick([name for name, held in held_out.items() if held == self.world.held_out], key)
 
+    def _light(self) -> Entry:
+        """Draw sky, light and horizon of the types that say where on earth they are."""
+        head: Entry = {}
+        if self.palette.sky:
+            head["sky"] = self.pick(self.palette.sky, "sky")
+        if self.kind.latitude_deg is not None:
+            head["light"] = self._sun(self.kind.latitude_deg, self.pick(self.palette.weather, "weather"))
+        if horizon := self.kind.topologies[self.topology].horizon:
+            head["horizon"] = {"kind": horizon}
+        return head
+
+    def _sun(self, latitude_deg: tuple[float, float], weather: str) -> Entry:
+        """Draw when and where it is; both hemispheres and all hours, so that light tells no compass direction."""
+        rng = self.rng("light")
+        low, high = (0.06, 0.14) if weather == "dusk" else (0.3, 0.92)  # Sine of the sun's elevation
+        light: Entry = {}
+        for _ in range(400):
+            side = 1 if rng.random() < 0.5 else -1
+            latitude = side * int(rng.integers(round(latitude_deg[0]), round(latitude_deg[1]) + 1))
+            date = f"{int(rng.integers(1, 13)):02d}-{int(rng.integers(1, 29)):02d}"
+            hour = int(rng.integers(28, 69)) / 4
+            light = {"latitude_deg": latitude, "date": date, "hour": hour, "weather": weather}
+            if low <= sun_at(latitude, date, hour)[2] <= high:
+                return light
+        raise NoRoomError("no such light at this latitude")
+
     @property
     def palette(self) -> Palette:
         """The palette that was drawn."""
@@ -164,16 +191,19 @@ class Draft:
         inside = shapely.box(-self.width_m / 2, -self.depth_m / 2, self.width_m / 2, self.depth_m / 2).contains(area)
         return bool(inside) and not any(taken.intersects(area) for taken in self._taken)
 
-    def landmark(self, spots: Iterable[tuple[float, float, float]], of: Iterable[str] | None = None) -> None:
+    def landmark(
+        self, spots: Iterable[tuple[float, float, float]], of: Iterable[str] | None = None
+    ) -> list[tuple[str, float, float]]:
         """Place the type's landmarks, or some `of` them, at the first free of some poses, each another category."""
+        placed: list[tuple[str, float, float]] = []
         low, high = self.kind.n_landmarks
         wanted = self.whole(low, high, "n_landmarks")
         weights = self.kind.landmarks
         left = [what for what in (weights if of is None else of) if what not in self.landmarks]
         order = sorted(left, key=lambda c: -math.log(self.rng("landmark", c).random()) / weights[c])
         for x, y, yaw in spots:
-            if not order or len(self.landmarks) == wanted:
-                return
+            if not order or len(self.landmarks) >= wanted:
+                break
             what = next((c for c in order if self.is_free(_box(x, y, *extents_m(self.catalogue, c), yaw, 0.5))), None)
             if what is None:
                 continue
@@ -182,6 +212,8 @@ class Draft:
             self.landmarks.append(what)
             thing = repainted(self.catalogue, what, (x, y, yaw), self.rng("landmark", what, "variant"))
             self.add({"place": [thing], "fit": "must", "margin_m": 0.4, **self._levelled(None)})
+            placed.append((what, x, y))
+        return placed
 
     # Slots
 

@@ -12,6 +12,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.light import Weather
 from aerialdojo_gen.scenes.recipe import validated
 
 Range = tuple[float, float]
@@ -37,10 +38,28 @@ class Knob(_Strict):
         return self
 
 
+class Ring(_Strict):
+    """Slots about the middle of a place."""
+
+    slots: str  # Their kind
+    number: Annotated[int, Field(ge=1, le=40)] = 1
+    away_m: Range = (0.0, 0.0)  # How far from the middle
+    room_m: Range = (3.0, 3.0)
+
+
+class Place(_Strict):
+    """A round level place in open country, such as a camp or a yard, with what belongs to it."""
+
+    radius_m: Annotated[float, Field(gt=0)]
+    rings: list[Ring]
+
+
 class Topology(_Strict):
     """One arrangement of a type."""
 
     about: str
+    places: list[str] = []  # Places of the type that it has
+    horizon: str = ""  # Kind of the country beyond, where that is not the type's
     held_out: bool = False  # Used by worlds of ``--held-out`` alone
     size_m: tuple[Range, Range] | None = None  # In place of the type's
 
@@ -49,6 +68,8 @@ class Palette(_Strict):
     """Colours and materials of one look of a type, its season among them."""
 
     held_out: bool = False
+    sky: list[str] = []  # Colours; of several, a world draws one
+    weather: list[Weather] = ["clear"]
     materials: dict[str, str | list[str]]  # By role; of several, a world or a house draws one
 
 
@@ -72,6 +93,8 @@ class SceneType(_Strict):
     palettes: Annotated[dict[str, Palette], Field(min_length=2)]
     landmarks: Weights
     n_landmarks: tuple[int, int] = (1, 3)
+    latitude_deg: Range | None = None  # Of either hemisphere; without it the sun stands where it does by default
+    places: dict[str, Place] = {}
     slots: dict[str, Slots]
 
     @model_validator(mode="after")
@@ -79,6 +102,11 @@ class SceneType(_Strict):
         for kind, some in (("topologies", self.topologies), ("palettes", self.palettes)):
             if len({one.held_out for one in some.values()}) != 2:
                 raise ValueError(f"{kind}: some must be held out, and some not")
+        for name, topology in self.topologies.items():
+            if stray := set(topology.places) - set(self.places):
+                raise ValueError(f"topologies {name}: no place {min(stray)!r}")
+        if stray := {ring.slots for place in self.places.values() for ring in place.rings} - set(self.slots):
+            raise ValueError(f"places: no slots {min(stray)!r}")
         return self
 
 
