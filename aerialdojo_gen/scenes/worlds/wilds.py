@@ -83,6 +83,36 @@ def clearing(draft: Draft, name: str, at: Point, radius_m: float) -> None:
     draft.paint(name, draft.material("glade", name))
 
 
+def brook(draft: Draft, name: str, ends: tuple[Point, Point], swing_m: float) -> shapely.LineString:
+    """Cut the bed of a brook, and let water flow in it; gives its middle line."""
+    bed = winding(draft, name, ends, swing_m)
+    step(draft, "level_along", lines=[name], width_m=5.6, blend_m=5, smooth_m=40)
+    step(draft, "sink_area", area={"ribbon": name, "width_m": 7.0}, depth_m=1.8, blend_m=2.4)
+    draft.areas["water"] = {"ribbon": name, "width_m": 2.8}
+    water(draft)
+    return bed
+
+
+def water(draft: Draft) -> None:
+    """Paint the area `water` and its shore."""
+    seed = draft.whole(0, 9999, "shore")
+    draft.make("paint_shore", water="water", material=draft.material("bank"), lobe_m=1.4, seed=seed)
+    draft.paint("water", draft.material("water"))
+
+
+def bridged(draft: Draft, bed: shapely.LineString, share: float) -> list[Point]:
+    """Lay a footbridge over a brook at a share of its length, and take its ground; gives the landings."""
+    middle = bed.interpolate(bed.length * share)
+    ahead = bed.interpolate(bed.project(middle) + 0.5)
+    across = math.degrees(math.atan2(ahead.y - middle.y, ahead.x - middle.x)) + 90.0
+    c, s = math.cos(math.radians(across)), math.sin(math.radians(across))
+    draft.take(bed.buffer(3.8))
+    draft.take(middle.buffer(7.5))
+    at = [round(middle.x, 1), round(middle.y, 1)]
+    draft.make("footbridge", at=at, yaw_deg=round(across, 1), span_m=8.5, place="")
+    return [(round(middle.x + u * c, 1), round(middle.y + u * s, 1)) for u in (-6.5, 6.5)]
+
+
 def about(
     draft: Draft, kind: str, at: Point, ring: tuple[float, float], number: int, room_m: tuple[float, float]
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import shapely
@@ -11,11 +10,14 @@ from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.wilds import (
     about,
     anywhere,
+    bridged,
+    brook,
     clearing,
     paths,
     rolling,
     step,
     strewn,
+    water,
     winding,
     wood,
 )
@@ -59,35 +61,17 @@ def _camp(draft: Draft, at: Point, name: str) -> None:
 
 def _creek(draft: Draft, w: float, d: float) -> None:
     ends = ((-w - 1, draft.number(-d / 3, d / 3, "in")), (w + 1, draft.number(-d / 3, d / 3, "out")))
-    bed = winding(draft, "creek", ends, d / 5)
-    step(draft, "level_along", lines=["creek"], width_m=5.6, blend_m=5, smooth_m=40)
-    step(draft, "sink_area", area={"ribbon": "creek", "width_m": 7.0}, depth_m=1.8, blend_m=2.4)
-    draft.areas["water"] = {"ribbon": "creek", "width_m": 2.8}
-    _water(draft)
-    middle = bed.interpolate(bed.length * draft.number(0.35, 0.65, "bridge"))
-    ahead = bed.interpolate(bed.project(middle) + 0.5)
-    across = math.degrees(math.atan2(ahead.y - middle.y, ahead.x - middle.x)) + 90.0
-    c, s = math.cos(math.radians(across)), math.sin(math.radians(across))
-    landing = [(round(middle.x + u * c, 1), round(middle.y + u * s, 1)) for u in (-6.5, 6.5)]
+    bed = brook(draft, "creek", ends, d / 5)
+    landing = bridged(draft, bed, draft.number(0.35, 0.65, "bridge"))
     sign = 1.0 if landing[0][1] < landing[1][1] else -1.0
     outer = [(draft.number(-w / 2, w / 2, "path", k), sign * (2 * k - 1) * d) for k in (0, 1)]
     lines = {f"path_{k}": winding(draft, f"path_{k}", (landing[k], outer[k]), 6.0, 3) for k in (0, 1)}
-    draft.take(bed.buffer(3.8))
-    at = [round(middle.x, 1), round(middle.y, 1)]
-    draft.take(middle.buffer(7.5))
-    draft.make("footbridge", at=at, yaw_deg=round(across, 1), span_m=8.5, place="")
     paths(draft, lines)
     for k in range(int(bed.length // 16)):
         p = bed.interpolate(8 + 16 * k)
         side = 1 if draft.chance(0.5, "water", k) else -1
         draft.slot("water", p.x, p.y + side * 5.4, draft.number(0, 360, "water", k), (4.2, 4.2))
     _sites(draft, [_cabin, _camp], 11.0)
-
-
-def _water(draft: Draft) -> None:
-    seed = draft.whole(0, 9999, "shore")
-    draft.make("paint_shore", water="water", material=draft.material("bank"), lobe_m=1.4, seed=seed)
-    draft.paint("water", draft.material("water"))
 
 
 def _sites(draft: Draft, kinds: list[Callable[[Draft, Point, str], None]], radius_m: float) -> list[Point]:
@@ -140,7 +124,7 @@ def _pond(draft: Draft, w: float, d: float) -> None:
     step(draft, "level_area", area={"disc": [*at, radius + 6]}, blend_m=6)
     step(draft, "sink_area", area={"disc": [*at, radius]}, depth_m=1.2, blend_m=3.0)
     draft.areas["water"] = {"blob": [*at, round(radius - 1.5, 1), draft.whole(0, 1999, "pond"), 0.2]}
-    _water(draft)
+    water(draft)
     about(draft, "water", at, (radius + 2.5, radius + 4.5), 9, (4.2, 4.2))
     draft.take(shapely.Point(at).buffer(radius + 6))
     lines = {"round": winding(draft, "round", ((-w, at[1] + radius + 9), (w, at[1] + radius + 7)), 3.0, 4)}

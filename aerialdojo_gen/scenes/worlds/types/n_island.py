@@ -4,156 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.shores import (
-    afloat,
-    ahead,
-    beach_slots,
-    coast,
-    huts_over_water,
-    islands,
-    jetty,
-    landing,
-    towards,
-    walls,
-)
-from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, clearing, paths, smoothed, step, strewn, winding
+from aerialdojo_gen.scenes.worlds.seaside import Isle, inside, settle
+from aerialdojo_gen.scenes.worlds.shores import ahead, coast, islands, landing, towards
+from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, smoothed, step, winding
 
 Point = tuple[float, float]
 
 
-class _Isle(NamedTuple):
-    """What a topology gives to the stages after it."""
-
-    land: BaseGeometry
-    village: Point
-    bay_deg: float  # Where the village looks to the sea
-    heads: list[Point]  # Level places for landmarks, and what belongs to lookouts
-    shut: BaseGeometry = shapely.Point()  # Too steep for houses and woods
-
-
 def write(draft: Draft) -> None:
-    """Raise the island, then a village with landings, lookouts, paths between them, beaches, boats and woods."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
-    isle = _TOPOLOGIES[draft.topology](draft, w, d)
-    draft.take(isle.shut)
-    clearing(draft, "square", isle.village, 8.0)
-    for k, head in enumerate(isle.heads):
-        clearing(draft, f"head_{k}", head, 6.5)
-    draft.section("Landings")
-    _landings(draft, isle)
-    _ways(draft, isle)
-    draft.section("The village")
-    _houses(draft, isle)
-    about(draft, "village", isle.village, (3.2, 6.6), 9, (4.9, 3.8))
-    draft.take(shapely.Point(isle.village).buffer(9.0))
-    afloat(draft, isle.land, 9)
-    beach_slots(draft, isle.land)
-    sea = shapely.box(-w, -d, w, d).difference(isle.land.buffer(-3.5))
-    draft.take(sea)
-    step(draft, "level_under_things")
-    draft.section("Landmarks")
-    spots = [(*head, float(round(towards(head, isle.village)))) for head in isle.heads]
-    inner = isle.land.buffer(-7.0)
-    spots += [p for p in anywhere(draft, 200) if inner.contains(shapely.Point(p[0], p[1]))]
-    if draft.chance(0.6, "lighthouse"):
-        draft.landmark(spots[: len(isle.heads)], of=["lighthouse"])
-    draft.landmark(spots)
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
-    for head in isle.heads:
-        about(draft, "lookout", head, (5.2, 7.4), 5, (3.4, 3.4))
-    draft.level_things = False  # The land is gentle enough for small things
-    strewn(draft, "inland", 30, (3.6, 3.6))
-    draft.fill_slots()
-    _growth(draft)
-
-
-def _landings(draft: Draft, isle: _Isle) -> None:
-    built, huts = 0, draft.material("homes") == "huts"
-    for off in (0.0, 22.0, -22.0, 40.0, -40.0, 60.0, -60.0, 85.0, -85.0):
-        yaw = isle.bay_deg + off
-        shore = landing(isle.land, isle.village, yaw)
-        if built == 1 and huts and huts_over_water(draft, isle.land, shore, yaw, draft.whole(2, 3, "rows")):
-            built += 1
-        elif built < 2:
-            built += jetty(draft, isle.land, shore, yaw, draft.number(12, 18, "jetty", off))
-    if not built:
-        raise NoRoomError("no room for a jetty")
-
-
-def _ways(draft: Draft, isle: _Isle) -> None:
-    """Paths from the village to the lookouts and to the shore, so far as they lie on land."""
-    lines = {}
-    shore = landing(isle.land, isle.village, isle.bay_deg)
-    lines["to_shore"] = winding(draft, "to_shore", (ahead(isle.village, isle.bay_deg, 6.5), shore), 0.4, 1)
-    for k, head in enumerate(isle.heads):
-        yaw = towards(isle.village, head)
-        ends = (ahead(isle.village, yaw, 6.5), ahead(head, yaw, -6.6))
-        line = winding(draft, f"way_{k}", ends, 5.0, 3)
-        if isle.land.buffer(-2.0).contains(line) and not isle.shut.intersects(line):
-            lines[f"way_{k}"] = line
-        else:
-            del draft.lines[f"way_{k}"]
-    paths(draft, lines)
-
-
-def _houses(draft: Draft, isle: _Isle) -> None:
-    """Houses about the square, fronts to it, each on a level pad with a yard."""
-    inner = isle.land.buffer(-6.5)
-    found: list[tuple[float, float, float]] = []
-    wanted = round(draft.knob("houses"))
-    rng = draft.rng("houses")
-    for _ in range(160):
-        angle, away = float(rng.uniform(0, 360)), float(rng.uniform(13.5, 27.0))
-        x, y = ahead(isle.village, angle, away)
-        spot = shapely.Point(x, y)
-        if len(found) < wanted and inner.contains(spot) and draft.is_free(spot.buffer(5.2)):
-            turn = round(angle + 180.0 + float(rng.uniform(-25, 25)), 1) % 360.0
-            found.append((x, y, turn))
-            draft.take(spot.buffer(5.6))
-    if len(found) < 2:
-        raise NoRoomError("no room for the village")
-    for x, y, yaw in found:
-        step(draft, "level_area", area=[{"disc": [x, y, 4.2]}], blend_m=3.5)
-        draft.paint({"blob": [x, y, 6.0, draft.whole(0, 999, "yard", x), 0.2]}, draft.material("glade", x))
-        for side in (-1, 1):
-            draft.slot("yard", *ahead((x, y), yaw, draft.number(1, 4, "yard", x, side), side * 6.2), yaw, (3.0, 3.0))
-    poses = [list(p) for p in found]
-    if draft.material("homes") == "huts":
-        draft.make("stilt_huts", at=poses, walls=walls(draft, len(poses), "home"))
-        return
-    draft.make(
-        "house_row", at=[p[:2] for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
-        style={"width_m": draft.number(6.0, 6.9, "house_w"), "depth_m": 5.6, "storeys": 1, "storey_m": 2.7,
-               "roof_m": draft.number(2.0, 2.8, "house_roof")},
-        roofs=[draft.material("roof", k) for k in range(2)], doors=["#2f5f6e", "#6e2f2a", "#e9dcb0"],
-        storeys=[draft.whole(1, 2, "storeys", k) for k in range(3)], chimneys=[True, False],
-    )  # fmt: skip
-
-
-def _growth(draft: Draft) -> None:
-    """Boulders at the shore, and what grows inland."""
-    draft.section("Rocks, and what grows")
-    draft.make(
-        "strew_rocks", area={"outline": "land", "width_m": 4.0}, spacing_m=draft.number(3.2, 6.0, "rocks"),
-        radius_m=[0.5, 1.4], material=draft.material("boulder"), limit=60,
-    )  # fmt: skip
-    draft.areas["inner"] = {"area": "land", "grow_m": -5.0}
-    trees, low = draft.material("trees").split("+"), draft.material("low").split("+")
-    most = round(draft.knob("trees") / len(trees) / 2)
-    kinds = [
-        {"of": tree, "spacing_m": 3.8, "limit": most, "scale": draft.number(low_, high, "scale", tree, low_)}
-        for tree in trees
-        for low_, high in ((0.9, 1.1), (1.2, 1.5))
-    ]
-    kinds += [{"of": one, "spacing_m": 2.6, "limit": 15, "scale": draft.number(1, 1.5, "low", one)} for one in low]
-    draft.make("undergrowth", area="inner", kinds=kinds)
+    """Raise the island, and settle it."""
+    settle(draft, _TOPOLOGIES[draft.topology](draft, draft.width_m / 2, draft.depth_m / 2))
 
 
 def _cone(at: Point, radius_m: float, height_m: float, lobes: int) -> dict[str, str]:
@@ -173,12 +37,7 @@ def _knoll(name: str, at: Point, radius_m: float, height_m: float) -> dict[str, 
     return {f"{name}_far": far, name: f"{height_m}*exp(-({name}_far*{name}_far))*eased(inland, 1, 7)"}
 
 
-def _inside(land: BaseGeometry, at: Point, yaw_deg: float, from_shore_m: float) -> Point:
-    """Point that lies so far behind the shore, from a point on land in a direction."""
-    return ahead(landing(land, at, yaw_deg), yaw_deg, -from_shore_m)
-
-
-def _volcano(draft: Draft, w: float, d: float) -> _Isle:
+def _volcano(draft: Draft, w: float, d: float) -> Isle:
     bay = draft.number(0, 360, "bay")
     land = coast(draft, "coast", (0, 0), (w * 0.79, d * 0.79), [(bay, 0.36, 38)])
     top, height = ahead((0, 0), bay + 180 + draft.number(-30, 30, "top"), 15), draft.number(13, 18, "height")
@@ -188,12 +47,12 @@ def _volcano(draft: Draft, w: float, d: float) -> _Isle:
     draft.paint({"blob": [*top, 19, draft.whole(0, 999, "lava"), 0.3]}, draft.material("rock"))
     draft.make("paint_heights", material=draft.material("cliff", "top"), above_m=round(height * 0.7, 1))
     draft.paint({"disc": [*top, 2.6]}, draft.pick(["#e2602a", "#b8402a", "water:#4fb0a8"], "crater"))
-    village = _inside(land, (0, 0), bay, 13.0)
-    heads = [_inside(land, village, bay + off, 10.0) for off in (105.0, -105.0)]
-    return _Isle(land, village, bay, heads, shapely.Point(top).buffer(19.0))
+    village = inside(land, (0, 0), bay, 13.0)
+    heads = [inside(land, village, bay + off, 10.0) for off in (105.0, -105.0)]
+    return Isle(land, village, bay, heads, shapely.Point(top).buffer(19.0))
 
 
-def _atoll(draft: Draft, w: float, d: float) -> _Isle:
+def _atoll(draft: Draft, w: float, d: float) -> Isle:
     """A ring of low land, open at one side, about a lagoon; the village looks on the lagoon."""
     open_deg, turn = draft.number(0, 360, "open"), draft.number(95, 115, "turn")
     ends = range(0, 101, 10)
@@ -208,10 +67,10 @@ def _atoll(draft: Draft, w: float, d: float) -> _Isle:
         parts.append({"blob": [*arc[k], radius, draft.whole(0, 999, "islet", k), 0.15]})
         land = land.union(shapely.Point(arc[k]).buffer(radius * 0.92))
     islands(draft, parts, land, round(draft.knob("relief_m") * 0.4, 2), heights={}, total="0")
-    return _Isle(land, arc[5], towards(arc[5], (0, 0)), [arc[1], arc[9]])
+    return Isle(land, arc[5], towards(arc[5], (0, 0)), [arc[1], arc[9]])
 
 
-def _ridge(draft: Draft, w: float, d: float) -> _Isle:
+def _ridge(draft: Draft, w: float, d: float) -> Isle:
     """A long island with a rocky ridge along it, a bay at either side."""
     side = draft.pick([90.0, 270.0], "side")
     land = coast(draft, "coast", (0, 0), (w * 0.86, d * 0.64), [(side, 0.3, 30), (side + 155, 0.25, 25)])
@@ -223,12 +82,12 @@ def _ridge(draft: Draft, w: float, d: float) -> _Isle:
             heights={"ridge": f"{height}*eased(crest, -11, 2)*(1 + 0.25*noise)*eased(inland, 2, 10)"},
             total="ridge", inland={"crest": {"ribbon": "crest", "width_m": 7}})  # fmt: skip
     draft.paint({"ribbon": "crest", "width_m": 6, "ragged": [1.5, 7, 2]}, draft.material("rock"))
-    village = _inside(land, (0, -up * d * 0.1), side, 13.0)
-    heads = [_inside(land, (0, 0), a, 11.0) for a in (0.0, 180.0)]
-    return _Isle(land, village, side, heads, crest.buffer(8.0))
+    village = inside(land, (0, -up * d * 0.1), side, 13.0)
+    heads = [inside(land, (0, 0), a, 11.0) for a in (0.0, 180.0)]
+    return Isle(land, village, side, heads, crest.buffer(8.0))
 
 
-def _twins(draft: Draft, w: float, d: float) -> _Isle:
+def _twins(draft: Draft, w: float, d: float) -> Isle:
     """Two islands and a footbridge on piles between them."""
     big = draft.number(0.46, 0.52, "big")
     flip = draft.pick([1.0, -1.0], "flip")
@@ -250,11 +109,11 @@ def _twins(draft: Draft, w: float, d: float) -> _Isle:
     draft.make("pier", at=list(ahead(start, yaw, -2.4)), yaw_deg=round(yaw, 1), length_m=round(span + 4.8, 1),
                width_m=3.0, z=1.9, bay_m=4.6, rail=draft.material("rail"), category="footbridge")  # fmt: skip
     draft.take(shapely.LineString([start, end]).buffer(4.0))
-    village = _inside(lands[0], one, bay, 14.0)
-    return _Isle(land, village, bay, [_inside(lands[0], one, bay + 150, 12.0), two])
+    village = inside(lands[0], one, bay, 14.0)
+    return Isle(land, village, bay, [inside(lands[0], one, bay + 150, 12.0), two])
 
 
-def _skerries(draft: Draft, w: float, d: float) -> _Isle:
+def _skerries(draft: Draft, w: float, d: float) -> Isle:
     """An islet with a deep inlet and two knolls, skerries about it."""
     bay = draft.pick([0.0, 90.0, 180.0, 270.0], "bay") + draft.number(-20, 20, "bay_off")
     land = coast(draft, "coast", (0, 0), (w * 0.68, d * 0.7), [(bay, 0.62, 20)])
@@ -271,14 +130,14 @@ def _skerries(draft: Draft, w: float, d: float) -> _Isle:
     for spot in islets:
         land = land.union(spot.buffer(4.0))
     knolls: dict[str, str] = {}
-    heads = [_inside(main, ahead((0, 0), bay + 180, 12), bay + off, 15.0) for off in (125.0, -115.0)]
+    heads = [inside(main, ahead((0, 0), bay + 180, 12), bay + off, 15.0) for off in (125.0, -115.0)]
     for k, head in enumerate(heads):
         knolls |= _knoll(f"knoll_{k}", head, draft.number(10, 13, "r", k), draft.number(3.5, 8, "h", k))
     islands(draft, parts, land, draft.knob("relief_m"), heights=knolls, total="knoll_0 + knoll_1")
-    return _Isle(land, _inside(main, ahead((0, 0), bay + 180, 12), bay, 15.0), bay, heads)
+    return Isle(land, inside(main, ahead((0, 0), bay + 180, 12), bay, 15.0), bay, heads)
 
 
-def _fort(draft: Draft, w: float, d: float) -> _Isle:
+def _fort(draft: Draft, w: float, d: float) -> Isle:
     """A table of rock with a ruined fort, a village at its foot."""
     bay = draft.number(0, 360, "bay")
     land = coast(draft, "coast", (0, 0), (w * 0.8, d * 0.78), [(bay, 0.3, 34)])
@@ -295,10 +154,10 @@ def _fort(draft: Draft, w: float, d: float) -> _Isle:
                stone=draft.material("stone"),
                walls=[{"ends": e, "height_m": h} for e, h in zip(ends, high, strict=True)])  # fmt: skip
     about(draft, "lookout", at, (2.0, 4.6), 5, (2.8, 2.8))
-    heads = [_inside(land, _inside(land, (0, 0), bay, 13.0), bay + off, 10.0) for off in (105.0, -105.0)]
-    return _Isle(land, _inside(land, (0, 0), bay, 13.0), bay, heads, shapely.Point(at).buffer(21.0))
+    heads = [inside(land, inside(land, (0, 0), bay, 13.0), bay + off, 10.0) for off in (105.0, -105.0)]
+    return Isle(land, inside(land, (0, 0), bay, 13.0), bay, heads, shapely.Point(at).buffer(21.0))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], _Isle]] = {
+_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Isle]] = {
     "volcano": _volcano, "atoll": _atoll, "ridge": _ridge, "twins": _twins, "skerries": _skerries, "fort": _fort,
 }  # fmt: skip
