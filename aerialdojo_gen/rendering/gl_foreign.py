@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -25,7 +26,9 @@ def foreign_kinds(scene: Scene) -> list[Kind]:
 def backdrop_kinds(scene: Scene) -> list[Kind]:
     """Pack sky domes: all materials, both sides."""
     domes = [instance for instance in scene.backdrop if instance.surface != HORIZON]
-    return _kinds(domes, scene.materials, False, ("FOREIGN", "BACKDROP"))
+    # No light falls on a dome: its colours stay as vivid as they are.
+    unlit = {name: replace(material, unlit=True) for name, material in scene.materials.items()}
+    return _kinds(domes, unlit, False, ("FOREIGN", "BACKDROP"))
 
 
 def _kinds(

@@ -2,6 +2,8 @@
 
 from support.planting import check
 
+from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
+
 SIDES = ("routes/train", "routes/test")
 
 # What is done to which route, and by which check that is found.
@@ -50,9 +52,7 @@ def test_a_release_of_an_older_version_is_not_at_fault(planted):
     for side in SIDES:
         planted.edit_all(side, forget, lambda _: True)
     for side in ("tasks/train", "tasks/test"):
-        planted.edit_all(side, lambda row: row.update(dict.fromkeys(
-            ("target_seen_in_train", "start_seen_in_train", "pair_seen_in_train", "target_split", "target_held_out",
-             "start_held_out"))), lambda _: True)  # fmt: skip
+        planted.edit_all(side, lambda row: row.update(dict.fromkeys(SPLIT_COLUMNS)), lambda _: True)
     assert check(planted) == {}
 
 

@@ -207,7 +207,10 @@ def test_a_landmark_called_after_another_thing(planted):
     planted.edit("release/landmarks", lambda row: row.update(name="fire hydrant"))
     for side in ("train", "test"):
         planted.edit_all(f"tasks/{side}", lambda task: task.update(landmark="fire hydrant"), lambda _: True)
-    assert check(planted) == {"landmark_name": [f"landmark_id={landmark['landmark_id']}"]}
+    found = check(planted)
+    assert found["landmark_name"] == [f"landmark_id={landmark['landmark_id']}"]
+    # Texts that name the hydrant may now mean the landmark.
+    assert set(found) <= {"landmark_name", "object_words"}
 
 
 def longer(planted, insert, at=0):

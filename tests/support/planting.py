@@ -9,6 +9,7 @@ import math
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -136,10 +137,15 @@ def edit_mesh(planted: Planted, change: Callable[[dict], None]) -> None:
     planted.edit("release/scenes", lambda row: row.update(mesh_sha256=digest))
 
 
-def retell(planted: Planted, object_id: int, **said: str) -> None:
-    """Say something else of an object, in `objects` and in every task that asks for it."""
-    planted.edit("release/objects", lambda row: row.update(said), lambda row: row["object_id"] == object_id)
+def retell(planted: Planted, object_id: int, **said: Any) -> None:
+    """Say something else of an object, in `objects` and all its tasks; a description as one by a person."""
     named = {"target_name" if name == "name" else name: text for name, text in said.items()}
+    if "description" in said:
+        text = said["description"]
+        written = {"level": "written", "text": text, "claims": [], "frame": text, "held_out": False}
+        said = said | {"paraphrases": [written]}
+        named |= {"frame_seen_in_train": True}
+    planted.edit("release/objects", lambda row: row.update(said), lambda row: row["object_id"] == object_id)
     for side in ("train", "test"):
         asked = {r["nav_id"] for r in planted.rows(f"routes/{side}") if r["target_object_id"] == object_id}
 

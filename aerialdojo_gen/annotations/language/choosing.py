@@ -25,7 +25,7 @@ _MORE_DETAILS = {"terse": 0.0, "vague": 0.0, "normal": 0.45, "detailed": 0.95}
 _ONE_OF = {"colour", "material"}
 # Of the relations, the most natural first, each is chosen so much more often than the next.
 _FALL = 0.8
-_PLACE, _USED = 1.2, 0.2
+_PLACE, _SIDE, _USED = 1.2, 0.35, 0.2
 _DIRECTION = {"terse": 0.15, "vague": 0.9, "normal": 0.15, "detailed": 0.3}
 
 
@@ -149,6 +149,9 @@ def _ranked(about: About, level: str, used: Collection[int], rng: np.random.Gene
     for k in about.places:
         kind = about.claims[k].kind
         weights[k] = _PLACE if kind == "place" else _DIRECTION[level] if kind == "direction" else fall
+        # Compass sides are true of most neighbours, and few people say them.
+        if kind == "relation" and about.claims[k].key.endswith(" of"):
+            weights[k] *= _SIDE
         fall *= _FALL if kind == "relation" else 1.0
         weights[k] *= _USED if k in used else 1.0
     keys = {k: float(rng.exponential()) / weight for k, weight in weights.items()}

@@ -15,7 +15,10 @@ from aerialdojo_gen.annotations.language.subject import Wording
 
 _STARTS = re.compile(r"(^|[.?!] +)([a-zé])")
 _GOES_ON = re.compile(r"\{(?:a|the|np)\} (?:[a-z]|\{ing\})")
-_WITH = re.compile(r"\},? with \{w\}")
+_WITH = re.compile(r"\bwith \{w\}")
+# "Put up up on the hill", "with a sign with a P".
+_AWKWARD = re.compile(r"\b(\w+) \1\b|\bwith (?:an?|the) [^.,;:?]*\bwith (?:an?|the)\b", re.IGNORECASE)
+_LOOKING = re.compile(r"\b(?:note|notice|see|look|find|spot|make|watch)\b")
 _OPENING = 2  # words that no other text of the object begins with
 # How often a kind of first sentence is used where there is something to say with it.
 _KINDS = {"at": 1.0, "ref": 0.5, "at_with": 1.0, "at_telling": 1.5}
@@ -75,12 +78,14 @@ def compose(
     if "w" in first.slots:
         slots["w"] = _one(details.pop(0)[0].details, rng)
     said = [(first, slots)]
-    said += [_detail(wording, telling, rng) for wording, telling in details]
-    said += [_place(place, "" if first.slots & _VERBS else content.verb[0], rng) for place in places[len(own) :]]
+    for wording, telling in details:
+        said.append(_detail(wording, telling, said, rng))
+    for place in places[len(own) :]:
+        said.append(_place(place, "" if first.slots & _VERBS else content.verb[0], said, rng))
     text = " ".join(_ended(frame.text.format(**slots)) for frame, slots in said)
     text = _STARTS.sub(lambda m: m[1] + m[2].upper(), " ".join(text.split()))
     text = text.removesuffix(".") if content.level == "terse" else text
-    if " ".join(text.split()[:_OPENING]) in used:
+    if " ".join(text.split()[:_OPENING]) in used or _AWKWARD.search(text):
         return None
     return text, " | ".join(frame.text for frame, _ in said), first.held_out
 
@@ -140,21 +145,30 @@ def _joined(places: Sequence[Location], template: str, rng: np.random.Generator)
     return f"{first.text} and {second.thing if first.key == second.key != 'between' else second.text}"
 
 
-def _detail(wording: Wording, telling: bool, rng: np.random.Generator) -> tuple[Frame, dict[str, str]]:
+def _detail(
+    wording: Wording, telling: bool, said: Sequence[tuple[Frame, object]], rng: np.random.Generator
+) -> tuple[Frame, dict[str, str]]:
     if wording.clauses and rng.random() < _CLAUSE:
-        return _frame("clause", rng), {"clause": _one(wording.clauses, rng)}
+        return _frame("clause", said, rng), {"clause": _one(wording.clauses, rng)}
     kind = "telling" if telling and rng.random() < _TELLING else "with"
-    return _frame(kind, rng), {"w": _one(wording.details, rng)}
+    return _frame(kind, said, rng), {"w": _one(wording.details, rng)}
 
 
-def _place(place: Location, verb: str, rng: np.random.Generator) -> tuple[Frame, dict[str, str]]:
+def _place(
+    place: Location, verb: str, said: Sequence[tuple[Frame, object]], rng: np.random.Generator
+) -> tuple[Frame, dict[str, str]]:
     if place.turned and rng.random() < _TURNED:
-        return _frame("near", rng), {"ref": place.thing, "nearit": place.turned}
-    return _frame("at", rng, bool(verb)), {"at": place.text, "be": verb}
+        return _frame("near", said, rng), {"ref": place.thing, "nearit": place.turned}
+    return _frame("at", said, rng, bool(verb)), {"at": place.text, "be": verb}
 
 
-def _frame(kind: str, rng: np.random.Generator, with_verb: bool = True) -> Frame:
-    frame = _choose([f for f in frames("more", kind) if with_verb or "be" not in f.slots], rng)
+def _frame(
+    kind: str, said: Sequence[tuple[Frame, object]], rng: np.random.Generator, with_verb: bool = True
+) -> Frame:
+    pool = [frame for frame in frames("more", kind) if with_verb or "be" not in frame.slots]
+    heard = {word for frame, _ in said for word in _LOOKING.findall(frame.text)}
+    # "You'll see a keypad. You'll see it by the gate."
+    frame = _choose([f for f in pool if not heard & set(_LOOKING.findall(f.text))] or pool, rng)
     assert frame is not None
     return frame
 

@@ -25,7 +25,8 @@ export class NodeCuller {
       part.setUsage(THREE.DynamicDrawUsage);
       return part;
     });
-    this.groups.forEach(({ ranges }, g) => {
+    this.groups.forEach(({ ranges, behind, beyond }, g) => {
+      if (behind || beyond) return; // no nodes: the sky and the land beyond are always drawn
       const part = this.part[g];
       let at = 0;
       for (let i = 0; i < ranges.length; i += 3) {
