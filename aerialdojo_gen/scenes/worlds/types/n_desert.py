@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import shapely
 
+from typing import Any
+
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.places import (
     Rock,
@@ -258,7 +260,8 @@ def _serai(draft: Draft, w: float, d: float) -> list[Point]:
     step(draft, "level_area", area={"disc": [*at, half * 1.45]}, blend_m=6)
     draft.section("The caravanserai")
     draft.paint({"box": [-half, -half, half, half], "frame": [*at, yaw]}, draft.material("glade"))
-    walls, houses = [], []
+    walls: list[dict[str, Any]] = []
+    houses: list[dict[str, Any]] = []
     for k in range(4):
         turn = yaw + 90 * k
         for a, b in ((-1.0, -0.18), (0.18, 1.0)):
