@@ -240,7 +240,8 @@ class Draft:
         assert not unknown_kinds, f"{self.world.type}: no slots {unknown_kinds} in its table"
         for (kind, on, settle_m), things in rows.items():
             self.section(f"Things: {kind}{'' if on is None else f', on {on}'}")
-            keys: Entry = {"fit": "skip", "margin_m": 0.25}
+            sure = self.kind.slots[kind].sure
+            keys: Entry = {"fit": "as_is"} if sure else {"fit": "skip", "margin_m": 0.25}
             keys |= {} if on is None else {"on": on}
             keys |= {} if settle_m is None else {"settle_m": settle_m}
             self.add({"place": sorted(things, key=_pose), **keys, **self._levelled(on)})

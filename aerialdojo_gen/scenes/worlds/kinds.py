@@ -80,6 +80,7 @@ class Slots(_Strict):
     held_out: list[str] = []  # Of these, those of ``--held-out`` alone
     most: Annotated[int, Field(ge=1)] = 3  # Instances of a category at these slots of a world
     share: Range = (0.6, 1.0)  # Of the slots, how many are filled
+    sure: bool = False  # Whether there is room where they are offered, as on walls and between parapets
 
 
 class SceneType(_Strict):
