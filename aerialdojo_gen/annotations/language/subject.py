@@ -50,8 +50,8 @@ def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: st
     return found
 
 
-def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> NounPhrase:
-    """Make the noun phrase that says these adjectives and tails, in English order."""
+def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> NounPhrase | None:
+    """Make the noun phrase that says these adjectives and tails, in English order; None if it says a word twice."""
     known = set(name.text.split())
     ordered = sorted(said, key=lambda w: _ORDER.index(w.key) if w.key in _ORDER else 1)
     adjectives: list[str] = []
@@ -69,7 +69,13 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
         adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
     # "Five round" says "round" as well.
     kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
-    return noun_phrase(name, kept, tail)
+    return None if _again([*kept, name.text]) else noun_phrase(name, kept, tail)
+
+
+def _again(said: Sequence[str]) -> bool:
+    """Whether two compounds share a part: "three-level three-tier", "A-shaped A-board"."""
+    parts = [part for text in said for word in text.split() if "-" in word for part in word.split("-")]
+    return len(set(parts)) < len(parts)
 
 
 def fresh(phrases: Sequence[str], said: str) -> tuple[str, ...]:

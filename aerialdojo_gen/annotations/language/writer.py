@@ -45,6 +45,7 @@ class Writer:
         self._names = Names(words, landmarks)
         self._locations = LocationWords(claims, self._names)
         self._said: set[str] = set()
+        self._openings: set[str] = set()
 
     def texts(self, i: int, claims: Sequence[Claim], shown: Collection[str] | None, n: int) -> list[Text]:
         """Write up to `n` texts of instance `i`, none twice; fewer if its claims do not tell it from others.
@@ -61,6 +62,7 @@ class Writer:
             if text is not None:
                 found.append(text)
                 self._said.add(text.text)
+                self._openings.add(_opening(text.text))
         return found
 
     def _write(
@@ -80,6 +82,8 @@ class Writer:
                 continue
             text, frame, held = composed
             least, most = LENGTHS[own]
+            if attempt < _TRIES // 2 and _opening(text) in self._openings:
+                continue
             if text not in self._said and least <= len(text.split()) <= most:
                 return Text(own, text, tuple(sorted(plan.indices)), frame, held)
         return None
@@ -93,6 +97,8 @@ class Writer:
         other = len(verbs) > 1 and rng.random() > _USUAL_VERB
         verb = verbs[int(rng.integers(1, len(verbs))) if other else 0]
         phrase = phrase_of(name, plan.adjectives, rng)
+        if phrase is None:
+            return None
         said = phrase.bare
         details = [
             (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.telling(w.index))
@@ -108,6 +114,10 @@ class Writer:
             [self._locations.of(about.i, k, about.claims[k], plan.level, rng) for k in plan.places],
             details,
         )
+
+
+def _opening(text: str) -> str:
+    return " ".join(text.lower().split()[:4])
 
 
 def _orders(n: int, rng: np.random.Generator) -> Iterator[tuple[str, bool]]:
