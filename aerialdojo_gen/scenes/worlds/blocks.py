@@ -165,3 +165,33 @@ def square(draft: Draft, box: Box, kind: str = "square", step_m: float = 3.5) ->
             yaw = round(math.degrees(math.atan2(y - v, x - u)) / 90.0) * 90.0
             draft.slot(kind, u, v, yaw, (3.3, 3.3))
     return round(x, 2), round(y, 2)
+
+
+def lane_streets(draft: Draft, lanes: Sequence[Box], lane_m: float = 2.8, pavement_m: float = 1.6) -> None:
+    """Pave the lanes between blocks as streets; offer slots on them (``road``) and at their kerbs (``kerb``)."""
+    paths, w, d = [], draft.width_m / 2, draft.depth_m / 2
+    for lane in lanes:
+        x, y = lane.middle
+        more = lane_m + pavement_m
+        if lane.depth > lane.width:
+            low, high = (lane.y0 - more, lane.y1 + more)
+            paths.append([[round(x, 2), round(max(low, -d), 2)], [round(x, 2), round(min(high, d), 2)]])
+        else:
+            low, high = (lane.x0 - more, lane.x1 + more)
+            paths.append([[round(max(low, -w), 2), round(y, 2)], [round(min(high, w), 2), round(y, 2)]])
+    draft.make(
+        "streets", paths=paths, lane_m=lane_m, pavement_m=pavement_m, surface=draft.material("street"),
+        pavement=draft.material("pavement"),
+    )  # fmt: skip
+    for lane in lanes:
+        x, y = lane.middle
+        upright = lane.depth > lane.width
+        length, start = (lane.depth, lane.y0) if upright else (lane.width, lane.x0)
+        for k in range(int(length // 6.0)):
+            at = start + 3.0 + 6.0 * k
+            for side in (-1, 1):
+                road, kerb = side * lane_m / 2, side * (lane_m + pavement_m - 0.85)
+                yaw = (90.0 if side > 0 else 270.0) if upright else (180.0 if side > 0 else 0.0)
+                if k % 2 == (side > 0):
+                    draft.slot("road", *((x + road, at) if upright else (at, y + road)), yaw, (9.5, 2.9))
+                draft.slot("kerb", *((x + kerb, at) if upright else (at, y + kerb)), yaw + 90.0, (1.6, 4.6))

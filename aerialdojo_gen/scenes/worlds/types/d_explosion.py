@@ -1,0 +1,147 @@
+"""Streets and yards after a blast: a crater, fronts torn open about it, soot, wreckage and a cordon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import shapely
+
+from aerialdojo_gen.scenes.worlds.blocks import lane_streets, split, turned
+from aerialdojo_gen.scenes.worlds.draft import Draft
+from aerialdojo_gen.scenes.worlds.places import beside, point
+from aerialdojo_gen.scenes.worlds.streets import Box
+from aerialdojo_gen.scenes.worlds.towns import Layout, avenue, estate, square, town
+from aerialdojo_gen.scenes.worlds.wilds import rolling, step
+from aerialdojo_gen.scenes.worlds.wrecked import heap, littered, open_landmarks, paint_heaps, things, wreck
+
+Point = tuple[float, float]
+
+
+def write(draft: Draft) -> None:
+    """Lay streets and lots out, blast a crater, then tear the buildings open, the more the nearer they stand."""
+    turn, w, d = turned(draft)
+    rolling(draft, 0.25, (22, 32), 1.6)
+    draft.level_things = False
+    lots, lanes, open_ = ([turn.box(b) for b in boxes] for boxes in _TOPOLOGIES[draft.topology](draft, w, d))
+    draft.section("Streets and open ground")
+    for box in open_:
+        draft.paint(box.rounded(), draft.material("square", *box))
+    for box in lots:
+        draft.paint(box.grown(-0.5).rounded(), draft.material("yard", *box))
+    lane_streets(draft, lanes)
+    at = _where(draft, lanes, open_)
+    radius = draft.knob("crater_m")
+    _crater(draft, at, radius)
+    for lane in lanes:
+        draft.take(lane.shape())
+    open_landmarks(
+        draft, [*open_, *(lot for lot in lots if lot.width * lot.depth > 320)], shapely.Point(at).buffer(9.0)
+    )
+    draft.section("What is left of the buildings")
+    for k, lot in enumerate(draft.shuffled(lots, "lots")):
+        _lot(draft, lot, k, at, radius)
+    for box in open_:
+        things(draft, "camp", box.grown(-2.5), 6.2, (7.4, 7.0))
+        things(draft, "small", box.grown(-1.5), 4.8, (2.4, 2.6))
+    draft.section("Rubble")
+    paint_heaps(draft)
+    _cordon(draft, at, radius)
+    draft.fill_slots()
+    draft.section("Loose pieces")
+    _scattered(draft, at, radius)
+
+
+def _where(draft: Draft, lanes: list[Box], open_: list[Box]) -> Point:
+    """Where it blew up: on the square, else in a street near the middle of the site."""
+    if draft.topology in ("square", "yard") and open_:
+        box = max(open_, key=lambda b: b.width * b.depth)
+        return point(box.middle[0] + draft.number(-3, 3, "blast_x"), box.middle[1] + draft.number(-2, 2, "blast_y"))
+    lane = min(lanes, key=lambda b: math.hypot(*b.middle) + draft.number(0, 6, "blast", *b))
+    x, y = lane.middle
+    off = draft.number(-0.2, 0.2, "blast_off")
+    upright = lane.depth > lane.width
+    return point(x, y + off * lane.depth) if upright else point(x + off * lane.width, y)
+
+
+def _crater(draft: Draft, at: Point, radius_m: float) -> None:
+    draft.section("The crater")
+    step(draft, "crater", at=list(at), radius_m=radius_m, depth_m=round(0.6 * radius_m, 1), rim_m=0.8)
+    seed, soot = draft.whole(0, 999, "crater"), draft.material("soot")
+    draft.paint({"blob": [*at, round(radius_m * 2.6, 1), seed, 0.4]}, soot)
+    draft.make(
+        "scorch_rays", at=list(at), radius_m=radius_m, count=24, reach=[2.4, 4.0], spread=[0.06, 0.15], material=soot
+    )
+    for share, role in ((1.65, "earth"), (0.98, "mud"), (0.42, "pool")):
+        draft.paint({"blob": [*at, round(radius_m * share, 1), seed + round(share * 10), 0.25]}, draft.material(role))
+    turns, reach = (25.0, 97.0, 166.0, 235.0, 309.0), 1.5 * radius_m
+    starts = [[*beside((*at, turn), reach, 0.0), turn] for turn in turns]
+    draft.make("cracks", starts=starts, length_m=7, seed=seed % 90)
+    if draft.chance(0.6, "rim"):
+        draft.make("crater_rim", at=list(at), radius_m=radius_m)
+    draft.take(shapely.Point(at).buffer(radius_m * 1.5))
+
+
+def _lot(draft: Draft, lot: Box, k: int, at: Point, radius_m: float) -> None:
+    """Put what is left of a building on a lot; near the blast it is torn wide open, or rubble alone."""
+    name, storeys = f"block_{k}", max(2, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k))
+    box, deep = lot.grown(-1.5), min(lot.width, lot.depth) - 3.0
+    if deep > 13.0:
+        # The front stands at the side that looks to the blast.
+        cut = deep - draft.number(10.5, 13.0, "deep", k)
+        low = at[1] < box.middle[1] if box.width >= box.depth else at[0] < box.middle[0]
+        x0, y0, x1, y1 = box
+        box = (Box(x0, y0 + (0 if low else cut), x1, y1 - (cut if low else 0)) if box.width >= box.depth
+               else Box(x0 + (0 if low else cut), y0, x1 - (cut if low else 0), y1))  # fmt: skip
+        rest = lot.grown(-1.5).shape().difference(box.grown(1.5).shape())
+        if rest.area > 20.0:
+            things(draft, "yard", Box(*rest.bounds), 5.2, (3.8, 3.8))
+    away = box.shape().distance(shapely.Point(at))
+    taken = not draft.is_free(box.shape())
+    if taken or away < radius_m * 1.1:
+        if not taken:
+            high = draft.number(1.2, 2.2, "heap", k)
+            heap(draft, f"heap_{name}", point(*box.middle), min(box.width, box.depth) * 0.42, high)
+        things(draft, "yard", box, 5.2, (3.8, 3.8))
+        return
+    torn = 2 if away < 16.0 else 1 if away < 34.0 else draft.whole(0, 1, "torn", k)
+    wreck(draft, box, name, storeys, torn, toward=at, soot=round(max(0.0, 0.7 - away / 45.0), 2))
+
+
+def _cordon(draft: Draft, at: Point, radius_m: float) -> None:
+    """Bend street lamps away from the blast, and offer slots about the crater (``cordon``, ``rubble``)."""
+    feet = []
+    for k in range(5):
+        foot = beside((*at, 72.0 * k + draft.number(0, 60, "lamp", k)), radius_m * 2.2 + 2.0, 0.0)
+        if draft.is_free(shapely.Point(foot).buffer(0.6)):
+            feet.append(list(foot))
+    if feet:
+        draft.make("bent_lamps", feet=feet, blast=list(at))
+    for k in range(10):
+        turn = 36.0 * k + draft.number(0, 30, "cordon", k)
+        away = radius_m * (1.9 + 0.1 * draft.whole(0, 9, "cordon", k, "away"))
+        draft.slot("cordon", *beside((*at, turn), away, 0.0), turn, (5.6, 3.6), settle_m=0.5)
+
+
+def _scattered(draft: Draft, at: Point, radius_m: float) -> None:
+    beams = []
+    for k in range(6):
+        turn, away = draft.number(0, 360, "beam", k), radius_m * draft.number(1.8, 3.4, "beam", k, "away")
+        beams.append([*beside((*at, turn), away, 0.0), draft.number(2, 5, "beam", k, "m")])
+    draft.make("twisted_steel", beams=beams, stream="beams")
+    littered(draft)
+
+
+def _yard(draft: Draft, w: float, d: float) -> Layout:
+    """A works' yard with halls at three sides, a street along the fourth."""
+    street = -d + 5.0
+    lanes = [Box(-w, street - 4.4, w, street + 4.4)]
+    deep, side, y0 = draft.number(14, 17, "deep"), draft.number(15, 18, "side"), street + 4.4
+    row, _ = split(draft, Box(-w, d - deep, w, d), (4.0, 7.0), (18.0, 34.0), "row")
+    lots = [*row, Box(-w, y0 + 2, -w + side, d - deep - 5), Box(w - side, y0 + 2, w, d - deep - 5)]
+    return lots, lanes, [Box(-w + side + 1, y0 + 1, w - side - 1, d - deep - 1)]
+
+
+_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+    "street": avenue, "square": square, "blocks": town, "yard": _yard, "flats": estate,
+}  # fmt: skip
