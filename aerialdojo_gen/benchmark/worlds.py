@@ -1,0 +1,119 @@
+"""Worlds on demand: releases of worlds from seeds, made in the background and kept in the cache."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.base.shipped import home
+from aerialdojo_gen.base.version import __version__
+from aerialdojo_gen.scenes.worlds.kinds import type_names
+from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
+from aerialdojo_gen.store.cache import Cache
+
+
+class WorldMaker:
+    """Makes releases of worlds, each once: a folder of the cache that `aerialdojo_gen.store.cache` bounds.
+
+    Parameters
+    ----------
+    types : str or sequence of str
+        Names of scene types, or globs: ``"U_*"``.
+    start_seed, num_worlds : int
+        The first seed, and how many seeds of every type.
+    knobs : mapping, optional
+        What the seeds would draw otherwise.
+    held_out : bool
+        Make worlds of what no other world has.
+    n_objects : int
+        Most annotated objects of a world.
+    folder : Path, optional
+        In place of the user's cache.
+
+    Raises
+    ------
+    UsageError
+        No such type, or seeds out of range.
+    """
+
+    def __init__(
+        self, types: str | Sequence[str], start_seed: int = 1000, num_worlds: int = 1, *,
+        knobs: Mapping[str, float] | None = None, held_out: bool = False, n_objects: int = 40,
+        folder: Path | None = None,
+    ) -> None:  # fmt: skip
+        if num_worlds < 1 or start_seed < 0 or start_seed + num_worlds - 1 > MAX_SEED:
+            raise UsageError(
+                f"start_seed and num_worlds: seeds from 0 to {MAX_SEED:,}, and at least 1 world, "
+                f"not {num_worlds} from {start_seed}"
+            )
+        patterns = [types] if isinstance(types, str) else list(types)
+        names = choose_scenes(patterns, type_names(home() / "scene_assets"), "type")
+        seeds = range(start_seed, start_seed + num_worlds)
+        self.worlds = [World(name, seed, dict(knobs or {}), held_out) for seed in seeds for name in names]
+        self._n_objects = n_objects
+        self._cache = Cache(folder)
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="worlds")
+        self._coming: dict[str, Future[Path]] = {}
+        self._lock = threading.Lock()
+        self._child: subprocess.Popen[str] | None = None
+        self._closed = False
+
+    def root(self, world: World) -> Path:
+        """Return the data directory of a world; it is made where it is not there.
+
+        Raises
+        ------
+        AerialDojoError
+            It could not be made.
+        """
+        self.prepare(world)
+        return self._coming.pop(world.name).result()
+
+    def prepare(self, world: World) -> None:
+        """Begin to make a world in the background, one after the other."""
+        if self._closed:
+            raise RuntimeError("the worlds are closed")
+        if world.name not in self._coming:
+            self._coming[world.name] = self._pool.submit(self._find_or_make, world)
+
+    def close(self) -> None:
+        """Stop what is being made; a second call does nothing."""
+        with self._lock:
+            self._closed = True
+            if self._child is not None:
+                self._child.kill()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _find_or_make(self, world: World) -> Path:
+        made_of = (__version__, world.version, world.name, sorted(world.knobs.items()), self._n_objects)
+        name = hashlib.blake2b(repr(made_of).encode(), digest_size=16, person=b"world").hexdigest()
+        return self._cache.make(name, lambda folder: self._make(world, folder)) / "data"
+
+    def _make(self, world: World, folder: Path) -> None:
+        """Write a world's plan and its release into a folder, in processes of their own."""
+        knobs = [word for name, value in world.knobs.items() for word in ("--knob", f"{name}={value:g}")]
+        held_out = ["--held-out"] if world.held_out else []
+        seeds = f"{world.seed}:{world.seed + 1}"
+        objects = ["--objects", str(self._n_objects)]
+        self._run(world, "vary", world.type, "--seeds", seeds, "--out", str(folder), *objects, *knobs, *held_out)
+        self._run(world, "run", str(folder / "pipeline.toml"), "--data", str(folder / "data"), "--quiet")
+
+    def _run(self, world: World, *words: str) -> None:
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", *words, "--workers", "1"]
+        with self._lock:
+            if self._closed:
+                raise AerialDojoError(f"{world.name}: the worlds were closed while it was made")
+            self._child = child = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            )
+        _, said = child.communicate()
+        if child.returncode:
+            last = said.strip().splitlines()[-1:] or [f"it ended with {child.returncode}"]
+            raise AerialDojoError(f"{world.name} could not be made: {last[0]}")

@@ -1,0 +1,92 @@
+"""The environment over worlds from seeds: real worlds, made by real processes, in a cache of the test's own."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+import gymnasium
+import pytest
+
+import aerialdojo_gen.benchmark  # noqa: F401 - registers the environment
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.benchmark.worlds import WorldMaker
+
+GIVEN = {"worlds": "N_Snowfield", "num_worlds": 2, "episodes_per_world": 2, "n_objects": 6, "views": ()}
+
+
+def episodes(env: gymnasium.Env, n: int) -> list[tuple[str, str]]:
+    """Worlds and tasks of some episodes, each ended at once."""
+    found = []
+    for k in range(n):
+        observation, _ = env.reset(seed=5 if k == 0 else None)
+        assert observation in env.observation_space
+        *_, info = env.step(0)
+        found.append((env.unwrapped.world, info["task_id"]))
+    return found
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("worlds")
+
+
+@pytest.mark.slow
+def test_episodes_go_through_worlds_that_are_made_once(cache: Path) -> None:
+    env = gymnasium.make("AerialDojo-v0", **GIVEN, cache=cache)
+    first = episodes(env, 6)
+    env.close()
+    worlds = [world for world, _ in first]
+    assert set(worlds) == {"N_Snowfield-1000", "N_Snowfield-1001"}
+    assert worlds[0] == worlds[1]
+    assert worlds[2] == worlds[3] != worlds[0]
+    assert all(task.startswith(world) for world, task in first)
+    made = {path: path.stat().st_mtime_ns for path in cache.glob("*/*/data/release/tasks/**/*.parquet")}
+    assert made
+    again = gymnasium.make("AerialDojo-v0", **GIVEN, cache=cache)
+    assert episodes(again, 6) == first, "the seed alone decides worlds and tasks"
+    again.reset(options={"world": "N_Snowfield-1001"})
+    assert again.unwrapped.world == "N_Snowfield-1001"
+    with pytest.raises(UsageError, match="no world 'N_Snowfield-1002'"):
+        again.reset(options={"world": "N_Snowfield-1002"})
+    again.close()
+    assert {path: path.stat().st_mtime_ns for path in cache.glob("*/*/data/release/tasks/**/*.parquet")} == made
+
+
+def test_closing_stops_the_process_that_makes_a_world(tmp_path: Path) -> None:
+    maker = WorldMaker("N_Snowfield", folder=tmp_path)
+    maker.prepare(maker.worlds[0])
+    deadline = time.monotonic() + 60
+    while maker._child is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    child: subprocess.Popen[str] = maker._child
+    coming = maker._coming[maker.worlds[0].name]
+    maker.close()
+    assert child.poll() is not None
+    with pytest.raises(AerialDojoError, match="N_Snowfield-1000"):
+        coming.result()
+    assert not list(tmp_path.glob("[0-9a-f][0-9a-f]/*")), "nothing half-made is kept"
+
+
+def test_a_world_that_cannot_be_made_says_why(tmp_path: Path) -> None:
+    maker = WorldMaker("N_Snowfield", knobs={"storeys": 3.0}, folder=tmp_path)
+    with pytest.raises(AerialDojoError, match=r"N_Snowfield-1000 could not be made: .*storeys"):
+        maker.root(maker.worlds[0])
+    maker.close()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"worlds": "U_Nowhere"}, "U_Nowhere"),
+        ({"worlds": "N_Snowfield", "num_worlds": 0}, "at least 1 world"),
+        ({"worlds": "N_Snowfield", "start_seed": -1}, "seeds from 0"),
+        ({"worlds": "N_Snowfield", "data": "data"}, "data and worlds"),
+        ({"worlds": "N_Snowfield", "episodes_per_world": 0}, "episodes_per_world"),
+    ],
+)
+def test_requests_that_make_no_sense(given: dict[str, object], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        gymnasium.make("AerialDojo-v0", **given)
