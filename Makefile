@@ -9,7 +9,7 @@ RUN := .venv/bin/aerialdojo-gen
 RUN_FLAGS := $(if $(WORKERS),--workers $(WORKERS))
 
 .DEFAULT_GOAL := help
-.PHONY: help env dev torch docs dataset smoke evaluate policy test test-fast fuzz torture nightly facts lint format gallery bench lock clean
+.PHONY: help env dev torch docs dataset smoke worlds evaluate policy test test-fast fuzz torture nightly facts lint format gallery bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,6 +65,11 @@ dataset: .venv/.installed  ## generate the dataset: scene_assets/ and annotation
 
 smoke: .venv/.installed  ## two small scenes through all stages, a rendered video included (DATA=data-smoke)
 	@$(RUN) run pipelines/smoke.toml --data $(SMOKE_DATA) $(RUN_FLAGS)
+
+WORLDS ?= my-worlds
+worlds: .venv/.installed  ## four worlds from seeds of every type, with tasks, into $(WORLDS)/
+	@$(RUN) vary '*' --seeds 1000:1004 --out $(WORLDS) $(RUN_FLAGS)
+	@$(RUN) run $(WORLDS)/pipeline.toml --data $(WORLDS)/data $(RUN_FLAGS)
 
 SAMPLE_AGENTS := oracle stop constant random explorer
 SAMPLE := --split id_test --split ood_test --setting base --setting standard --limit 64 $(foreach scene,U_Mall_0 U_Park_1 \
