@@ -69,12 +69,13 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
         adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
     # "Five round" says "round" as well.
     kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
-    return None if _again([*kept, name.text]) else noun_phrase(name, kept, tail)
+    return None if _again(kept, name.text) else noun_phrase(name, kept, tail)
 
 
-def _again(said: Sequence[str]) -> bool:
-    """Whether two compounds share a part: "three-level three-tier", "A-shaped A-board"."""
-    parts = [part for text in said for word in text.split() if "-" in word for part in word.split("-")]
+def _again(adjectives: Sequence[str], noun: str) -> bool:
+    """Whether a word or a part of a compound is said twice: "striped blue-striped", "A-shaped A-board"."""
+    words = [*(word for text in adjectives for word in text.split()), *(w for w in noun.split() if "-" in w)]
+    parts = [part for word in words for part in word.split("-") if part != "and"]
     return len(set(parts)) < len(parts)
 
 
