@@ -211,7 +211,8 @@ class Draft:
             self.take(_box(x, y, *extents_m(self.catalogue, what), yaw, 0.5))
             self.landmarks.append(what)
             thing = repainted(self.catalogue, what, (x, y, yaw), self.rng("landmark", what, "variant"))
-            self.add({"place": [thing], "fit": "must", "margin_m": 0.4, **self._levelled(None)})
+            margin = {} if what in self.kind.overhanging else {"margin_m": 0.4}
+            self.add({"place": [thing], "fit": "must", **margin, **self._levelled(None)})
             placed.append((what, x, y))
         return placed
 

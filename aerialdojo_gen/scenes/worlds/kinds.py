@@ -94,6 +94,7 @@ class SceneType(_Strict):
     palettes: Annotated[dict[str, Palette], Field(min_length=2)]
     landmarks: Weights
     n_landmarks: tuple[int, int] = (1, 3)
+    overhanging: list[str] = []  # Landmarks that others may stand under, such as cranes with their jibs
     latitude_deg: Range | None = None  # Of either hemisphere; without it the sun stands where it does by default
     places: dict[str, Place] = {}
     slots: dict[str, Slots]
