@@ -29,7 +29,7 @@ OBJECT_COLUMNS = [
     column(
         "description",
         pa.string(),
-        "what it looks like and what stands by it, as a person wrote it; null where none did",
+        "what it looks like and what stands by it, as a person wrote it; else the first paraphrase, in the release",
         nullable=True,
     ),
     column("mesh_node", pa.string(), "node of the scene's mesh"),
