@@ -137,7 +137,9 @@ def dressed(draft: Draft, box: Box, name: str, storeys: int, sides: Sequence[flo
 
 def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float = 5.6) -> None:
     """Hang washing and lights across lanes, from house to house."""
-    walls, washing, lights = shapely.union_all([house.shape() for house in houses]), [], []
+    walls = shapely.union_all([house.shape() for house in houses])
+    washing: list[list[float]] = []
+    lights: list[list[float]] = []
     for lane in lanes:
         upright = lane.depth > lane.width
         for k in range(int(max(lane.width, lane.depth) // 9.0)):

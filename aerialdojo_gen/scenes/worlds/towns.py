@@ -43,14 +43,14 @@ def avenue(draft: Draft, w: float, d: float) -> Layout:
     y, lane = draft.number(-0.25, 0.25, "y") * d, 8.8
     at = draft.number(0.4, 0.55, "park") * w
     lanes = [Box(-w, y - lane / 2, w, y + lane / 2)]
-    lots, open_ = [], []
+    lots: list[Box] = []
     for k, (y0, y1) in enumerate(((-d, y - lane / 2), (y + lane / 2, d))):
         row, ways = split(draft, Box(-w, y0, at if k == 0 else w, y1), (8.8, 8.8), (18.0, 34.0), k)
         lots += row
         lanes += ways
     park = Box(at, -d, w, y - lane / 2)
     lots, more = left_open(draft, lots, 1)
-    return lots, lanes, [park, *more, *open_]
+    return lots, lanes, [park, *more]
 
 
 def estate(draft: Draft, w: float, d: float) -> Layout:

@@ -143,7 +143,7 @@ def _flats(draft: Draft, flats: Sequence[tuple[Box, float]]) -> None:
 
 def _water(draft: Draft, w: float, d: float) -> None:
     """Offer slots on what is open water."""
-    rng, found = draft.rng("water"), []
+    rng, found = draft.rng("water"), list[shapely.Point]()
     for _ in range(400):
         spot = shapely.Point(float(rng.uniform(-w + 4, w - 4)), float(rng.uniform(-d + 4, d - 4)))
         yaw, kind = float(rng.uniform(0, 360)), ("afloat", "drowned", "garden")[int(rng.integers(3))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import shapely
 
@@ -81,7 +82,7 @@ def _hall(draft: Draft, lot: Box, k: int) -> None:
     box = _shrunk(draft, lot, k, 4.0)
     eaves = draft.number(6.4, 8.4, "eaves", k)
     kind = draft.pick(["saw", "flat", "gable"], "roof_kind", k)
-    roof = {"kind": kind, "material": draft.material("hall_roof", k)}
+    roof: dict[str, Any] = {"kind": kind, "material": draft.material("hall_roof", k)}
     roof |= {"teeth": draft.whole(3, 5, "teeth", k)} if kind == "saw" else {}
     roof |= {"lights": draft.whole(2, 4, "lights", k)} if kind == "flat" else {}
     gates: dict[str, list[list[float]]] = {}
