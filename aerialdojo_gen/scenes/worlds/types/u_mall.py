@@ -1,0 +1,196 @@
+"""Malls: shops about promenades, courts and car parks, department stores, what stands before them and on roofs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import shapely
+
+from aerialdojo_gen.scenes.worlds.blocks import SIDES, dressed, split, strung
+from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.streets import Box, edge_slots, grid, street_along
+
+_BAY_M, _DEPTH_M, _AISLE_M = 2.6, 5.2, 6.4
+_STORES = ["MARKET", "CINEMA", "GALERIA", "PRIMA", "HOME", "NOVA", "CENTRAL"]
+
+
+class _Mall(NamedTuple):
+    """What a topology gives to the stages after it."""
+
+    shops: list[tuple[Box, tuple[float, ...]]]  # Shops of one or two storeys, and the sides with shop fronts
+    stores: list[Box]  # Department stores, their fronts to the south
+    courts: list[Box]  # Squares and promenades
+    lanes: list[Box]
+    lots: list[Box]  # Ground for cars
+
+
+def write(draft: Draft) -> None:
+    """Lay the street and the car parks, pave courts, then put up shops and stores, and furnish them."""
+    w, d, flip = draft.width_m / 2, draft.depth_m / 2, draft.pick([1, -1], "flip")
+    draft.section("The street")
+    half = street_along(draft, [(-w, -d + 5.6), (w, -d + 5.6)])
+    mall = _TOPOLOGIES[draft.topology](draft, Box(-w + 3.0, -d + 5.6 + half + 1.2, w - 3.0, d - 3.0))
+    mall = mall if flip > 0 else _mirrored(mall)
+    draft.section("Car parks")
+    for k, lot in enumerate(mall.lots):
+        _car_park(draft, lot, k)
+    draft.section("Courts and promenades")
+    for court in mall.courts:
+        draft.paint(court.rounded(), draft.material("plaza", *court), rise_m=0.12)
+    for box in [*(b for b, _ in mall.shops), *mall.stores]:
+        draft.take(box.grown(0.3).shape())
+    draft.section("Landmarks")
+    spots = [p for court in mall.courts for p in grid(court.grown(-2.8), 3.4)]
+    spots += [p for lot in mall.lots for p in grid(lot.grown(-2.6), 5.0)]
+    draft.landmark([(*p, 270.0) for p in draft.shuffled(spots, "spots")])
+    if not draft.landmarks:
+        raise NoRoomError("no room for a landmark")
+    draft.section("Shops and stores")
+    _shops(draft, mall)
+    strung(draft, mall.lanes, [box for box, _ in mall.shops], 4.3)
+    for court in mall.courts:
+        for x, y in grid(court.grown(-2.2), 4.2):
+            draft.slot("court", x, y, draft.pick(SIDES, "court", x, y), (3.8, 3.8))
+    edge_slots(draft, "tree", Box(-w, -d, w, d).grown(-2.0), 6.0, (3.0, 3.0))
+    draft.fill_slots()
+
+
+def _mirrored(mall: _Mall) -> _Mall:
+    """Turn a mall over along x: else the stores of all would be at the same end."""
+
+    def over(boxes: list[Box]) -> list[Box]:
+        return [Box(-box.x1, box.y0, -box.x0, box.y1) for box in boxes]
+
+    shops = [(over([box])[0], tuple((180.0 - side) % 360.0 for side in sides)) for box, sides in mall.shops]
+    return _Mall(shops, over(mall.stores), over(mall.courts), over(mall.lanes), over(mall.lots))
+
+
+def _shops(draft: Draft, mall: _Mall) -> None:
+    names = draft.shuffled(_STORES, "stores")
+    for k, (box, sides) in enumerate(mall.shops):
+        storeys = draft.whole(1, round(draft.knob("storeys")), "storeys", k)
+        draft.make("building", outline=box.rounded(), wall=draft.material("wall", k), roof=draft.material("roof", k),
+                   storeys=storeys, storey_m=4.6 if storeys == 1 else 3.8, on=0, category="shop_building",
+                   **{"as": f"shop_{k}"})  # fmt: skip
+        dressed(draft, box, f"shop_{k}", 1, sides, shops=0.72)
+        for x, y in grid(box.grown(-2.0), 5.0):
+            draft.slot("roof", x, y, draft.pick(SIDES, "roof", x, y), (4.4, 4.4), on=f"shop_{k}")
+    for k, box in enumerate(mall.stores):
+        draft.make(
+            "anchor_store", node=f"{names[k].lower()}_store", box=box.rounded(), sign=names[k],
+            height_m=draft.number(9.0, 12.5, "store", k), wall=draft.material("store", k), **{"as": f"store_{k}"},
+        )  # fmt: skip
+        for x, y in grid(box.grown(-2.4), 5.6):
+            draft.slot("roof", x, y, draft.pick(SIDES, "store roof", x, y), (4.6, 4.6), on=f"store_{k}")
+
+
+def _car_park(draft: Draft, lot: Box, k: int) -> None:
+    """Pave a car park, with double rows of bays along x."""
+    draft.paint(lot.rounded(), draft.material("lot"))
+    for n in range(2):
+        x = round(lot.x0 + (0.1 + 0.5 * n + 0.3 * draft.number(0, 1, "entry", k, n)) * lot.width, 1)
+        y = round(-draft.depth_m / 2 + 5.6 + 3.2, 2)
+        draft.paint([x - 3.2, y, x + 3.2, round(lot.y0 + 0.1, 2)], draft.material("lot"))
+        draft.make("arrows", at=[[x - 1.5, lot.y0, 270.0], [x + 1.5, lot.y0, 90.0]])
+    rows, y = [], lot.y0 + 3.4 + _DEPTH_M
+    count = int((lot.width - 12.0) // _BAY_M)
+    while y + _DEPTH_M < lot.y1 - 2.0 and count > 3:
+        x = round(lot.middle[0], 2)
+        rows += [[x, round(y, 2), 90.0, count], [x, round(y, 2), 270.0, count]]
+        for side in (-1, 1):
+            at = x + side * (count * _BAY_M / 2 + 1.6)
+            island = Box(at - 1.2, y - _DEPTH_M, at + 1.2, y + _DEPTH_M)
+            draft.paint(island.rounded(), draft.material("island"), rise_m=0.12)
+            draft.slot("tree", at, y + 2.6, 0.0, (2.0, 2.0))
+            draft.slot("island", at, y - 2.2, 90.0, (2.2, 4.0))
+        y += 2 * _DEPTH_M + _AISLE_M
+    if rows:
+        draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
+        for x, y, _, n in rows[::2]:
+            draft.take(shapely.box(x - n * _BAY_M / 2, y - _DEPTH_M, x + n * _BAY_M / 2, y + _DEPTH_M))
+    edge_slots(draft, "verge", lot.grown(-1.4), 5.6, (3.0, 3.0))
+
+
+def _row(draft: Draft, x0: float, x1: float, y0: float, y1: float, key: str) -> list[Box]:
+    """Shops wall to wall from x0 to x1."""
+    boxes, x, k = [], x0, 0
+    while x < x1 - 1.0:
+        wide = draft.number(12, 20, key, k)
+        wide = x1 - x if x1 - x - wide < 11.0 else wide
+        boxes.append(Box(x, y0, x + wide, y1 - draft.pick([0.0, 0.0, 1.5], key, k, "deep")))
+        x, k = x + wide, k + 1
+    return boxes
+
+
+def _strip(draft: Draft, area: Box) -> _Mall:
+    """Shops in a row with a wing at one end, a store among them, a car park before them."""
+    deep, wing = draft.number(13, 16, "deep"), draft.number(13, 15, "wing")
+    y0 = area.y1 - deep
+    at = draft.number(area.x0 + wing + 22, area.x1 - 44, "store")
+    store = Box(at, y0 - 1.0, at + draft.number(22, 28, "store_wide"), area.y1)
+    shops = [(b, (270.0,)) for b in _row(draft, area.x0, at, y0, area.y1, "west")]
+    shops += [(b, (270.0,)) for b in _row(draft, store.x1, area.x1, y0, area.y1, "east")]
+    low = y0 - draft.number(24, 32, "wing_long")
+    shops += [(Box(area.x0, max(low, area.y0 + 4), area.x0 + wing, y0 - 0.05), (0.0,))]
+    walk = Box(area.x0 + wing, y0 - 7.0, area.x1, y0)
+    return _Mall(shops, [store], [walk], [], [Box(area.x0 + wing + 2.0, area.y0, area.x1, y0 - 8.0)])
+
+
+def _promenade(draft: Draft, area: Box) -> _Mall:
+    """Two rows of shops that face one another over a promenade, a store at its end."""
+    deep, wide = draft.number(12, 15, "deep"), draft.number(11, 15, "wide")
+    y1 = area.y1 - deep
+    y0 = y1 - wide
+    end = draft.number(24, 30, "store")
+    shops = [(b, (270.0,)) for b in _row(draft, area.x0, area.x1 - end - 8, y1, area.y1, "north")]
+    shops += [(b, (90.0, 270.0)) for b in _row(draft, area.x0, area.x1 - end - 8, y0 - deep, y0, "south")]
+    store = Box(area.x1 - end, area.y1 - draft.number(22, 28, "store_deep"), area.x1, area.y1)
+    walk, square = Box(area.x0, y0, area.x1 - end - 8, y1), Box(area.x1 - end - 8, y0 - deep, area.x1, store.y0)
+    return _Mall(shops, [store], [walk, square], [walk], [Box(area.x0, area.y0, area.x1, y0 - deep - 5.0)])
+
+
+def _lanes(draft: Draft, area: Box) -> _Mall:
+    """Shops on blocks with lanes between them, like a small town, a square among them."""
+    y0 = area.y0 + draft.number(0.3, 0.38, "lot") * area.depth
+    blocks, lanes = split(draft, Box(area.x0, y0, area.x1, area.y1), (6.0, 8.5), (13.0, 24.0))
+    near = sorted(blocks, key=lambda b: abs(b.middle[0]) * 0.5 + abs(b.middle[1] - (y0 + area.y1) / 2))
+    large = max(near[2:], key=lambda b: b.width)
+    shops = [(b, SIDES) for b in near[2:] if b is not large]
+    paved = [Box(area.x0, y0, area.x1, area.y1)]
+    return _Mall(shops, [large.grown(-0.5)], [*paved, *near[:2]], lanes, [Box(area.x0, area.y0, area.x1, y0 - 4.0)])
+
+
+def _court(draft: Draft, area: Box) -> _Mall:
+    """Shops about a court that is open to the car park, stores at two sides."""
+    deep, half = draft.number(13, 16, "deep"), draft.number(22, 28, "half")
+    x, y1 = draft.number(-8, 8, "x"), area.y1 - deep
+    low = y1 - draft.number(26, 32, "court")
+    court = Box(x - half, low, x + half, y1)
+    shops = [(b, (270.0,)) for b in _row(draft, x - half, x + half, y1, area.y1, "north")]
+    shops.append((Box(x - half - deep, low, x - half, area.y1), (0.0,)))
+    shops.append((Box(x + half, low, x + half + deep, area.y1), (180.0,)))
+    stores = []
+    for a, b in ((area.x0, x - half - deep - 0.1), (x + half + deep + 0.1, area.x1)):
+        if b - a > 17.0:
+            stores.append(Box(a, area.y1 - 22.0, b, area.y1))
+    return _Mall(shops, stores, [court], [], [Box(area.x0, area.y0, area.x1, low - 5.0)])
+
+
+def _islands(draft: Draft, area: Box) -> _Mall:
+    """Stores that stand alone in a wide car park, a row of shops behind them."""
+    deep = draft.number(12, 14, "deep")
+    y1 = area.y1 - deep
+    shops = [(b, (270.0,)) for b in _row(draft, area.x0, area.x1, y1, area.y1, "north")]
+    y = (area.y0 + y1) / 2
+    stores, n = [], 2
+    for k in range(n):
+        x = area.x0 + (k + 0.5) * area.width / n + draft.number(-5, 5, "x", k)
+        stores.append(Box(x - 14.0, y - 3.0, x + 14.0, y + 14.0))
+    walk = Box(area.x0, y1 - 6.0, area.x1, y1)
+    return _Mall(shops, stores, [walk], [], [Box(area.x0, area.y0, area.x1, y - 12.0)])
+
+
+_TOPOLOGIES: dict[str, Callable[[Draft, Box], _Mall]] = {
+    "strip": _strip, "promenade": _promenade, "lanes": _lanes, "court": _court, "islands": _islands,
+}  # fmt: skip
