@@ -14,6 +14,7 @@ from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.checks import faults
 from aerialdojo_gen.scenes.colours import colour_name
+from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
@@ -49,6 +50,19 @@ def test_a_world_is_sound_and_its_plan_builds_the_same_scene(kind: str) -> None:
         assert (one.vertices == other.vertices).all()
 
 
+def test_every_type_of_the_scenes_has_a_generator_and_suns_on_all_sides() -> None:
+    assert {path.stem.rsplit("_", 1)[0] for path in (ASSETS / "scenes").glob("*.toml")} == set(TYPES)
+    for kind in ("N_Desert", "D_Flood"):
+        table = load_type(kind, ASSETS, catalogue())
+        lights = [Draft(World(kind, seed), table, catalogue()).head["light"] for seed in range(60)]
+        suns = [sun_at(light["latitude_deg"], light["date"], light["hour"]) for light in lights]
+        assert {(x > 0, y > 0) for x, y, _ in suns} == {(a, b) for a in (True, False) for b in (True, False)}
+        assert {light["weather"] for light in lights} >= {"clear", "overcast"} & {
+            weather for palette in table.palettes.values() if not palette.held_out for weather in palette.weather
+        }
+        assert all(z > 0.05 for *_, z in suns)
+
+
 @settings(max_examples=4, deadline=None)
 @given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
 def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
@@ -64,6 +78,7 @@ def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
 @pytest.mark.parametrize("kind", TYPES)
 def test_seeds_give_all_topologies_and_other_worlds(kind: str) -> None:
     drafts = [d for d in (draft_of(World(kind, seed)) for seed in range(1000, 1040)) if d is not None]
+    assert len(drafts) >= 36
     table = load_type(kind, ASSETS, catalogue())
     assert {d.topology for d in drafts} == {name for name, t in table.topologies.items() if not t.held_out}
     assert len({d.text().split("\n", 1)[1] for d in drafts}) == len(drafts)
