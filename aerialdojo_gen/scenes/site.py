@@ -9,6 +9,7 @@ from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.affinity import rotate, translate
 from shapely.geometry import MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -17,6 +18,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
+from aerialdojo_gen.scenes.contact import CONTACT_M, stand
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
@@ -48,6 +50,7 @@ class Site:
         self._counts: dict[str, int] = {}
         self._nodes: set[str] = set()
         self._moved_nodes: set[str] = set()
+        self._on_ground: list[int] = []  # Indices of the things that stand on the ground
         self._footprints = Footprints()
         self._terrain = flat_terrain(head.size_m)
         self._base = "grass"
@@ -152,6 +155,8 @@ class Site:
         if thing.solid and area is not None:
             self._footprints.add(area, base, high)
         moved = self._at_moved_pose(thing.category, name, (*at, base), thing.yaw_deg, options)
+        if thing.z is None:
+            self._on_ground.append(len(self.instances))
         self.instances.append(moved or instance)
         self._keep_free(thing, instance, room)
         return instance
@@ -262,6 +267,7 @@ class Site:
         missing = next((node for node in self.head.moves if node not in self._moved_nodes), None)
         if missing is not None:
             raise AssetError(f"{self.name}: moves: no prop {missing!r} is placed{nearest(missing, self._nodes)}")
+        self._bring_into_contact()
         ground = self._ground()
         instances = (ground, *self.instances)
         x, y = self.head.size_m
@@ -275,6 +281,22 @@ class Site:
             self.name, instances, materials, bounds, sky, sun, self.head.light.weather, backdrop=beyond,
             attribution=self.head.attribution,
         )  # fmt: skip
+
+    def _bring_into_contact(self) -> None:
+        """Let what stands on a slope lean with it, sink in, or stand on a plinth."""
+
+        def heights(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.array([self.ground_z(*at) for at in zip(x.tolist(), y.tolist(), strict=True)])
+
+        for k in self._on_ground:
+            thing = self.instances[k]
+            (x0, y0, _), (x1, y1, _) = thing.bounds
+            under = self._terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
+            if np.ptp(under) <= CONTACT_M / 2.0:
+                continue
+            self.instances[k], plinth = stand(thing, self.catalogue[thing.category].kind, heights)
+            if plinth is not None:
+                self.add(f"plinth_{thing.node}", "plinth", [(self.material("plinth", "concrete"), plinth)])
 
     def _ground(self) -> Instance:
         meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)

@@ -259,7 +259,8 @@ class _Building:
     def _stand(self, thing: Thing, entry: Place, where: str) -> bool:
         category, variant, (x, y, yaw_deg) = self._pose(thing, entry, where)
         z, above_m = thing.on if thing.on is not None else entry.on, thing.above_ground_m or entry.above_ground_m
-        if z is None and entry.settle_m is not None:
+        settles = z is None and entry.settle_m is not None and not above_m and entry.sunk is None
+        if z is None and entry.settle_m is not None and not settles:
             z = self._site.settled_z(x, y, entry.settle_m) + above_m
         elif z is None and above_m:
             z = self._site.ground_z(x, y) + above_m
@@ -273,6 +274,8 @@ class _Building:
             category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid, **given
         )
         room: Room = {"clear_m": entry.clear_m, "margin_m": entry.margin_m, "room_m": entry.room_m}
+        if settles:
+            room["settle_m"] = entry.settle_m
         try:
             placed = self._site.place(one, entry.fit, **room) is not None
         except AssetError as error:
