@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import shapely
@@ -18,7 +18,7 @@ _STORES = ["MARKET", "CINEMA", "GALERIA", "PRIMA", "HOME", "NOVA", "CENTRAL"]
 class _Mall(NamedTuple):
     """What a topology gives to the stages after it."""
 
-    shops: list[tuple[Box, tuple[float, ...]]]  # Shops of one or two storeys, and the sides with shop fronts
+    shops: Sequence[tuple[Box, tuple[float, ...]]]  # Shops of one or two storeys, and the sides with shop fronts
     stores: list[Box]  # Department stores, their fronts to the south
     courts: list[Box]  # Squares and promenades
     lanes: list[Box]
@@ -89,10 +89,10 @@ def _car_park(draft: Draft, lot: Box, k: int) -> None:
     """Pave a car park, with double rows of bays along x."""
     draft.paint(lot.rounded(), draft.material("lot"))
     for n in range(2):
-        x = round(lot.x0 + (0.1 + 0.5 * n + 0.3 * draft.number(0, 1, "entry", k, n)) * lot.width, 1)
-        y = round(-draft.depth_m / 2 + 5.6 + 3.2, 2)
-        draft.paint([x - 3.2, y, x + 3.2, round(lot.y0 + 0.1, 2)], draft.material("lot"))
-        draft.make("arrows", at=[[x - 1.5, lot.y0, 270.0], [x + 1.5, lot.y0, 90.0]])
+        gate = round(lot.x0 + (0.1 + 0.5 * n + 0.3 * draft.number(0, 1, "entry", k, n)) * lot.width, 1)
+        kerb = round(-draft.depth_m / 2 + 5.6 + 3.2, 2)
+        draft.paint([gate - 3.2, kerb, gate + 3.2, round(lot.y0 + 0.1, 2)], draft.material("lot"))
+        draft.make("arrows", at=[[gate - 1.5, lot.y0, 270.0], [gate + 1.5, lot.y0, 90.0]])
     rows, y = [], lot.y0 + 3.4 + _DEPTH_M
     count = int((lot.width - 12.0) // _BAY_M)
     while y + _DEPTH_M < lot.y1 - 2.0 and count > 3:
@@ -107,8 +107,8 @@ def _car_park(draft: Draft, lot: Box, k: int) -> None:
         y += 2 * _DEPTH_M + _AISLE_M
     if rows:
         draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
-        for x, y, _, n in rows[::2]:
-            draft.take(shapely.box(x - n * _BAY_M / 2, y - _DEPTH_M, x + n * _BAY_M / 2, y + _DEPTH_M))
+        for u, v, _, many in rows[::2]:
+            draft.take(shapely.box(u - many * _BAY_M / 2, v - _DEPTH_M, u + many * _BAY_M / 2, v + _DEPTH_M))
     edge_slots(draft, "verge", lot.grown(-1.4), 5.6, (3.0, 3.0))
 
 
@@ -143,7 +143,8 @@ def _promenade(draft: Draft, area: Box) -> _Mall:
     y1 = area.y1 - deep
     y0 = y1 - wide
     end = draft.number(24, 30, "store")
-    shops = [(b, (270.0,)) for b in _row(draft, area.x0, area.x1 - end - 8, y1, area.y1, "north")]
+    shops: list[tuple[Box, tuple[float, ...]]] = []
+    shops += [(b, (270.0,)) for b in _row(draft, area.x0, area.x1 - end - 8, y1, area.y1, "north")]
     shops += [(b, (90.0, 270.0)) for b in _row(draft, area.x0, area.x1 - end - 8, y0 - deep, y0, "south")]
     store = Box(area.x1 - end, area.y1 - draft.number(22, 28, "store_deep"), area.x1, area.y1)
     walk, square = Box(area.x0, y0, area.x1 - end - 8, y1), Box(area.x1 - end - 8, y0 - deep, area.x1, store.y0)
