@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Heights = Callable[[Floats, Floats], Floats]
 
 CONTACT_M = 0.05  # a gap that the eye does not see
-_FOOT_M = 0.12  # a thing's feet are so near to its lowest point
+_FOOT_M = 0.03  # a thing's feet are so near to its lowest point
 _SUNK_M = 0.015  # what is let down is so deep in the ground, or its edge would show light
 _LET_DOWN_M = 0.25  # more would bury the door of a booth
 _STEEPEST_DEG = 18.0
@@ -52,45 +52,52 @@ def stand(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mes
     plinth : Mesh or None
         What bears it, from its feet into the ground.
     """
-    gaps, feet = _gaps(instance, ground)
+    feet = _feet(instance)
+    gaps = _gaps(instance, feet, ground)
     leans = _leans(instance, kind, feet)
     touches = float(gaps.max()) <= CONTACT_M and not (leans and float(gaps.min()) < -_BURIED_M)
     if touches or float(gaps.min()) > CONTACT_M or float(np.abs(gaps).max()) > _ELSEWHERE_M:
         return instance, None
     if leans:
         instance = _leaning(instance, feet, ground)
-        gaps, feet = _gaps(instance, ground)
+        gaps = _gaps(instance, feet, ground)
     gap = float(gaps.max())
     if gap <= CONTACT_M:
         return instance, None
     long, wide, high = np.ptp(instance.bounds, axis=0).tolist()
     if gap > _LET_DOWN_M and not leans and kind != "vegetation" and max(long, wide) <= _PLINTH_M:
-        return instance, _plinth(feet, ground)
+        return instance, _plinth(instance.vertices[feet], ground)
     down = np.array([0.0, 0.0, -min(gap + _SUNK_M, _BURIED_SHARE * high)])
     return _moved(instance, lambda v: v + down), None
 
 
-def _gaps(instance: Instance, ground: Heights) -> tuple[Floats, Floats]:
-    """Gaps (n,) between a thing's outermost feet, (n, 3), and the ground: negative where they are in it."""
+def _feet(instance: Instance) -> NDArray[np.int64]:
+    """Indices of the outermost of a thing's lowest vertices, in sixteen directions."""
     vertices = instance.vertices
-    low = vertices[vertices[:, 2] <= vertices[:, 2].min() + _FOOT_M]
+    low = np.flatnonzero(vertices[:, 2] <= vertices[:, 2].min() + _FOOT_M)
     turns = np.arange(16) * (math.pi / 8.0)
-    reach = low[:, :1] * np.cos(turns) + low[:, 1:2] * np.sin(turns)
-    feet = low[np.unique(np.argmax(np.round(reach, 6), axis=0))]
-    return np.round(feet[:, 2] - ground(feet[:, 0], feet[:, 1]), 6), feet
+    reach = vertices[low, :1] * np.cos(turns) + vertices[low, 1:2] * np.sin(turns)
+    return np.unique(low[np.argmax(np.round(reach, 6), axis=0)])
 
 
-def _leans(instance: Instance, kind: str, feet: Floats) -> bool:
+def _gaps(instance: Instance, feet: NDArray[np.int64], ground: Heights) -> Floats:
+    """Gaps (n,) between feet and ground, metres: negative where they are in it."""
+    x, y, z = instance.vertices[feet].T
+    return np.round(z - ground(x, y), 6)
+
+
+def _leans(instance: Instance, kind: str, feet: NDArray[np.int64]) -> bool:
     long, wide, high = np.ptp(instance.bounds, axis=0).tolist()
-    foot = np.ptp(feet[:, :2], axis=0)
+    foot = np.ptp(instance.vertices[feet, :2], axis=0)
     return (
         kind not in _LEVEL and kind != "vegetation"
         and float(foot.min()) >= _LEAST_M and (kind == "vehicle" or high <= _SLENDER * min(long, wide))
     )  # fmt: skip
 
 
-def _leaning(instance: Instance, feet: Floats, ground: Heights) -> Instance:
+def _leaning(instance: Instance, indices: NDArray[np.int64], ground: Heights) -> Instance:
     """Turn a thing about a level axis, so that its feet follow the ground's slope."""
+    feet = instance.vertices[indices]
     x, y = (feet[:, k] - feet[:, k].mean() for k in (0, 1))
     z = ground(feet[:, 0], feet[:, 1])
     xx, yy, xy = float((x * x).sum()), float((y * y).sum()), float((x * y).sum())
