@@ -31,6 +31,7 @@ class Isle(NamedTuple):
     bay_deg: float  # Where the village looks to the sea
     heads: list[Point]  # Level places for landmarks, and what belongs to lookouts
     shut: BaseGeometry = shapely.Point()  # Too steep for houses and woods
+    cliffs: BaseGeometry = shapely.Point()  # Where the shore is no beach
 
 
 def settle(draft: Draft, isle: Isle) -> None:
@@ -48,7 +49,7 @@ def settle(draft: Draft, isle: Isle) -> None:
     about(draft, "village", isle.village, (3.2, 6.6), 9, (4.9, 3.8))
     draft.take(shapely.Point(isle.village).buffer(9.0))
     afloat(draft, isle.land, 9)
-    beach_slots(draft, isle.land)
+    beach_slots(draft, isle.land, off=isle.cliffs)
     sea = shapely.box(-w, -d, w, d).difference(isle.land.buffer(-3.5))
     draft.take(sea)
     step(draft, "level_under_things")

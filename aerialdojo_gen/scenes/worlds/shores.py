@@ -165,8 +165,10 @@ def afloat(draft: Draft, land: BaseGeometry, number: int, reach_m: float = 200.0
             draft.slot("sea", spot.x, spot.y, yaw, (14.2, 6.0), on="sea")
 
 
-def beach_slots(draft: Draft, land: BaseGeometry, step_m: float = 6.5, inland_m: float = 4.8) -> None:
-    """Offer slots (``beach``) along the shore, fronts to the sea, where the ground is free."""
+def beach_slots(
+    draft: Draft, land: BaseGeometry, step_m: float = 6.5, inland_m: float = 4.8, off: BaseGeometry | None = None
+) -> None:
+    """Offer slots (``beach``) along the shore, fronts to the sea, where the ground is free, off an area."""
     inner = land.buffer(-inland_m)
     for part in getattr(inner, "geoms", [inner]):
         ring = part.exterior
@@ -174,5 +176,5 @@ def beach_slots(draft: Draft, land: BaseGeometry, step_m: float = 6.5, inland_m:
             p = ring.interpolate((k + draft.number(0.2, 0.8, "beach", k, round(part.area))) * step_m)
             q = ring.interpolate(ring.project(p) + 0.5)
             yaw = towards((p.x, p.y), (q.x, q.y)) + (-90.0 if ring.is_ccw else 90.0)
-            if draft.is_free(p.buffer(2.2)):
+            if draft.is_free(p.buffer(2.2)) and (off is None or not off.intersects(p)):
                 draft.slot("beach", p.x, p.y, yaw, (5.4, 4.0))

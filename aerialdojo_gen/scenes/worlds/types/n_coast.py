@@ -55,6 +55,14 @@ def _shore(draft: Draft) -> _Shore:
     return _Shore(quarter, draft.pick([1, -1], "flip"), *((d, w) if quarter % 2 else (w, d)))
 
 
+def _beside(shore: _Shore, at: float, by_m: float) -> BaseGeometry:
+    """Ground that is farther along the shore from a place than so much."""
+    far, deep = shore.half_u + 30.0, shore.half_v + 30.0
+    boxes = [[shore.at(u, v) for u, v in ((a, -deep), (b, -deep), (b, deep), (a, deep))]
+             for a, b in ((-far, at - by_m), (at + by_m, far))]  # fmt: skip
+    return shapely.union_all([shapely.Polygon(box).buffer(0) for box in boxes])
+
+
 def _mainland(draft: Draft, shore: _Shore, line: Callable[[float], float]) -> shapely.Polygon:
     """Name the coastline, v by u, that bounds the land; it goes on beyond the site."""
     rng, out = draft.rng("coastline"), shore.half_u + 20.0
@@ -118,7 +126,8 @@ def _cove(draft: Draft, shore: _Shore) -> Isle:
         heights[f"far_{k}"] = far
         heights[f"head_{k}"] = f"{draft.number(5, 10, 'high', k)}*exp(-far_{k}*far_{k})*eased(inland, 1, 6)"
     _raise(draft, [{"polygon": ["coast"]}], land, heights, "head_0 + head_1")
-    return Isle(land, _behind(shore, land, at, 14.0), shore.yaw(270.0), heads)
+    steep = shapely.MultiPoint(heads).buffer(24.0)
+    return Isle(land, _behind(shore, land, at, 14.0), shore.yaw(270.0), heads, cliffs=steep)
 
 
 def _cliffs(draft: Draft, shore: _Shore) -> Isle:
@@ -141,7 +150,8 @@ def _cliffs(draft: Draft, shore: _Shore) -> Isle:
     _raise(draft, parts, whole, heights, "cliff")
     far = [u * shore.half_u for u in (-0.72, 0.72) if abs(u * shore.half_u - at) > half + 8]
     heads = [_behind(shore, land, u, 11.0) for u in far]
-    return Isle(whole, _behind(shore, land, at, 14.0), shore.yaw(270.0), heads)
+    village = _behind(shore, land, at, 14.0)
+    return Isle(whole, village, shore.yaw(270.0), heads, cliffs=_beside(shore, at, half - 1.0))
 
 
 def _estuary(draft: Draft, shore: _Shore) -> Isle:
@@ -195,14 +205,15 @@ def _spit(draft: Draft, shore: _Shore) -> Isle:
 def _fjord(draft: Draft, shore: _Shore) -> Isle:
     """A long arm of the sea between steep hills, the village at its end."""
     base, deep = -0.72 * shore.half_v, draft.number(1.05, 1.2, "deep") * shore.half_v
-    at, half = draft.number(-0.15, 0.15, "at") * shore.half_u, draft.number(0.31, 0.36, "half") * shore.half_u
+    at, half = draft.number(-0.15, 0.15, "at") * shore.half_u, draft.number(0.35, 0.4, "half") * shore.half_u
     land = _mainland(draft, shore, lambda u: base + deep * math.exp(-(((u - at) / half) ** 4)))
     high = draft.number(8, 13, "high")
     aside = f"eased(abs({shore.along} - ({at:.1f})), {half * 1.1 + 6:.1f}, {half * 1.1 + 20:.1f})"
     hills = f"{high}*{aside}*eased(inland, 2, 12)*(1 + 0.25*noise)"
     _raise(draft, [{"polygon": ["coast"]}], land, {"hills": hills}, "hills")
     heads = [_behind(shore, land, at + side * half * 1.25, 16.0) for side in (-1, 1)]
-    return Isle(land, _behind(shore, land, at, 13.0), shore.yaw(270.0), heads)
+    village = _behind(shore, land, at, 13.0)
+    return Isle(land, village, shore.yaw(270.0), heads, cliffs=_beside(shore, at, half * 1.1 + 6.0))
 
 
 _TOPOLOGIES: dict[str, Callable[[Draft, _Shore], Isle]] = {
