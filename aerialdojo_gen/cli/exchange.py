@@ -19,11 +19,14 @@ app = typer.Typer()
 
 # Formats with what the body sees on its way.
 FOR_TRAINING = ("lerobot", "webdataset")
+# Formats of meshes alone.
+SHAPES = ("pointcloud", "occupancy")
 
 
 @app.command("export")
 def export(
-    form: Annotated[str, typer.Option("--format", help="aerialdojo, habitat, lerobot or webdataset.")],
+    form: Annotated[str, typer.Option(
+        "--format", help="aerialdojo, habitat, lerobot, webdataset, pointcloud or occupancy.")],
     scenes: Scenes = None,
     data: Data = "data",
     out: Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: "
@@ -71,6 +74,10 @@ def export(
         "--run", help="Export the successful flights of this run of evaluate or fly in place of the references; "
         "repeatable.")] = None,
     workers: Workers = None,
+    points_per_m2: Annotated[float | None, typer.Option(
+        "--points-per-m2", help="pointcloud: points per square metre of surface.  (default: 20)")] = None,
+    voxel_m: Annotated[float | None, typer.Option(
+        "--voxel-m", help="occupancy: edge of a voxel in metres.  (default: 0.5)")] = None,
     estimate: Annotated[bool, typer.Option(
         "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing.")] = False,
     as_json: Json = False,
@@ -79,7 +86,8 @@ def export(
     """Write the release in the layout of AerialDojo's authors, as Habitat's ObjectNav-v1, or for training.
 
     lerobot (LeRobotDataset v3) and webdataset (tar shards) contain images and actions of every step; only they
-    take the options from --split to --estimate. After an interruption the same command continues.
+    take the options from --split to --workers, and --estimate. After an interruption the same command continues.
+    pointcloud (PLY) and occupancy (NumPy's npz) are of all scenes whose meshes are there, and need no release.
     """
     from aerialdojo_gen.base.errors import UsageError
     from aerialdojo_gen.base.names import unknown
@@ -96,8 +104,11 @@ def export(
     }  # fmt: skip
     given = {name: value for name, value in training.items() if value}
     given |= {name: value for name, value in training.items() if value is not None and not isinstance(value, list)}
-    if form not in (*FORMATS, *FOR_TRAINING):
-        raise UsageError(unknown("no format", form, (*FORMATS, *FOR_TRAINING)))
+    if form not in (known := (*FORMATS, *FOR_TRAINING, *SHAPES)):
+        raise UsageError(unknown("no format", form, known))
+    for name, of, value in (("--points-per-m2", SHAPES[0], points_per_m2), ("--voxel-m", SHAPES[1], voxel_m)):
+        if value is not None and form != of:
+            raise UsageError(f"{name} is for --format {of}, not for {form}")
     root = open_root(data)
     if out is None and not isinstance(root, LocalRoot):
         raise UsageError("an export is a folder of this machine: name it with --out")
@@ -123,10 +134,21 @@ def export(
         names = _options(given, estimate, workers)
         verb = "is" if len(names) == 1 else "are"
         raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(FOR_TRAINING)}, not for {form}")
-    counts = export_release(
-        form, root, target, merge_scenes(scenes, scene), force=force, picture_px=picture_size, shards=shards,
-        reporter=Reporter(quiet=quiet or as_json),
-    )  # fmt: skip
+    chosen, reporter = merge_scenes(scenes, scene), Reporter(quiet=quiet or as_json)
+    if form in SHAPES:
+        from aerialdojo_gen.exchange.shape_export import POINTS_PER_M2, VOXEL_M, export_shapes
+
+        if picture_size is not None or shards:
+            raise UsageError("--picture-size and --shards are for --format aerialdojo")
+        counts = export_shapes(
+            form, root, target, chosen, force=force, reporter=reporter,
+            points_per_m2=POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
+            voxel_m=VOXEL_M if voxel_m is None else voxel_m,
+        )  # fmt: skip
+    else:
+        counts = export_release(
+            form, root, target, chosen, force=force, picture_px=picture_size, shards=shards, reporter=reporter
+        )
     if as_json:
         print_json({"path": str(target), **counts})
     elif not quiet:
