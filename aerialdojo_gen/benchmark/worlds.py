@@ -9,6 +9,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
@@ -117,3 +118,15 @@ class WorldMaker:
         if child.returncode:
             last = said.strip().splitlines()[-1:] or [f"it ended with {child.returncode}"]
             raise AerialDojoError(f"{world.name} could not be made: {last[0]}")
+
+
+def make_worlds(types: str | Sequence[str], **options: Any) -> list[Path]:
+    """Return the data directories of worlds, each made where it is not there; parameters and errors of `WorldMaker`.
+
+    This process keeps the cache from removing them, as long as it lives.
+    """
+    maker = WorldMaker(types, **options)
+    try:
+        return [maker.root(world) for world in maker.worlds]
+    finally:
+        maker.close()

@@ -95,7 +95,7 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the files of a part: its data, its videos, and ``part.json`` with what is counted of them."""
-    labels = Labels(root, part.index, ())
+    labels = Labels(part.index, ())
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in frame_schema().names}
     episodes: list[dict[str, Stats]] = []
     sums: Counts = {}

@@ -90,8 +90,8 @@ class Part:
         short = [index.actions_of(k)[:steps] for k in range(len(index))]
         first = np.concatenate([[0], np.cumsum([len(actions) for actions in short])]).astype(np.int64)
         small = Index(
-            index.scenes, index.scene, index.nav_id, np.concatenate(short), first, index.start, index.goal,
-            index.budget, index.told,
+            index.scenes, index.roots, index.scene, index.nav_id, np.concatenate(short), first, index.start,
+            index.goal, index.budget, index.told,
         )  # fmt: skip
         n = len(small)
         return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
@@ -109,7 +109,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
         for scene in chosen.scenes:
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
     else:
-        chosen = _recorded(root, chosen, options)
+        chosen = _recorded(chosen, options)
     texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
         *(chosen.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
     )]  # fmt: skip
@@ -144,10 +144,8 @@ def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptio
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
 
-def _recorded(root: DataRoot, index: Index, options: ExportOptions) -> Index:
-    recorded = RecordedFrames(
-        root, index, options.sensors, RenderedFrames(root, index, options.sensors, options.renderer)
-    )
+def _recorded(index: Index, options: ExportOptions) -> Index:
+    recorded = RecordedFrames(index, options.sensors, RenderedFrames(index, options.sensors, options.renderer))
     has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
     if not len(has):
         raise UsageError(
@@ -175,9 +173,9 @@ class SampleFrames:
 
     def __init__(self, root: DataRoot, part: Part, options: ExportOptions) -> None:
         self._root, self._part, self._sensors = root, part, options.sensors
-        drawn: Source = RenderedFrames(root, part.index, options.sensors, options.renderer)
+        drawn: Source = RenderedFrames(part.index, options.sensors, options.renderer)
         self._source: Source = (
-            drawn if options.source == "render" else RecordedFrames(root, part.index, options.sensors, drawn)
+            drawn if options.source == "render" else RecordedFrames(part.index, options.sensors, drawn)
         )
 
     def frames(self, k: int) -> Iterator[tuple[int, Frames]]:

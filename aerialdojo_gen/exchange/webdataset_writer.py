@@ -35,7 +35,7 @@ def frames_a_part(options: ExportOptions) -> int:
 
 def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path) -> None:
     """Write the shard of a part."""
-    labels, sample_frames = Labels(root, part.index, ()), SampleFrames(root, part, options)
+    labels, sample_frames = Labels(part.index, ()), SampleFrames(root, part, options)
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):

@@ -38,6 +38,7 @@ class Index:
     """The trajectories of a selection, sorted by scene and navigation task."""
 
     scenes: tuple[str, ...]  # Their scenes, sorted
+    roots: tuple[DataRoot, ...]  # Of every scene, the data directory that it is in
     scene: NDArray[np.int32]  # (n,) int32; of every trajectory, an index of `scenes`
     nav_id: list[str]
     actions: NDArray[np.int8]  # (m,) int8; of all trajectories one after the other: 0 to 15, the last of each a Stop
@@ -55,6 +56,11 @@ class Index:
     def steps(self) -> NDArray[np.int64]:
         """Actions of every trajectory, Stop included, (n,) int64."""
         return np.diff(self.first)
+
+    def scene_of(self, k: int) -> tuple[DataRoot, str]:
+        """Return the data directory and the scene of trajectory k."""
+        number = self.scene[k]
+        return self.roots[number], self.scenes[number]
 
     def actions_of(self, k: int) -> NDArray[np.int8]:
         """Actions of trajectory k, Stop included."""
@@ -83,10 +89,12 @@ class Index:
     def take(self, rows: NDArray[np.int64]) -> Index:
         """Keep some trajectories, in their order."""
         pieces = [self.actions_of(int(k)) for k in rows]
-        names = sorted({self.scenes[self.scene[k]] for k in rows})
+        roots = {self.scenes[i]: self.roots[i] for i in self.scene[rows]}
+        names = sorted(roots)
         place = {name: i for i, name in enumerate(names)}
         return Index(
             tuple(names),
+            tuple(roots[name] for name in names),
             np.array([place[self.scenes[self.scene[k]]] for k in rows], np.int32),
             [self.nav_id[k] for k in rows],
             np.concatenate([*pieces, np.empty(0, np.int8)]),
@@ -122,6 +130,34 @@ def read_index(
     if not parts:
         raise UsageError(f"no task of the selection has the target split {target_split!r}")
     return _joined(parts)
+
+
+def read_indices(
+    roots: Sequence[DataRoot], selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
+    paraphrase: str = "task",
+) -> Index:  # fmt: skip
+    """Read the trajectories of a selection in several data directories, as `read_index` those of one.
+
+    A directory in which no task fits is left out, unless none fits in any. UsageError where two have a scene of the
+    same name.
+    """
+    parts: list[Index] = []
+    refused: list[UsageError] = []
+    for root in roots:
+        try:
+            parts.append(read_index(root, selection, target_split, runs, paraphrase))
+        except UsageError as error:
+            refused.append(error)
+    if not parts:
+        raise refused[0] if refused else UsageError("name at least one data directory")
+    known: dict[str, DataRoot] = {}
+    for part in parts:
+        for scene, root in zip(part.scenes, part.roots, strict=True):
+            if scene in known:
+                raise UsageError(f"scene {scene} is in {known[scene]} and in {root}: name one of them")
+            known[scene] = root
+    whole = _joined(parts)
+    return whole.take(np.argsort([whole.scenes[i] for i in whole.scene], kind="stable").astype(np.int64))
 
 
 def _paraphrased(root: DataRoot, rows: pa.Table, seed: int) -> pa.Table:
@@ -174,6 +210,7 @@ def _scene(
     pieces = [flown.get(nav_id, routes[nav_id][0]) for nav_id in ids]
     return Index(
         (scene,),
+        (root,),
         np.zeros(len(ids), np.int32),
         ids,
         np.concatenate([*pieces, np.empty(0, np.int8)]),
@@ -223,9 +260,11 @@ def _starts(pieces: Sequence[NDArray[np.int8]]) -> NDArray[np.int64]:
 
 def _joined(parts: Sequence[Index]) -> Index:
     shifts = _starts([p.actions for p in parts])
+    before = np.cumsum([0, *(len(p.scenes) for p in parts)])
     return Index(
-        tuple(p.scenes[0] for p in parts),
-        np.concatenate([np.full(len(p), i, np.int32) for i, p in enumerate(parts)]),
+        tuple(scene for p in parts for scene in p.scenes),
+        tuple(root for p in parts for root in p.roots),
+        np.concatenate([p.scene + np.int32(s) for p, s in zip(parts, before, strict=False)]),
         [nav_id for p in parts for nav_id in p.nav_id],
         np.concatenate([p.actions for p in parts]),
         np.concatenate([[0], *(p.first[1:] + s for p, s in zip(parts, shifts, strict=False))]).astype(np.int64),

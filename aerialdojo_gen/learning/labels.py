@@ -13,7 +13,6 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.learning.geodesic import geodesic
 from aerialdojo_gen.learning.index import Index
-from aerialdojo_gen.store.root import DataRoot
 
 PRIVILEGED = ("pose", "goal_distance_m", "actions")
 # In the place of the action before the first one.
@@ -23,8 +22,8 @@ NO_ACTION = N_ACTIONS
 class Labels:
     """Labels of a selection's trajectories."""
 
-    def __init__(self, root: DataRoot, index: Index, privileged: tuple[str, ...]) -> None:
-        self._root, self.index, self.privileged = root, index, privileged
+    def __init__(self, index: Index, privileged: tuple[str, ...]) -> None:
+        self.index, self.privileged = index, privileged
 
     def of(self, rows: NDArray[np.int64], steps: NDArray[np.int64], mask: NDArray[np.bool_]) -> dict[str, Any]:
         """Labels of windows of steps (n, T), by name; 0 where the mask is false."""
@@ -59,7 +58,7 @@ class Labels:
     def _known(
         self, out: dict[str, Any], i: int, here: NDArray[np.bool_], k: int, poses: NDArray[np.float64]
     ) -> None:  # fmt: skip
-        ways, goal = geodesic(*mesh_of(self._root, self.index.scenes[self.index.scene[k]])), self.index.goal[k]
+        ways, goal = geodesic(*mesh_of(*self.index.scene_of(k))), self.index.goal[k]
         if "goal_distance_m" in self.privileged:
             out["goal_distance_m"][i, here] = ways.distances_m(goal, poses[:, :3])
         if "actions" in self.privileged:

@@ -59,14 +59,13 @@ class Source(Protocol):
 class RenderedFrames:
     """Pictures drawn when they are asked for, as the environment and `render` draw them."""
 
-    def __init__(self, root: DataRoot, index: Index, sensors: Sensors, renderer: str) -> None:
-        self._root, self._index, self._sensors, self._renderer = root, index, sensors, renderer
+    def __init__(self, index: Index, sensors: Sensors, renderer: str) -> None:
+        self._index, self._sensors, self._renderer = index, sensors, renderer
 
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Draw; see `Source`."""
         index, sensors = self._index, self._sensors
-        scene = index.scenes[index.scene[trajectories[0]]]
-        context = open_scene(*mesh_of(self._root, scene), SEVERAL)
+        context = open_scene(*mesh_of(*index.scene_of(int(trajectories[0]))), SEVERAL)
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
@@ -76,16 +75,16 @@ class RenderedFrames:
 class RecordedFrames:
     """Pictures read from recordings, made smaller; what has none is drawn."""
 
-    def __init__(self, root: DataRoot, index: Index, sensors: Sensors, drawn: Source) -> None:
-        self._root, self._index, self._sensors, self._drawn = root, index, sensors, drawn
+    def __init__(self, index: Index, sensors: Sensors, drawn: Source) -> None:
+        self._index, self._sensors, self._drawn = index, sensors, drawn
         self._known: dict[str, dict[str, int]] = {}
 
     def has(self, trajectory: int) -> bool:
         """Whether a trajectory has a recording of all that is asked for."""
         index = self._index
-        scene, nav_id = index.scenes[index.scene[trajectory]], index.nav_id[trajectory]
+        (root, scene), nav_id = index.scene_of(trajectory), index.nav_id[trajectory]
         if scene not in self._known:
-            self._known[scene] = recorded_frames(self._root, scene, self._sensors)
+            self._known[scene] = recorded_frames(root, scene, self._sensors)
         # The recording has a frame a pose of the reference; that of an older version may have other actions.
         frames = self._known[scene].get(nav_id, 0)
         return 0 <= frames - int(index.steps[trajectory]) <= 1
@@ -111,7 +110,8 @@ class RecordedFrames:
         rgb = np.empty((*shape, 3), np.uint8) if s.rgb else None
         depth_m = np.empty(shape, np.float32) if s.depth else None
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
-            recording = _recording(self._root, f"media/{index.scenes[index.scene[k]]}/{index.nav_id[k]}")
+            root, scene = index.scene_of(k)
+            recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for v, view in enumerate(s.views):
                 if rgb is not None:
                     rgb[row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)

@@ -19,18 +19,20 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.benchmark.worlds import make_worlds
 from aerialdojo_gen.learning.cached import CachedFrames, CacheOptions
-from aerialdojo_gen.learning.index import Index, read_index
+from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
 from aerialdojo_gen.learning.words import PADDING, Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
-from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import VIEWS
 
 GOALS = ("text", "tokens", "image")
 SOURCES = ("render", "recordings", "auto")
+_OF_WORLDS = ("start_seed", "num_worlds", "knobs", "held_out", "n_objects", "worlds_cache")
 
 
 @dataclass(frozen=True)
@@ -106,11 +108,18 @@ class Trajectories:
 
     Parameters
     ----------
-    release : str, Path or DataRoot
-        The data directory, in which ``release/`` lies, and beside it ``meshes/`` and ``media/``.
+    release : str, Path or DataRoot, or a sequence of them
+        The data directory, in which ``release/`` lies, and beside it ``meshes/`` and ``media/``. Several must have
+        scenes of different names; one in which no task fits is left out.
     split : str or sequence of str
+    worlds : str or sequence of str, optional
+        In place of a release: names of scene types, or globs, whose worlds are samples. Those that the user's cache
+        does not have are made first, some half a minute of a core each. Worlds of seeds below 1,000 have no training
+        tasks, held-out ones no `split` of ``id_``.
     **options
-        The fields of `SampleOptions`.
+        The fields of `SampleOptions`; with `worlds` also ``start_seed`` (1000), ``num_worlds`` (1, of every type),
+        ``knobs``, ``held_out``, ``n_objects`` and ``worlds_cache``, as of
+        `aerialdojo_gen.benchmark.worlds_env.WorldsEnv`, where the last is ``cache``.
 
     Attributes
     ----------
@@ -127,22 +136,32 @@ class Trajectories:
         No task fits, or a value makes no sense.
     StoreError
         There is no release, or a scene's mesh is missing.
+    AerialDojoError
+        A world could not be made.
     """
 
-    def __init__(self, release: Where, split: str | Sequence[str] = "id_train", **options: Any) -> None:
+    def __init__(
+        self,
+        release: Where | Sequence[Where] | None = None,
+        split: str | Sequence[str] = "id_train",
+        *,
+        worlds: str | Sequence[str] | None = None,
+        **options: Any,
+    ) -> None:
+        of_worlds = {name: options.pop(name) for name in _OF_WORLDS if name in options}
         own = SampleOptions(**options)
-        self._root = open_root(release)
         self.goal = _chosen("goal", own.goal, GOALS)
         self.privileged = _chosen("privileged column", own.privileged, PRIVILEGED)
         self.sensors, self.past, self.stride = own.sensors, own.past, own.stride
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
         chosen = Selection(_names(split), _names(own.setting), modalities, _names(own.scene), None, own.seed)
-        self.index = read_index(self._root, chosen, own.target_split, _names(own.run), own.paraphrase)
+        roots = _roots(release, worlds, of_worlds)
+        self.index = read_indices(roots, chosen, own.target_split, _names(own.run), own.paraphrase)
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)
-        self._labels = Labels(self._root, self.index, self.privileged)
+        self._labels = Labels(self.index, self.privileged)
         steps = self.index.steps
         ends = np.ones(len(steps), np.int64) if own.past is None else (steps - 1) // own.stride + 1
         self._first = np.concatenate([[0], np.cumsum(ends)])
@@ -153,10 +172,11 @@ class Trajectories:
     def _open_source(self, own: SampleOptions) -> Source:
         """Open where pictures come from; of recordings alone only the trajectories that have one are kept."""
         # A scene without a mesh is named before the first epoch, not within it.
-        meshes = {name: mesh_of(self._root, name)[1] for name in self.index.scenes}
-        source: Source = RenderedFrames(self._root, self.index, self.sensors, own.renderer)
+        places = zip(self.index.roots, self.index.scenes, strict=True)
+        meshes = {name: mesh_of(root, name)[1] for root, name in places}
+        source: Source = RenderedFrames(self.index, self.sensors, own.renderer)
         if own.source != "render":
-            recorded = RecordedFrames(self._root, self.index, self.sensors, source)
+            recorded = RecordedFrames(self.index, self.sensors, source)
             if own.source == "recordings":
                 has = np.flatnonzero([recorded.has(k) for k in range(len(self.index))])
                 if not len(has):
@@ -165,8 +185,8 @@ class Trajectories:
                         f"{command('render')}, or choose source='render'"
                     )
                 self.index = self.index.take(has)
-                drawn = RenderedFrames(self._root, self.index, self.sensors, own.renderer)
-                recorded = RecordedFrames(self._root, self.index, self.sensors, drawn)
+                drawn = RenderedFrames(self.index, self.sensors, own.renderer)
+                recorded = RecordedFrames(self.index, self.sensors, drawn)
             source = recorded
         if not own.cache_gb:
             return source
@@ -258,7 +278,7 @@ class Trajectories:
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         named = self.index.told["reference_image_id"][k]
-        return None if named is None else reference_image(self._root, self.index.scenes[self.index.scene[k]], named)
+        return None if named is None else reference_image(*self.index.scene_of(k), named)
 
     def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         if self._source is None:
@@ -280,6 +300,20 @@ class Trajectories:
             "sensors": [s.views, s.rgb, s.depth, s.width, s.height, s.fov_deg, s.max_depth_m],
         }  # fmt: skip
         return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+
+
+def _roots(
+    release: Where | Sequence[Where] | None, worlds: str | Sequence[str] | None, of_worlds: dict[str, Any]
+) -> list[DataRoot]:
+    if (release is None) == (worlds is None):
+        raise UsageError("name either a release or worlds")
+    if worlds is not None:
+        folder = of_worlds.pop("worlds_cache", None)
+        return [open_root(path) for path in make_worlds(worlds, folder=folder, **of_worlds)]
+    if of_worlds:
+        raise UsageError(f"{', '.join(of_worlds)}: of worlds, not of a release")
+    several = [release] if isinstance(release, DataRoot | Path | str) else list(release or ())
+    return [open_root(one) for one in several]
 
 
 def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:

@@ -179,7 +179,7 @@ def test_workers_give_what_this_process_gives(data, context):
     if context == "fork":
         # This process has drawn: only one that has not can be forked.
         done = subprocess.run(
-            [sys.executable, "-c", FORKED, str(data._root)],
+            [sys.executable, "-c", FORKED, str(data.index.roots[0])],
             cwd=os.path.dirname(__file__),
             capture_output=True,
             text=True,
