@@ -26,7 +26,7 @@ class _Mall(NamedTuple):
 
 
 def write(draft: Draft) -> None:
-    """Lay the street and the car parks, pave courts, then put up shops and stores, and furnish them."""
+    """Lay the street and the car parks, pave courts, then put up shops and stores, with what stands there."""
     w, d, flip = draft.width_m / 2, draft.depth_m / 2, draft.pick([1, -1], "flip")
     draft.section("The street")
     half = street_along(draft, [(-w, -d + 5.6), (w, -d + 5.6)])
