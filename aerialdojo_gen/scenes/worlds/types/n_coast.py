@@ -118,7 +118,7 @@ def _cove(draft: Draft, shore: _Shore) -> Isle:
     """A bay between two headlands, the village at its head."""
     base, deep = draft.number(-0.5, -0.36, "base") * shore.half_v, draft.number(0.5, 0.72, "deep") * shore.half_v
     at, half = draft.number(-0.2, 0.2, "at") * shore.half_u, draft.number(0.3, 0.4, "half") * shore.half_u
-    land = _mainland(draft, shore, lambda u: base + deep * math.exp(-(((u - at) / half) ** 4)))
+    land = _mainland(draft, shore, lambda u: base + deep * math.exp(-math.pow((u - at) / half, 4.0)))
     heads = [_behind(shore, land, at + side * half * 2.0, 13.0) for side in (-1, 1)]
     heights = {}
     for k, (x, y) in enumerate(heads):
@@ -206,7 +206,7 @@ def _fjord(draft: Draft, shore: _Shore) -> Isle:
     """A long arm of the sea between steep hills, the village at its end."""
     base, deep = -0.72 * shore.half_v, draft.number(1.05, 1.2, "deep") * shore.half_v
     at, half = draft.number(-0.15, 0.15, "at") * shore.half_u, draft.number(0.35, 0.4, "half") * shore.half_u
-    land = _mainland(draft, shore, lambda u: base + deep * math.exp(-(((u - at) / half) ** 4)))
+    land = _mainland(draft, shore, lambda u: base + deep * math.exp(-math.pow((u - at) / half, 4.0)))
     high = draft.number(8, 13, "high")
     aside = f"eased(abs({shore.along} - ({at:.1f})), {half * 1.1 + 6:.1f}, {half * 1.1 + 20:.1f})"
     hills = f"{high}*{aside}*eased(inland, 2, 12)*(1 + 0.25*noise)"
