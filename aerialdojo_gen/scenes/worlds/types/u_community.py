@@ -30,7 +30,7 @@ class _Estate(NamedTuple):
 
 
 def write(draft: Draft) -> None:
-    """Lay streets and bays, put up flats, then lead paths from their fronts through the garden, and fill the slots."""
+    """Lay streets and bays, put up flats, then lead paths from their fronts through the garden, and fill slots."""
     turn, w, d = turned(draft)
     estate = _TOPOLOGIES[draft.topology](draft, w, d)
     draft.section("Streets and parking bays")
