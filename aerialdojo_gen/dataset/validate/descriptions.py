@@ -209,6 +209,8 @@ def _catalogue(folder: Path | None) -> Catalogue | None:
 def _recoloured(instance: Instance, text: str) -> str:
     """Say which of a thing's attributes with a colour in it stands in a text with another colour alone."""
     normalized = " ".join(_split(text))
+    # In "a red jib crane" the crane is red, though its jib is white.
+    head = instance.category.rsplit("_", 1)[-1]
     for key, value in instance.attributes.items():
         words = _split(value)
         # Said of a part that the attribute is called after: a green poster, yellow flowers.
@@ -218,7 +220,7 @@ def _recoloured(instance: Instance, text: str) -> str:
             if word not in _COLOURS or {*rest} <= {*_COLOURS, "and"}:
                 continue
             phrase = " ".join([*words[:k], _ANY_COLOUR, *words[k + 1 :]]).removeprefix("a ")
-            found = re.findall(rf"\b{phrase}\b", normalized)
+            found = re.findall(rf"\b{phrase}\b(?! {head}\b)", normalized)
             if found and word not in found:
                 return f"{found[0]!r} stands where {value!r} has {word!r}"
     return ""
