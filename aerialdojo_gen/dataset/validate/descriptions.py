@@ -213,6 +213,8 @@ def _recoloured(instance: Instance, text: str) -> str:
     head = instance.category.rsplit("_", 1)[-1]
     for key, value in instance.attributes.items():
         words = _split(value)
+        if words[:1] in (["at"], ["by"], ["on"]):
+            continue  # of a place, such as "by the green"
         # Said of a part that the attribute is called after: a green poster, yellow flowers.
         words += _split(key) if len(words) == 1 and key != "colour" else []
         for k, word in enumerate(words):
