@@ -77,6 +77,10 @@ _SPECS = (
         {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
     ),
     _BreakdownSpec(
+        SEEN, ("shape_seen_in_train",), "Shapes of targets that training shows",
+        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
+    ),
+    _BreakdownSpec(
         SEEN, ("target_split",), "The split by target",
         {"train": lambda side: side == "train", "test": lambda side: side == "test"}, "tasks",
     ),

@@ -100,7 +100,7 @@ LOST: Mapping[str, Sequence[str]] = {
         "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m", "landmark_id",
         "box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "image_fraction",
         "reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad", "step_back_m", "tells_shown",
-        "tells_missing", "claims", "paraphrases", "all of those that no task names",
+        "tells_missing", "claims", "shape", "shape_held_out", "paraphrases", "all of those that no task names",
     ],
     "landmarks": ["all but the names"],
     "anchors": ["all but the start's number"],

@@ -36,6 +36,8 @@ LOST: Mapping[str, Sequence[str]] = {
     "objects": [
         "description",
         "claims",
+        "shape",
+        "shape_held_out",
         "paraphrases",
         "mesh_node",
         "size_x_m",

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +19,18 @@ from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
+from aerialdojo_gen.scenes.designs import Design, load_sets
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
-from aerialdojo_gen.scenes.prop import Category, Variant, parse_category, tags_of
+from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
 from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
 
 _MATERIALS = "materials.toml"
+_DESIGNS = "designs.toml"
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
+_SHAPE_DIGITS = 12
 
 
 class Catalogue:
@@ -69,11 +73,16 @@ class Catalogue:
         params: Mapping[str, float] | None = None,
         roles: Mapping[str, str] | None = None,
         attributes: Mapping[str, str] | None = None,
+        design: str | None = None,
     ) -> Instance:
-        """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order."""
+        """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order.
+
+        Its design is the first of its category where none is given.
+        """
         prop = self[category]
         look = self._draw_variant(prop, variant, rng)
-        sizes = self._draw_params(prop, look, params or {}, rng)
+        form = prop.designs[0] if design is None else prop.design(design)
+        sizes = self._draw_params(prop, look, {**form.params, **(params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
         surfaces = dict(prop.roles) | dict(look.roles) | dict(roles or {})
         refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
@@ -82,11 +91,11 @@ class Catalogue:
             assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
-            key = (category, look.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
+            key = (category, look.name, form.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
             if key not in self._parts:
                 if len(self._parts) >= _CACHE_SIZE:
                     self._parts.clear()
-                self._parts[key] = self._assembled(prop, look, sizes, surfaces, words, shape_seed)
+                self._parts[key] = self._assembled(prop, look, form, sizes, surfaces, words, shape_seed)
             assembly = self._parts[key]
         placed_parts, kept_faces = _placed(assembly.parts, position, yaw_deg, scale)
         if not placed_parts:
@@ -97,7 +106,8 @@ class Catalogue:
             fronts = tuple(float(wrap_angle_rad(yaw + math.radians(side))) for side in FRONTS[prop.front])
             identifying = tuple(dict.fromkeys((*prop.identifying_parts, *look.identifying_parts)))
             anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, identifying, remap_runs(assembly.runs, kept_faces))
-        return Instance(node, category, look.name, words, placed_parts, anatomy)
+        shape = sha256(assembly.shape + str(round(scale, 3)).encode()).hexdigest()[:_SHAPE_DIGITS]
+        return Instance(node, category, look.name, words, placed_parts, anatomy, shape=shape, held_out=form.held_out)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -121,6 +131,7 @@ class Catalogue:
         self,
         prop: Category,
         look: Variant,
+        form: Design,
         sizes: Mapping[str, float],
         surfaces: Mapping[str, str],
         words: Mapping[str, str],
@@ -128,13 +139,14 @@ class Catalogue:
     ) -> _Assembly:
         meshes: list[_Piece] = []
         for k, part in enumerate(prop.parts):
-            if look.without.intersection(tags_of(part)):
+            only = designs_of(part)
+            if (look.without | form.without).intersection(tags_of(part)) or (only and form.name not in only):
                 continue
             own = part
             if part["shape"] == "crown" and "seed" not in part:
                 own = {**part, "seed": shape_seed + k * _CROWN_SHAPES}
             try:
-                body, copies = part_mesh(own, sizes, words), copies_in(own, sizes)
+                body, copies = part_mesh(own, sizes, words, form.stretch), copies_in(own, sizes)
             except ShapeError as error:
                 raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
             meshes.append(_Piece(part["role"], body, tags_of(part), copies))
@@ -173,7 +185,8 @@ class Catalogue:
                 for name in dict.fromkeys((*piece.tags, piece.role)):
                     runs.setdefault(name, []).extend([run] if faces else [])
                 first += faces
-        return _Assembly(tuple(parts), {name: tuple(members) for name, members in sorted(runs.items())})
+        named = {name: tuple(members) for name, members in sorted(runs.items())}
+        return _Assembly(tuple(parts), named, [piece.body for piece in pieces])
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +205,17 @@ class _Assembly:
 
     parts: tuple[Part, ...]
     runs: Mapping[str, tuple[Run, ...]]
+    bodies: Sequence[Mesh]
+
+    @cached_property
+    def shape(self) -> bytes:
+        """Digest of the geometry, whatever its materials."""
+        digest = sha256()
+        for body in self.bodies:
+            digest.update(
+                np.rint(body.vertices * 1000.0).astype("<i4").tobytes() + body.faces.astype("<i4").tobytes()
+            )
+        return digest.digest()
 
 
 def placed(
@@ -224,8 +248,11 @@ def single(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def load_catalogue(folder: Path) -> Catalogue:
-    """Read a `scene_assets` folder: `materials.toml` and `catalogue_files`; cached while no file changes."""
-    return _load(folder, tuple(_file_state(path) for path in (folder / _MATERIALS, *catalogue_files(folder))))
+    """Read a `scene_assets` folder: materials, designs and `catalogue_files`; cached while no file changes."""
+    return _load(
+        folder,
+        tuple(_file_state(path) for path in (folder / _MATERIALS, folder / _DESIGNS, *catalogue_files(folder))),
+    )
 
 
 def _file_state(path: Path) -> tuple[str, int, int, int]:
@@ -239,10 +266,11 @@ def _file_state(path: Path) -> tuple[str, int, int, int]:
 @lru_cache(maxsize=2)
 def _load(folder: Path, files: tuple[tuple[str, int, int, int], ...]) -> Catalogue:
     materials = load_materials(folder / _MATERIALS)
+    sets = load_sets(folder / _DESIGNS)
     categories: dict[str, Category] = {}
     for path in catalogue_files(folder):
         for name, body in read_toml(path).items():
             if name in categories:
                 raise AssetError(f"{path}: [{name}] is already in {categories[name].source.partition(':')[0]}")
-            categories[name] = parse_category(path, name, body, materials, path.parent.name == TARGETS)
+            categories[name] = parse_category(path, name, body, materials, sets, path.parent.name == TARGETS)
     return Catalogue(categories, materials)

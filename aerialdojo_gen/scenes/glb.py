@@ -163,6 +163,8 @@ class _Writer:
             "variant": instance.variant,
             "attributes": instance.attributes,
             **({"surface": instance.surface} if instance.surface else {}),
+            **({"shape": instance.shape} if instance.shape else {}),
+            **({"held_out": True} if instance.held_out else {}),
             **({} if instance.anatomy is None else {"anatomy": instance.anatomy.to_json()}),
         }
         self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
@@ -285,8 +287,9 @@ def _read_instance(
     anatomy = parse_anatomy(extras["anatomy"], [len(p.faces) for p in parts]) if "anatomy" in extras else None
     words = dict(extras["attributes"])
     return Instance(
-        node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy, extras.get("surface", "")
-    )
+        node["name"], extras["category"], extras["variant"], words, tuple(parts), anatomy, extras.get("surface", ""),
+        str(extras.get("shape", "")), bool(extras.get("held_out", False)),
+    )  # fmt: skip
 
 
 def _array(accessor: int, document: dict[str, Any], data: memoryview) -> NDArray[Any]:

@@ -80,6 +80,11 @@ def translated(m: Mesh, offset: ArrayLike) -> Mesh:
     return replace(m, vertices=m.vertices + np.asarray(offset, dtype=np.float64))
 
 
+def stretched(m: Mesh, factors: Floats) -> Mesh:
+    """Stretch a mesh about the origin by positive factors (3,) along x, y and z."""
+    return m if (factors == 1.0).all() else replace(m, vertices=m.vertices * factors)
+
+
 def rotation(x_deg: float, y_deg: float, z_deg: float) -> Floats:
     """Make the (3, 3) matrix that turns about x, then y, then z by right-handed angles in degrees."""
     out = np.eye(3)

@@ -64,6 +64,8 @@ class Instance:
     parts: tuple[Part, ...]  # At least one, none of them empty
     anatomy: Anatomy | None = None  # Its fronts and named parts, if its catalogue has them
     surface: str = ""
+    shape: str = ""  # Digest of its geometry in its own frame: congruent things have the same; empty if none is known
+    held_out: bool = False  # Whether its design stands in no scene of the training side
 
     @property
     def vertices(self) -> NDArray[np.float64]:

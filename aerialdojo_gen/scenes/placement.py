@@ -33,6 +33,7 @@ class Placement:
     z: float | None = None  # Height of its foot; on the ground where absent
     place: str = ""  # Where it is, in words
     node: str | None = None  # The next free one of the category where absent
+    design: str | None = None  # One of the scene's side, drawn for the node, where absent
     scale: float = 1.0
     params: Mapping[str, float] | None = None
     roles: Mapping[str, str] | None = None

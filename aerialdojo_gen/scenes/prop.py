@@ -11,13 +11,15 @@ from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.anatomy import FRONTS
 from aerialdojo_gen.scenes.builders import builders
+from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, default_set, parse_designs
 from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark")
 Range = tuple[float, float]
-_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells")
+_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells",
+                  "designs")  # fmt: skip
 _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "tells")
 _MIRRORS = ("x", "y", "xy")
 _MAX_PARTS = 1000
@@ -54,6 +56,14 @@ class Category:
     target: bool = True  # Whether tasks may ask for it: false of landmarks and of scenery
     front: str = ""
     identifying_parts: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
+    designs: tuple[Design, ...] = (PLAIN,)  # Proportions that it comes in; the first is what its parts say
+
+    def design(self, name: str) -> Design:
+        """Look a design up; an `AssetError` names the nearest one."""
+        for one in self.designs:
+            if one.name == name:
+                return one
+        raise AssetError(f"{self.source}: unknown design {name!r}{nearest(name, [one.name for one in self.designs])}")
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
@@ -64,7 +74,9 @@ class Category:
         raise AssetError(f"{self.source}: unknown variant {name!r}{nearest(name, known)}")
 
 
-def parse_category(path: Path, category: str, body: Any, materials: MaterialLibrary, target: bool = True) -> Category:
+def parse_category(
+    path: Path, category: str, body: Any, materials: MaterialLibrary, sets: DesignSets, target: bool = True
+) -> Category:
     """Check one category's table."""
     where = f"{path}: [{category}]"
     if not isinstance(body, dict):
@@ -107,6 +119,15 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
             raise AssetError(f"{where} variants[{k}]: duplicate variant {variants[-1].name!r}")
     if not variants:
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
+    chosen = body.get("designs", default_set(kind, parts) if target else "fixed")
+    if isinstance(chosen, str) and chosen not in sets:
+        raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
+    designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
+    known = [one.name for one in designs]
+    for k, part in enumerate(parts):
+        for one in designs_of(part):
+            if one not in known:
+                raise AssetError(f"{where} parts[{k}]: unknown design {one!r}{nearest(one, known)}")
     return Category(
         category,
         name,
@@ -121,6 +142,7 @@ def parse_category(path: Path, category: str, body: Any, materials: MaterialLibr
         target,
         front,
         identifying_parts,
+        designs,
     )
 
 
@@ -128,6 +150,12 @@ def tags_of(part: Mapping[str, Any]) -> tuple[str, ...]:
     """Tags of a part: none, one, or those of a list."""
     tag = part.get("tag", ())
     return (tag,) if isinstance(tag, str) else tuple(tag)
+
+
+def designs_of(part: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the designs that have a part: none where all have it."""
+    design = part.get("design", ())
+    return (design,) if isinstance(design, str) else tuple(design)
 
 
 def _identifying_parts(raw: Any, named: Sequence[str], where: str) -> tuple[str, ...]:
@@ -165,6 +193,9 @@ def _check_part(
     tags = part.get("tag", "")
     if not isinstance(tags, str) and not (isinstance(tags, list) and all(isinstance(t, str) for t in tags)):
         raise AssetError(f"{where}: tag must be a word or a list of words, got {tags!r}")
+    given = part.get("design", "plain")
+    if not isinstance(given, str) and not (isinstance(given, list) and all(isinstance(d, str) for d in given)):
+        raise AssetError(f"{where}: design must be a name or a list of names, got {given!r}")
     role = part.get("role")
     if not isinstance(role, str):
         raise AssetError(f"{where}: role is missing: a role of the category or a material")

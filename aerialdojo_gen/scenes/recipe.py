@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.geometry.portable import unit
+from aerialdojo_gen.scenes.designs import Side
 from aerialdojo_gen.scenes.light import LightHead, sun_at
 from aerialdojo_gen.scenes.materials import read_toml
 
@@ -100,6 +101,7 @@ class SceneHead(BaseModel):
     sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
     light: LightHead = LightHead()
     horizon: HorizonHead = HorizonHead()
+    designs: Side = "train"  # Which designs of their categories things have
     palette: dict[str, str] = {}  # Materials by the file's names for them
     inventory: dict[str, Annotated[int, Field(ge=0, le=100_000)]] = {}  # Least number of instances by category
     attribution: Annotated[str, Field(max_length=500)] = ""

@@ -16,9 +16,10 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
-from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
 from aerialdojo_gen.scenes.contact import CONTACT_M, stand
+from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
@@ -140,6 +141,7 @@ class Site:
         options: dict[str, Any] = {
             "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
             "roles": thing.roles, "attributes": attributes or None,
+            "design": thing.design or self.design(thing.category, name),
         }  # fmt: skip
         instance = self.catalogue.instantiate(
             thing.category, name, self.rng_for("prop", name), (*at, base), thing.yaw_deg, **options
@@ -176,6 +178,11 @@ class Site:
             variant = instance.variant or None
             outline = self.outline_of(thing.category, variant, (thing.x, thing.y), thing.yaw_deg)
             self.occupy(outline.buffer(room["room_m"], quad_segs=2), float(low) - 1.0, float(high) + 6.0)
+
+    def design(self, category: str, node: str) -> str:
+        """Draw the design of a node among those of the scene's side."""
+        designs = of_side(self.catalogue[category].designs, self.head.designs)
+        return designs[rank(self.head.seed, "design", self.name, node) % len(designs)].name
 
     def next_variant(self, category: str) -> str | None:
         """Name the variant of a category used least so far; None where it has none."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
+from aerialdojo_gen.scenes.designs import ROUND
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
-from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mirrored, rotated, rotation, stretched, translated
 
 SHAPES: dict[str, Callable[..., Mesh]] = {
     f.__name__: f
@@ -21,12 +23,14 @@ SHAPES: dict[str, Callable[..., Mesh]] = {
         shapes_extruded.sweep, shapes_extruded.block, lettering.text,
     )
 }  # fmt: skip
-PLACEMENT_KEYS = frozenset({"shape", "role", "at", "rotate", "tag", "array", "ring", "mirror"})
+PLACEMENT_KEYS = frozenset({"shape", "role", "at", "rotate", "tag", "design", "array", "ring", "mirror"})
 ARRAY_KEYS = frozenset({"count", "step", "count2", "step2"})
 RING_KEYS = frozenset({"count", "radius", "axis", "arc", "start"})
 _WORDS = frozenset({("prism", "section"), ("text", "text"), ("ring", "axis")})
 _AXES = {"x": 0, "y": 1, "z": 2}
 _MAX_COPIES = 2000
+# Turned bodies of so few sides are square posts; an axis so near to x, y or z lies along it.
+_SQUARE, _ALONG = 4, 0.999
 # A hundred times what the largest prop of the catalogue has.
 MAX_TRIANGLES = 300_000
 
@@ -43,7 +47,7 @@ def names_used(part: Mapping[str, Any]) -> frozenset[str]:
     shape = part["shape"]
     found: set[str] = set()
     for key, value in part.items():
-        if key in ("shape", "role", "tag", "mirror") or (shape, key) in _WORDS:
+        if key in ("shape", "role", "tag", "design", "mirror") or (shape, key) in _WORDS:
             continue
         if key in ("array", "ring"):
             for inner, number in value.items():
@@ -54,21 +58,31 @@ def names_used(part: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(found)
 
 
-def part_mesh(part: Mapping[str, Any], names: Mapping[str, float], words: Mapping[str, str]) -> Mesh:
-    """Make one part of a prop, repeated and placed in the prop's frame."""
-    shape = part["shape"]
+def part_mesh(
+    part: Mapping[str, Any],
+    names: Mapping[str, float],
+    words: Mapping[str, str],
+    stretch: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> Mesh:
+    """Make one part of a prop, repeated and placed in the prop's frame, which is stretched by three factors."""
+    shape, whole = part["shape"], np.array(stretch)
     own = {k: v if (shape, k) in _WORDS else _number(v, names) for k, v in part.items() if k not in PLACEMENT_KEYS}
     if shape == "text":
         own["text"] = _fill(own["text"], words)
     body = SHAPES[shape](**own)
+    turn = np.eye(3)
     if "rotate" in part:
-        body = rotated(body, rotation(*_triple("rotate", part["rotate"], names)))
+        turn = rotation(*_triple("rotate", part["rotate"], names))
+        body = rotated(body, turn)
+    if "ring" not in part:
+        body = stretched(body, _round_factors(shape, own, turn, whole))
     if "array" in part:
-        body = _arrayed(body, part["array"], names)
+        body = _arrayed(body, part["array"], names, np.ones(3) if "ring" in part else whole)
     if "ring" in part:
-        body = _ringed(body, part["ring"], names)
+        axis = _AXES[part["ring"].get("axis", "z")]
+        body = stretched(_ringed(body, part["ring"], names), _factors_about(axis, whole))
     if "at" in part:
-        body = translated(body, _triple("at", part["at"], names))
+        body = translated(body, np.array(_triple("at", part["at"], names)) * whole)
     for axis in part.get("mirror", ""):
         body = merge([body, mirrored(body, _AXES[axis])])
     return body
@@ -84,13 +98,32 @@ def copies_in(part: Mapping[str, Any], names: Mapping[str, float]) -> int:
     return count
 
 
-def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:
+def _round_factors(shape: str, own: Mapping[str, Any], turn: Floats, stretch: Floats) -> Floats:
+    """Factors (3,) by which a body is stretched so that what is round stays round."""
+    if shape == "sphere" and own.get("radius") is not None:
+        return np.full(3, np.sort(stretch)[1])
+    if shape not in ROUND or own.get("segments", 12) <= _SQUARE:
+        return stretch
+    axis = int(np.argmax(np.abs(turn[:, 2])))
+    return _factors_about(axis, stretch) if abs(float(turn[axis, 2])) > _ALONG else stretch
+
+
+def _factors_about(axis: int, stretch: Floats) -> Floats:
+    """Factors (3,) that keep a body round about an axis; wheels grow with the height, and so touch the ground."""
+    x, y, z = stretch.tolist()
+    across = math.sqrt(x * y) if axis == 2 else z
+    factors = np.full(3, across)
+    factors[axis] = stretch[axis]
+    return factors
+
+
+def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float], stretch: Floats) -> Mesh:
     copies = [body]
     for count_key, step_key in (("count", "step"), ("count2", "step2")):
         if count_key not in array:
             continue
         count = _count(array[count_key], names, len(copies) * len(body.faces))
-        step = np.array(_triple(step_key, array.get(step_key), names))
+        step = np.array(_triple(step_key, array.get(step_key), names)) * stretch
         copies = [translated(c, step * k) for k in range(count) for c in copies]
     return merge(copies)
 

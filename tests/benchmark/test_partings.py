@@ -28,7 +28,7 @@ from aerialdojo_gen.store.root import open_root
 AT_3 = PROFILES["aerialdojo"]
 COLUMNS = ("plan_detour", "target_visible_at_start", "straight_line_free", "climb_m")
 SEEN = (
-    "target_seen_in_train", "start_seen_in_train", "pair_seen_in_train", "target_split",
+    "target_seen_in_train", "start_seen_in_train", "pair_seen_in_train", "shape_seen_in_train", "target_split",
     "target_held_out and start_held_out",
 )  # fmt: skip
 
@@ -66,6 +66,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
         "target_seen_in_train": rows.target_seen_in_train.map({True: "seen in training", False: "unseen"}),
         "start_seen_in_train": rows.start_seen_in_train.map({True: "seen in training", False: "unseen"}),
         "pair_seen_in_train": rows.pair_seen_in_train.map({True: "seen in training", False: "unseen"}),
+        "shape_seen_in_train": rows.shape_seen_in_train.map({True: "seen in training", False: "unseen"}),
         "target_split": rows.target_split,
         "target_held_out and start_held_out": (2 * rows.target_held_out + rows.start_held_out).map(
             {0: "neither", 1: "start alone", 2: "target alone", 3: "target and start"}
@@ -78,7 +79,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
         assert found[name].labels[0].tolist() == wanted.tolist(), name
     request = ReportRequest(open_root(planted.data), runs, [AT_3])
     tables = report_tables(request, ["difficulty", "seen"])
-    assert len(tables) == 10
+    assert len(tables) == 11
     heads = {table.title.split(",")[0]: table for table in tables}
     one = heads["Targets that training shows"]
     seen = rows[rows.target_seen_in_train]

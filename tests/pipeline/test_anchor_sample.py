@@ -247,7 +247,7 @@ def whole_run(place, objects, data, seed=0, chosen=()):
     rows = [
         item(o, k) | {
             "scene": name, "category": "thing", "description": "A thing.", "landmark_id": 0, "direction": "east",
-            "claims": "[]",
+            "claims": "[]", "shape": None, "shape_held_out": None,
             **dict(zip(("size_x_m", "size_y_m", "size_z_m"), np.ptp(o.bounds, axis=0).tolist(), strict=True)),
         }
         for k, o in enumerate(objects)

@@ -63,6 +63,7 @@ def things(data: Path, rows, *others):
             "scene": SCENE, "object_id": k, "name": f"ball {k}", "category": "ball", "description": "A ball.",
             "mesh_node": f"ball_{k}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
             "size_z_m": 1.0, "landmark_id": 0, "direction": "east", "claims": "[]",
+            "shape": None, "shape_held_out": None,
         }
         for k in balls
     ]  # fmt: skip

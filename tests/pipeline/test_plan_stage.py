@@ -52,7 +52,8 @@ def data(tmp_path_factory) -> Path:
     write(root, "objects", schemas.OBJECTS, [
         {"scene": SCENE, "object_id": k, "name": f"thing {k}", "category": "thing", "description": "A thing.",
          "mesh_node": f"thing_{k:02d}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
-         "size_z_m": 1.0, "landmark_id": 0, "direction": "east", "claims": "[]"}
+         "size_z_m": 1.0, "landmark_id": 0, "direction": "east", "claims": "[]",
+         "shape": None, "shape_held_out": None}
         for k in range(N_OBJECTS)])  # fmt: skip
     grid = ClearanceGrid.build(world)
     rng = np.random.default_rng(11)

@@ -45,6 +45,7 @@ def rows_of_objects():
             "scene": SCENE, "object_id": i, "name": f"thing {i}", "category": "thing", "description": f"It is {i}.",
             "mesh_node": f"thing_{i:03}", "x_m": x, "y_m": y, "z_m": z, "size_x_m": 1.0, "size_y_m": 1.0,
             "size_z_m": 1.0, "landmark_id": 0, "direction": "north", "claims": "[]",
+            "shape": None, "shape_held_out": None,
         }  # fmt: skip
 
 

@@ -67,6 +67,7 @@ def set_difficulty(planted: Planted) -> None:
         set_columns(
             planted, f"tasks/{side}", target_seen_in_train=pa.array(k % 2 == 0),
             start_seen_in_train=pa.array(k % 5 != 0), pair_seen_in_train=pa.array(k % 6 == 0),
+            shape_seen_in_train=pa.array(k % 7 != 0),
             target_split=pa.array(np.where(k % 4 == 0, "test", "train")),
             target_held_out=pa.array(k % 4 == 0), start_held_out=pa.array(k % 8 == 0),
         )  # fmt: skip

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal
@@ -221,6 +222,7 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
         "direction": objects.column("direction"),
         "reference_image_id": objects.column("reference_image_id"),
         "image_distance_m": objects.column("step_back_m"),
+        "shape_seen_in_train": pc.invert(objects.column("shape_held_out")),
     }
     fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
     for name, column in theirs.items():

@@ -106,6 +106,15 @@ def object_category(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, repr(category), repr(scene[str(node)].category))
 
 
+@check("objects", needs=("mesh",), after=("object_node",))
+def object_shape(data: SceneData, rows: Rows) -> Iterator[Finding]:
+    """An object's shape is its node's."""
+    scene = scene_mesh(data).scene
+    for row, (node, shape) in enumerate(zip(rows.texts("mesh_node"), rows.texts("shape"), strict=True)):
+        if node in scene and shape is not None and scene[str(node)].shape != shape:
+            yield Finding(row, repr(shape), repr(scene[str(node)].shape))
+
+
 @check("landmarks", needs=("mesh",), after=("landmark_node",))
 def landmark_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's centre is that of its node's box."""

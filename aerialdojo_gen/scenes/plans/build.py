@@ -268,7 +268,7 @@ class _Building:
             share, most_m = entry.sunk
             height_m = prop_height(self._site, category, variant, x, y)
             z = (z or 0.0) - min(share * height_m, most_m)
-        given = {key: getattr(thing, key) for key in ("scale", "roles", "params", "attributes")}
+        given = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
         given = {key: value for key, value in given.items() if value}
         one = Placement(
             category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid, **given

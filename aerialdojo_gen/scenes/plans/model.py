@@ -103,6 +103,7 @@ class Thing(BaseModel):
     phrase: Annotated[str, Field(max_length=200)] = ""  # In place of that of the entry
     above_ground_m: Number = 0.0  # The same
     node: str | None = None
+    design: Annotated[str, Field(max_length=60)] | None = None  # One of the scene's side where absent
     scale: Annotated[float, Field(ge=0.05, le=20)] = 1.0
     roles: dict[str, Material] = {}
     params: dict[str, Number] = {}

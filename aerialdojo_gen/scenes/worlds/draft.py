@@ -283,6 +283,7 @@ class Draft:
         return {
             "plan": 1, "seed": rank(self.world.seed, STAGE, self._trial) % 2**31,
             "size_m": [self.width_m, self.depth_m], "ceiling_m": self.whole(low, high, "ceiling"), **self.head,
+            **({"designs": "held_out"} if self.world.held_out else {}),
             "world": world, "floor_m": self.floors, "lines": self.lines, "areas": self.areas,
             "ground": self.ground, "site": self._site,
         }  # fmt: skip

@@ -44,6 +44,9 @@ SPLITS = [
     column("frame_seen_in_train", pa.bool_(),
            "whether descriptions of training tasks have sentences built like that of the semantic task",
            nullable=True),
+    column("shape_seen_in_train", pa.bool_(),
+           "whether training scenes may have things of the target's shape: false where its design is held out; null "
+           "of imported meshes", nullable=True),
 ]  # fmt: skip
 
 TASKS = table(

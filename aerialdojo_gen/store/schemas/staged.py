@@ -42,6 +42,19 @@ OBJECT_COLUMNS = [
         pa.string(),
         "what can be said of it, true of the mesh: a JSON list of claims (kind, key, things)",
     ),
+    column(
+        "shape",
+        pa.string(),
+        "digest of its geometry in its own frame: congruent things of the catalogue have the "
+        "same; null of imported meshes",
+        nullable=True,
+    ),
+    column(
+        "shape_held_out",
+        pa.bool_(),
+        "whether its design stands in no scene of the training side; null of imported meshes",
+        nullable=True,
+    ),
 ]
 REFERENCE = [
     column("reference_image", pa.binary(), "PNG: front view from the selected anchor, or from further back "

@@ -75,6 +75,8 @@ def annotation_tables(annotations: Annotations, claims: SceneClaims) -> dict[str
                 "landmark_id": landmarks[bearing.landmark].id,
                 "direction": bearing.direction,
                 "claims": json.dumps([claim.to_json() for claim in claims.of(i)], ensure_ascii=False),
+                "shape": instance.shape or None,
+                "shape_held_out": instance.held_out if instance.shape else None,
             }
         )
     chosen_rows = [

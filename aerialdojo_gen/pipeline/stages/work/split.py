@@ -96,7 +96,9 @@ def tasks_table(
     said, seen_frame = _said(routes, train, objects)
     target = _take(objects, "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
-    seen_and_split = splits_of(routes, train, out) | {"frame_seen_in_train": seen_frame}
+    seen_and_split = splits_of(routes, train, out) | {
+        "frame_seen_in_train": seen_frame, "shape_seen_in_train": pc.invert(target.column("shape_held_out")),
+    }  # fmt: skip
     instances = []
     for modality in ("image", "semantic"):
         columns: dict[str, Any] = {
