@@ -8,6 +8,7 @@ so that hidden ones fail the depth test early.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -19,6 +20,7 @@ from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import is_shiny
 from aerialdojo_gen.rendering.shading import MUTE, muted
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
+from aerialdojo_gen.scenes.noise import fractal, texture_rng
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,7 @@ _MORTON_BITS = 16
 _SHARP = 0.7
 # Materials whose pattern has no scale: they are drawn with grain at every distance.
 _GRAINED = frozenset({*NATURAL, "asphalt", "hedge"})
+_GRAIN_SPREAD, _GRAIN_MOST = 0.7, 11.0  # of the pattern's own, and of 255: from afar joints and stones are one tone
 # What is drawn first hides most.
 _ORDER: tuple[tuple[str, ...], ...] = (
     ("TEXTURED",), (), ("TEXTURED", "SHINY"), ("SHINY",), ("TEXTURED", "NATURAL"), ("TEXTURED", "NATURAL", "SHINY"),
@@ -91,7 +94,9 @@ class Kind:
 def own_kinds(scene: Scene) -> list[Kind]:
     """Pack a scene's catalogue materials and its horizon by what draws them; all share one texture array."""
     names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
-    layer = {name: float(k) for k, name in enumerate(names)}
+    grained = [name.split(":")[0] in _GRAINED for name in names]
+    # What has grain has a layer of it behind its own.
+    layer = {name: float(k + sum(grained[:k])) for k, name in enumerate(names)}
     rows: dict[tuple[str, ...], list[NDArray[np.void]]] = {tags: [] for tags in _ORDER}
     far: list[tuple[NDArray[np.void], tuple[str, ...]]] = []
     beyond = [instance for instance in scene.backdrop if instance.surface == HORIZON]
@@ -112,7 +117,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
     smooth(*(found for found, _ in far))
     for found, tags in far:
         rows.setdefault(tags, []).append(found)
-    layers = _layers(scene, names)
+    layers = _layers(scene, names, grained)
     return [Kind(cut(some), tags, layers if "TEXTURED" in tags else None) for tags, some in rows.items()]
 
 
@@ -193,16 +198,28 @@ def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
     return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
 
 
-def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
+def _layers(scene: Scene, names: list[str], grained: list[bool]) -> NDArray[np.uint8] | None:
     textures = [t for name in names if (t := scene.materials[name].texture) is not None]
     if not textures:
         return None
     edge = 1
     while edge < min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures)):
         edge *= 2
-    layers = np.empty((len(textures), edge, edge, 3), dtype=np.uint8)
-    for k, texture in enumerate(textures):
+    layers: list[NDArray[np.uint8]] = []
+    for texture, grain in zip(textures, grained, strict=True):
         larger = max(texture.shape[:2]) > edge
         sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)
-        layers[k] = cv2.transform(sized, MUTE)
-    return layers
+        layers.append(cv2.transform(sized, MUTE))
+        if grain:
+            mean, spread = (
+                layers[-1].mean(axis=(0, 1)),
+                np.minimum(_GRAIN_SPREAD * layers[-1].std(axis=(0, 1)), _GRAIN_MOST),
+            )
+            layers.append(np.clip(mean + spread * _grain(edge)[..., None], 0, 255).astype(np.uint8))
+    return np.stack(layers)
+
+
+@lru_cache(maxsize=2)
+def _grain(edge: int) -> Floats:
+    """Noise without a scale, tileable: what a material shows from afar, where its own pattern would be too large."""
+    return fractal(edge, 6, 6, texture_rng("grain"), 0.75)

@@ -175,11 +175,12 @@ void main() {
     float facing = -dot(v_normal, v_ray) * nearness;
 #ifdef TEXTURED
 #ifdef NATURAL
-    // The same pattern eight times as large, and again: ground has grain at every distance. By the square of the
+    // The next layer eight times as large, and again: ground has grain at every distance. By the square of the
     // texels a pixel, for a logarithm takes long.
     float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));
-    vec2 at = v_uv * (texels_2 < 28.0 ? 1.0 : texels_2 < 1800.0 ? 0.125 : 0.015625);
-    vec3 grain = texture(textures, vec3(at, v_texture.x)).rgb;
+    vec3 at = texels_2 < 28.0 ? vec3(v_uv, v_texture.x)
+        : vec3(v_uv * (texels_2 < 1800.0 ? 0.125 : 0.015625), v_texture.x + 1.0);
+    vec3 grain = texture(textures, at).rgb;
     base += (grain - base) * max(1.0 - 0.016 * texels_2, GRAIN);
 #else
     float texels_2 = range_2 / (v_texture.y * max(facing, 0.02));

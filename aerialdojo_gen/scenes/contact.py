@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import Mesh, areas, translated
 from aerialdojo_gen.scenes.model import Instance
@@ -25,7 +26,7 @@ _SUNK_M = 0.015  # what is let down is so deep in the ground, or its edge would 
 _LET_DOWN_M = 0.25  # more would bury the door of a booth
 _STEEPEST_DEG = 18.0
 _SLENDER = 1.7  # times as high as its narrow side: poles and booths stay upright
-_LEAST_M = 0.5  # a smaller foot is let down
+_LEAST_M = 0.35  # a smaller foot is let down
 _BURIED_M = 0.15  # a vehicle whose wheels are deeper in the ground leans as well
 _BURIED_SHARE = 0.4  # no more of a thing's height goes into the ground
 _PLINTH_M = 8.0  # longer things than this span: no block is put under them
@@ -87,12 +88,20 @@ def _gaps(instance: Instance, feet: NDArray[np.int64], ground: Heights) -> Float
 
 
 def _leans(instance: Instance, kind: str, feet: NDArray[np.int64]) -> bool:
-    long, wide, high = np.ptp(instance.bounds, axis=0).tolist()
-    foot = np.ptp(instance.vertices[feet, :2], axis=0)
-    return (
-        kind not in _LEVEL and kind != "vegetation"
-        and float(foot.min()) >= _LEAST_M and (kind == "vehicle" or high <= _SLENDER * min(long, wide))
-    )  # fmt: skip
+    if kind in _LEVEL or kind == "vegetation":
+        return False
+    high = float(np.ptp(instance.bounds[:, 2]))
+    # Whichever way it faces.
+    foot, narrow = _narrow_side(instance.vertices[feet]), _narrow_side(instance.vertices)
+    return foot >= _LEAST_M and (kind == "vehicle" or high <= _SLENDER * narrow)
+
+
+def _narrow_side(points: Floats) -> float:
+    """Shorter side of the smallest rectangle about points (n, 3) seen from above, metres."""
+    around = shapely.minimum_rotated_rectangle(shapely.multipoints(np.round(points[:, :2], 4)))
+    if around.geom_type != "Polygon":
+        return 0.0
+    return float(norm(np.diff(shapely.get_coordinates(around)[:3], axis=0)).min())
 
 
 def _leaning(instance: Instance, indices: NDArray[np.int64], ground: Heights) -> Instance:

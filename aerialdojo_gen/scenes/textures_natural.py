@@ -44,10 +44,10 @@ def dirt(colour: Floats) -> Floats:
 def gravel(colour: Floats) -> Floats:
     """Loose stones, drawn for 2 m."""
     rng = texture_rng("gravel")
-    first, second, owner = cells(256, 900, rng)
-    tone = rng.uniform(0.7, 1.25, size=900)[owner]
-    joint = np.clip((second - first) / 0.008, 0.55, 1.0)
-    warm = rng.uniform(-8, 8, size=900)[owner]
+    first, second, owner = cells(256, 2600, rng)
+    tone = rng.uniform(0.84, 1.14, size=2600)[owner]
+    joint = np.clip((second - first) / 0.006, 0.66, 1.0)
+    warm = rng.uniform(-6, 6, size=2600)[owner]
     image = shade(colour, tone * joint)
     image[..., 0] += warm
     image[..., 2] -= warm

@@ -17,7 +17,7 @@ from aerialdojo_gen.scenes.model import Instance
 
 ROOT = Path(__file__).resolve().parents[2]
 LEANING, UPRIGHT = (
-    ("pickup_truck", "fire_engine", "picnic_table", "gas_cylinder_cage"),
+    ("pickup_truck", "fire_engine", "bench", "picnic_table", "gas_cylinder_cage"),
     ("guard_booth", "phone_booth", "flagpole"),
 )
 
