@@ -70,7 +70,7 @@ def write_inputs(data, bad=BAD):
                 "scene": SCENE, "object_id": k, "name": node, "category": "thing", "description": "A cube.",
                 "mesh_node": node, **dict(zip(("x_m", "y_m", "z_m"), scene[node].centroid.tolist(), strict=True)),
                 "size_x_m": 1.0, "size_y_m": 1.0, "size_z_m": 1.0, "landmark_id": 0, "direction": "north",
-                "claims": "[]",
+                "claims": "[]", "shape": None, "shape_held_out": None,
             }
             for k, node in enumerate(("red_cube", "blue_cube", "west"))
         ],
