@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
-KINDS = ("prop", "vegetation", "vehicle", "building", "landmark")
+KINDS = ("prop", "vegetation", "vehicle", "building", "landmark", "life")
 Range = tuple[float, float]
 _CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells",
                   "designs")  # fmt: skip

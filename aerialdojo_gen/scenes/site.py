@@ -99,13 +99,21 @@ class Site:
 
     def ground_z(self, x: float, y: float) -> float:
         """Height of the painted ground at a point, metres."""
-        z = self._terrain.at(x, y)
+        surface = self._surface(x, y)
+        return self._terrain.at(x, y) + (0.0 if surface is None else surface.rise_m)
+
+    def ground_material(self, x: float, y: float) -> str:
+        """Material of the painted ground at a point."""
+        surface = self._surface(x, y)
+        return self._base if surface is None else surface.material
+
+    def _surface(self, x: float, y: float) -> Surface | None:
         for surface in reversed(self._surfaces):
             # Hundreds of lane marks are painted: test their boxes first.
             x0, y0, x1, y1 = surface.bounds
             if x0 <= x <= x1 and y0 <= y <= y1 and shapely.contains_xy(surface.area, x, y):
-                return z + surface.rise_m
-        return z
+                return surface
+        return None
 
     # Things
 

@@ -270,6 +270,19 @@ class Draft:
         rng = self.rng("thing", slot.kind, slot.x, slot.y, slot.on)
         return repainted(self.catalogue, what, (slot.x, slot.y, slot.yaw_deg), rng)
 
+    def add_life(self) -> None:
+        """Set out the type's people and animals, where all else leaves room."""
+        life = self.kind.life
+        some: Entry = {
+            kind: {c: n for c, (low, high) in of.items() if (n := self.whole(low, high, "life", c))}
+            for kind, of in (("animals", life.animals), ("birds", life.birds))
+        }
+        if life.ground:
+            some["ground"] = life.ground
+        self.section("People and animals")
+        people = self.whole(*life.people, "life", "people")
+        self.make("life", people=people, who=life.who, **{key: value for key, value in some.items() if value})
+
     # The plan
 
     def tables(self) -> Entry:

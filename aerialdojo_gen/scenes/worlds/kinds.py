@@ -83,6 +83,16 @@ class Slots(_Strict):
     sure: bool = False  # Whether there is room where they are offered, as on walls and between parapets
 
 
+class Life(_Strict):
+    """People and animals of a type: arguments of the builder ``life``, from least to most."""
+
+    people: tuple[int, int]
+    who: Annotated[list[str], Field(min_length=1)]
+    animals: dict[str, tuple[int, int]] = {}
+    birds: dict[str, tuple[int, int]] = {}
+    ground: list[str] = []  # Materials that they stand on, where these are not the builder's own
+
+
 class SceneType(_Strict):
     """A scene type."""
 
@@ -98,6 +108,7 @@ class SceneType(_Strict):
     latitude_deg: Range | None = None  # Of either hemisphere; without it the sun stands where it does by default
     places: dict[str, Place] = {}
     slots: dict[str, Slots]
+    life: Life
 
     @model_validator(mode="after")
     def _something_on_both_sides(self) -> SceneType:

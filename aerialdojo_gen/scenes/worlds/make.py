@@ -47,6 +47,7 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
         draft = Draft(world, kind, catalogue, trial)
         try:
             generator_of(world.type)(draft)
+            draft.add_life()
         except NoRoomError as error:
             refused.append((str(error), ""))
             continue

@@ -10,7 +10,7 @@ from typing import Literal
 from aerialdojo_gen.base.errors import AssetError
 
 # Raised when a generator gives another plan for a seed: plans of older versions are refused by name.
-VERSION = 1
+VERSION = 2
 # Seeds of the test and of the validation worlds; all that follow are for training.
 TEST_SEEDS, VALIDATION_SEEDS = range(200), range(200, 1000)
 MAX_SEED = 2**31 - 1

@@ -1,0 +1,195 @@
+"""People: a body on joints, in a posture and in clothes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from aerialdojo_gen.scenes.builders import builder
+from aerialdojo_gen.scenes.builders.growth import limb, vec
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, stretched, translated
+from aerialdojo_gen.scenes.shapes import box, lathe, sphere
+
+Parts = list[tuple[str, Mesh]]
+# Joints of a body of 1.75 m that stands, metres above its soles.
+_BODY_M = 1.75
+_HIP, _KNEE, _ANKLE = 0.93, 0.5, 0.08
+_SHOULDER, _HEAD = 1.43, 1.61
+_UPPER_ARM, _FOREARM, _THIGH, _SHIN = 0.29, 0.25, 0.43, 0.42
+_STAND, _WALK, _SIT, _WORK, _CALL = range(5)
+
+
+@builder
+def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
+    """Person who stands, walks, sits, works bent or calls, in what the parameters dress them in."""
+    posture = round(params["posture"])
+    seat_m = params["seat"]
+    lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0}.get(posture, 0.0)
+    hip_m = (
+        seat_m + 0.11 if posture == _SIT else _HIP - (0.09 if posture == _WORK else 0.015 if posture == _WALK else 0)
+    )
+    upper = _upper(rng, params, posture, lean_deg)
+    out = [
+        (role, translated(rotated(body, rotation(0.0, lean_deg, 0.0)), vec(0.0, 0.0, hip_m))) for role, body in upper
+    ]
+    out += _legs(rng, params, posture, hip_m)
+    grown = params["height"] / _BODY_M
+    return [(role, stretched(body, np.full(3, grown))) for role, body in out]
+
+
+def _upper(rng: np.random.Generator, params: Mapping[str, float], posture: int, lean_deg: float) -> Parts:
+    """All above the hips, in a frame whose origin lies between them and whose z runs up the back."""
+    stout, bust = params["stout"], params["bust"]
+    up, neck = _SHOULDER - _HIP, 0.55
+    girth = np.array([0.72, 1.0, 1.0])
+    trunk = limb(
+        [(0, 0, -0.09), (0, 0, 0.03), (0, 0, 0.16), (0, 0, 0.34), (0, 0, up - 0.02), (0, 0, up + 0.05)],
+        [0.155 * stout, 0.165 * stout, 0.145 * stout, 0.175, 0.155, 0.06], 9,
+    )  # fmt: skip
+    out: Parts = [
+        ("top", stretched(trunk, girth)),
+        ("skin", limb([(0, 0, up), (0.015, 0, neck + 0.06)], [0.058, 0.052], 6)),
+    ]
+    if bust:
+        out.append(("top", translated(sphere(radii=(0.075, 0.13, 0.085)), vec(0.075, 0.0, 0.33))))
+    if params["coat"] and posture != _SIT:
+        flare = limb([(0, 0, -0.34), (0, 0, -0.05), (0, 0, 0.1)], [0.215 * stout, 0.175 * stout, 0.155 * stout], 10)
+        out.append(("top", stretched(flare, np.array([0.8, 1.0, 1.0]))))
+    out += _head(params, neck + 0.06)
+    out += _arms(rng, params, posture, up, lean_deg)
+    if params["vest"]:
+        for z, r in ((0.2, 0.163), (0.32, 0.181)):
+            band = limb([(0, 0, z - 0.022), (0, 0, z + 0.022)], [r, r], 10)
+            out.append(("band", stretched(band, np.array([0.75, 1.0, 1.0]))))
+    if params["bag"]:
+        pack = box(size=(0.2, 0.3, 0.44), taper=(0.75, 0.85))
+        out.append(("bag", translated(pack, vec(-0.21, 0.0, 0.06))))
+        straps = [
+            limb([(-0.1, s * 0.11, up + 0.03), (0.1, s * 0.12, up), (0.13, s * 0.11, 0.3)], [0.03] * 3, 5)
+            for s in (-1, 1)
+        ]
+        out.append(("bag", merge(straps)))
+    return out
+
+
+def _head(params: Mapping[str, float], z: float) -> Parts:
+    """Head with hair, and what is worn on it; children have larger ones."""
+    size = 1.0 + max(0.0, 1.5 - params["height"]) * 0.5
+    centre = vec(0.02, 0.0, z + 0.085 * size)
+    parts: Parts = [
+        ("skin", sphere(radii=(0.101, 0.08, 0.121))),
+        ("skin", translated(sphere(radii=(0.02, 0.013, 0.02), subdivisions=0), vec(0.1, 0.0, -0.012))),
+    ]
+    hair = round(params["hair"])
+    if hair:
+        cap = sphere(radii=(0.105, 0.088, 0.122), half=True, subdivisions=0)
+        parts.append(("hair", translated(rotated(cap, rotation(0.0, -24.0, 0.0)), vec(-0.013, 0.0, 0.008))))
+        back = sphere(radii=(0.062, 0.082, 0.1 if hair == 1 else 0.185))
+        parts.append(("hair", translated(back, vec(-0.055, 0.0, -0.01 if hair == 1 else -0.1))))
+        if hair == 3:
+            parts.append(("hair", translated(sphere(radius=0.05), vec(-0.09, 0.0, 0.1))))
+    hat = round(params["hat"])
+    if hat:
+        crown = sphere(radii=(0.122, 0.104, 0.125), half=True, subdivisions=0)
+        parts.append(("hat", translated(crown, vec(-0.004, 0.0, 0.028))))
+        if hat == 1:
+            peak = lathe(points=[(0.0, 0.0), (0.115, -0.005), (0.115, 0.012), (0.0, 0.02)], segments=10)
+            parts.append(("hat", translated(peak, vec(0.075, 0.0, 0.03))))
+        elif hat == 2:
+            brim = lathe(points=[(0.0, 0.0), (0.2, -0.012), (0.2, 0.004), (0.0, 0.02)], segments=12)
+            parts.append(("hat", translated(brim, vec(0.0, 0.0, 0.03))))
+        else:
+            parts.append(("hat", translated(sphere(radius=0.035, subdivisions=0), vec(0.0, 0.0, 0.16))))
+    return [(role, translated(stretched(body, np.full(3, size)), centre)) for role, body in parts]
+
+
+def _arms(rng: np.random.Generator, params: Mapping[str, float], posture: int, up: float, lean_deg: float) -> Parts:
+    """Both arms from their shoulders; they hang straight down even where the back leans."""
+    out: Parts = []
+    swing = float(rng.uniform(18.0, 28.0))
+    for side in (-1.0, 1.0):
+        shoulder = vec(0.0, side * 0.185, up - 0.035)
+        # Degrees forward of the upper arm and of the forearm, seen from the side, and outward.
+        upper, fore, out_deg = float(rng.uniform(-6.0, 6.0)), float(rng.uniform(4.0, 22.0)), 7.0
+        if posture == _WALK:
+            upper, fore = side * swing, side * swing + 22.0
+        elif posture == _SIT:
+            upper, fore = 28.0, 62.0
+        elif posture == _WORK:
+            upper, fore, out_deg = 34.0 + side * 12.0, 52.0 + side * 12.0, 4.0
+        elif posture == _CALL and side > 0:
+            upper, fore, out_deg = 38.0, 158.0, 16.0
+        upper, fore = upper + lean_deg, fore + lean_deg
+        elbow = shoulder + _UPPER_ARM * _way(upper, side * out_deg)
+        wrist = elbow + _FOREARM * _way(fore, side * (out_deg - (12.0 if fore > 60.0 else 4.0)))
+        thick = 1.15 if params["coat"] or params["vest"] else 1.0
+        sleeve = "top" if params["sleeves"] else "skin"
+        out += [
+            ("top", translated(sphere(radii=(0.074 * thick, 0.067 * thick, 0.076), subdivisions=0), shoulder)),
+            ("top", limb([shoulder, (shoulder + elbow) / 2], [0.06 * thick, 0.054 * thick], 6)),
+            (sleeve, limb([(shoulder + elbow) / 2, elbow, wrist], [0.053 * thick, 0.046 * thick, 0.034 * thick], 6)),
+            ("skin", translated(sphere(radii=(0.044, 0.036, 0.056), subdivisions=0), wrist + 0.04 * _way(fore, 0.0))),
+        ]
+    return out
+
+
+def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, hip_m: float) -> Parts:
+    """Both legs from the hips to the ground; a skirt hides their upper part."""
+    out: Parts = []
+    stout = params["stout"]
+    bare = "skin" if params["skirt"] or params["shorts"] else "legs"
+    for side in (-1.0, 1.0):
+        hip = vec(0.0, side * 0.092, hip_m)
+        if posture == _SIT:
+            spread, seat_m = float(rng.uniform(0.0, 0.06)), hip_m - 0.11
+            if seat_m < 0.2:
+                knee, ankle = vec(0.33, side * (0.14 + spread), 0.43), vec(0.56, side * (0.13 + spread), _ANKLE)
+            else:
+                knee, ankle = vec(0.42, side * (0.11 + spread), hip_m - 0.02), vec(0.44, side * 0.11, _ANKLE)
+        elif posture == _WALK:
+            ahead = -side * 24.0
+            knee = hip + _THIGH * _way(ahead, 0.0)
+            ankle = knee + _SHIN * _way(ahead - (6.0 if ahead > 0 else 14.0), 0.0)
+            ankle[2] = _ANKLE + (0.0 if ahead > 0 else 0.05)
+        else:
+            apart = 0.15 if posture == _WORK else 0.105
+            bend = 0.09 if posture == _WORK else 0.012
+            knee, ankle = vec(bend, side * (apart + 0.01), _KNEE), vec(-0.01 + bend / 2, side * apart, _ANKLE)
+        out += [
+            (
+                "legs",
+                limb([hip + vec(0.0, 0.0, 0.03), hip, (hip + knee) / 2], [0.08, 0.094 * stout, 0.08 * stout], 7),
+            ),
+            (
+                bare,
+                limb([(hip + knee) / 2, knee, (knee + ankle) / 2, ankle], [0.078 * stout, 0.061, 0.056, 0.042], 6),
+            ),
+            (
+                ("legs" if bare == "legs" else "skin"),
+                translated(sphere(radii=(0.063, 0.061, 0.063), subdivisions=0), knee),
+            ),
+        ]
+        toe = 24.0 if posture == _WALK and side > 0 else 0.0
+        shoe = merge([
+            translated(sphere(radii=(0.135, 0.05, 0.085), half=True, subdivisions=0), vec(0.055, 0, 0)),
+            limb([(-0.01, 0, 0.02), (-0.01, 0, 0.11)], [0.052, 0.05], 5),
+        ])  # fmt: skip
+        out.append(("shoes", translated(rotated(shoe, rotation(0.0, toe, 0.0)), ankle - vec(0.0, 0.0, _ANKLE))))
+    if params["skirt"] and posture != _SIT:
+        skirt = limb(
+            [(0, 0, _KNEE + 0.02), (0, 0, hip_m - 0.02), (0, 0, hip_m + 0.12)], [0.26, 0.185 * stout, 0.15], 12
+        )
+        out.append(("legs", stretched(skirt, np.array([0.85, 1.0, 1.0]))))
+    if posture == _SIT and hip_m < 0.3:
+        # Who sits on the ground sits on it: the trunk's end is round.
+        out.append(("legs", translated(sphere(radii=(0.15, 0.19 * stout, 0.13)), vec(0.02, 0.0, hip_m))))
+    return out
+
+
+def _way(forward_deg: float, outward_deg: float) -> Floats:
+    """Unit vector of a limb that hangs down, turned forward and to the left."""
+    forward, outward = math.radians(forward_deg), math.radians(outward_deg)
+    down = math.cos(outward)
+    return np.round(vec(math.sin(forward) * down, math.sin(outward), -math.cos(forward) * down), 9)

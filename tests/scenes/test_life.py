@@ -1,0 +1,106 @@
+"""People and animals stand on the right ground with room, alike in every build, and no text names them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aerialdojo_gen.annotations.claims import SceneClaims
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.checks import clashes, floating
+from aerialdojo_gen.scenes.kit.life import WALKED, life
+from aerialdojo_gen.scenes.plans.build import build_plan, build_site
+
+ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
+SCENES = ("U_Alley_0", "N_Coast_1", "D_Flood_1")
+POSTURES = {"standing": 0, "walking": 1, "sitting": 2, "at work": 3, "on the phone": 4}
+
+
+@pytest.fixture(scope="module")
+def catalogue() -> Catalogue:
+    return load_catalogue(ASSETS)
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def built(request, catalogue):
+    path = ASSETS / "scenes" / f"{request.param}.toml"
+    return build_site(request.param, read_toml(path, AssetError), catalogue, request.param, path.parent)[0]
+
+
+def living(catalogue, instances, kinds=None):
+    return [i for i in instances if i.category in catalogue and catalogue[i.category].kind == "life"
+            and (kinds is None or i.category in kinds)]  # fmt: skip
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+def test_a_body_is_closed_and_stands_on_its_feet(catalogue, posture):
+    names = [v.name for v in catalogue["person"].variants]
+    assert len(names) >= 24
+    for name in names:
+        one = catalogue.instantiate(
+            "person", "p", generator(1, name), variant=name, params={"posture": POSTURES[posture]}
+        )
+        low, high = one.bounds[:, 2]
+        assert -0.05 < low < 0.02, name
+        upright = {"sitting": 0.53, "at work": 0.88}.get(posture, 1.06)
+        assert 0.45 < high < 1.9 * upright, (name, high)
+        assert len(one.faces) < 1250
+        for part in one.parts:
+            a, b, c = part.vertices[part.faces].transpose(1, 0, 2)
+            # Every limb is closed: its faces' normals add up to nothing.
+            assert np.abs(np.cross(b - a, c - a).sum(axis=0)).max() < 1e-4
+
+
+def test_people_stand_where_people_walk(catalogue, built):
+    on = next((e for e in reversed(built.head.site) if e.get("make") == "life"), {})
+    people = living(catalogue, built.instances, {"person"})
+    assert on["people"] * 0.8 <= len(people) <= on["people"]
+    for person in people:
+        x, y, _ = person.centroid
+        assert built.ground_material(float(x), float(y)).partition(":")[0] in on.get("ground", WALKED)
+        assert np.abs(person.centroid[:2]).max() < max(built.head.size_m) / 2 - 3.0
+    assert len({p.variant for p in people}) >= min(len(people), 6)
+
+
+def test_nobody_floats_or_stands_in_another(catalogue, built):
+    scene = built.scene()
+    nodes = {i.node for i in living(catalogue, scene.instances)}
+    assert nodes
+    assert not nodes & set(floating(scene, catalogue))
+    assert not [pair for pair in clashes(scene, catalogue) if nodes & set(pair)]
+
+
+def test_birds_stand_on_what_is_high(catalogue, built):
+    birds = living(catalogue, built.instances, {"pigeon", "gull", "crow"})
+    assert len(birds) >= 3
+    for bird in birds:
+        x, y, _ = bird.centroid
+        assert bird.bounds[0, 2] - built.ground_z(float(x), float(y)) > 1.5
+
+
+def test_no_claim_is_about_somebody_who_moves(catalogue):
+    scene = build_plan(ASSETS / "scenes" / "U_Alley_0.toml", catalogue)
+    kinds = {i.node: i.category for i in living(catalogue, scene.instances)}
+    claims = SceneClaims(Vocabulary(scene, catalogue), ())
+    named = [m.node for k, i in enumerate(scene.instances) if i.category in catalogue.targets
+             for claim in claims.of(k) for m in claim.things]  # fmt: skip
+    assert named
+    assert not kinds.keys() & set(named)
+
+
+def test_they_are_the_same_in_every_build(catalogue):
+    one, two = (build_plan(ASSETS / "scenes" / "U_Alley_0.toml", catalogue) for _ in range(2))
+    for a, b in zip(living(catalogue, one.instances), living(catalogue, two.instances), strict=True):
+        assert a.node == b.node
+        assert np.array_equal(a.vertices, b.vertices)
+
+
+def test_an_unknown_group_of_people_is_named(catalogue, built):
+    with pytest.raises(AssetError, match=r"'towm'.*town"):
+        life(built, people=1, who=["towm"])
