@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +91,19 @@ def props_sheet(
 
 def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
     """Picture a scene from above, from four sides and twice at flying height; (H, W, 3) uint8 sRGB."""
+    return contact_sheet(*zip(*_scene_pictures(scene, width, height), strict=True), 3)
+
+
+def scenes_sheet(scenes: Iterable[Scene], width: int = 320, height: int = 220) -> Image:
+    """Picture scenes from above, from the south-west and at flying height; (H, W, 3) uint8 sRGB."""
+    pictures = [one for scene in scenes for one in _scene_pictures(scene, width, height, (0, 1, 5))]
+    return contact_sheet(*zip(*pictures, strict=True), 6)
+
+
+def _scene_pictures(
+    scene: Scene, width: int, height: int, chosen: Sequence[int] = range(7)
+) -> list[tuple[Image, str]]:
+    """Take those of a scene's seven pictures that are chosen, each with its label."""
     low, high = scene.bounds
     centre = np.array([*(low[:2] + high[:2]) / 2, low[2]])
     span = high - low
@@ -111,8 +124,10 @@ def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
         views.append((eye, centre - [dx * 0.04 * reach, dy * 0.04 * reach, 0], fov, f"from the {name}"))
     for k, (eye, target) in enumerate(_flying_views(scene)):
         views.append((eye, target, 80.0, f"flying, {k + 1}"))
-    images = [look_at(scene, eye, target, width, height, angle) for eye, target, angle, _ in views]
-    return contact_sheet(images, [f"{scene.name}, {label}" for *_, label in views], 3)
+    return [
+        (look_at(scene, eye, target, width, height, angle), f"{scene.name}, {label}")
+        for eye, target, angle, label in (views[k] for k in chosen)
+    ]
 
 
 def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:

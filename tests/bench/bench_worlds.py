@@ -1,12 +1,14 @@
 """What making worlds costs, how many draws are refused and why, and how unlike the worlds of a type are.
 
     python tests/bench/bench_worlds.py [--types U_* N_Coast] [--worlds 20] [--held-out 4] [--first-seed 1000]
+        [--sheets DIR]
 
 Makes worlds of every type and prints a Markdown table. Times are CPU seconds of a world, the refused draws before it
 among them. *Near*: share of the objects that have one of the same category within 5 m in another world of the type,
 mean over pairs of worlds (wanted: at most 10 %). *Alike*: share of the objects whose mesh, turned and moved, another
 world has too, mean over pairs (at most 20 %). *Relief*: median over pairs of the correlation of the heights seen from
 above, metre by metre about the middle (at most 0.3). Objects are what tasks may ask for, plants left out.
+`--sheets` writes a picture a type of the paper's two scenes, the first eight worlds and two that are held out.
 """
 
 from __future__ import annotations
@@ -27,9 +29,11 @@ import numpy as np
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.gallery import scenes_sheet, write_picture
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.checks import targets_of
 from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.plans.build import build_plan
 from aerialdojo_gen.scenes.worlds.kinds import load_type, type_names
 from aerialdojo_gen.scenes.worlds.make import MAX_DRAWS, make_world
 from aerialdojo_gen.scenes.worlds.world import World
@@ -50,6 +54,7 @@ class Made:
     places: dict[str, np.ndarray]  # (n, 2) by category
     meshes: Counter[str]
     heights: np.ndarray  # Seen from above, a metre apart
+    scene: Scene | None  # Where it is to be pictured
 
 
 def mesh_digest(thing: Instance) -> str:
@@ -82,7 +87,7 @@ def reason_of(reason: str, what: str) -> str:
     return re.sub(r"(_?\d[\d,.]*%?)+", "", f"{reason}: {what}" if what else reason).strip(" :")
 
 
-def made(world: World, catalogue: Catalogue) -> Made | str:
+def made(world: World, catalogue: Catalogue, pictured: bool) -> Made | str:
     """Make a world and keep what is measured; the error where none is made."""
     begun = time.process_time()
     try:
@@ -97,7 +102,7 @@ def made(world: World, catalogue: Catalogue) -> Made | str:
     return Made(
         seconds, found.topology, [reason_of(*one) for one in found.refused], len(found.scene.instances),
         found.scene.n_triangles, {category: np.array(at) for category, at in places.items()},
-        Counter(mesh_digest(thing) for thing in things), heights_of(found.scene),
+        Counter(mesh_digest(thing) for thing in things), heights_of(found.scene), found.scene if pictured else None,
     )  # fmt: skip
 
 
@@ -158,6 +163,7 @@ def main() -> int:
     parser.add_argument("--worlds", type=int, default=20)
     parser.add_argument("--held-out", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=1000)
+    parser.add_argument("--sheets", type=Path)
     options = parser.parse_args()
     catalogue = load_catalogue(ASSETS)
     kinds = [kind for kind in type_names(ASSETS) if any(fnmatch(kind, one) for one in options.types)]
@@ -172,7 +178,8 @@ def main() -> int:
     for kind in kinds:
         worlds, failed = [], 0
         for world in worlds_of(kind, options):
-            one = made(world, catalogue)
+            seed = world.seed - options.first_seed
+            one = made(world, catalogue, options.sheets is not None and seed < (2 if world.held_out else 8))
             if isinstance(one, str):
                 failures.append(one)
                 failed += 1
@@ -182,6 +189,12 @@ def main() -> int:
             meshes |= one.meshes.keys()
         if worlds:
             print(row_of(kind, worlds, failed), flush=True)
+        if options.sheets is not None:
+            papers = [build_plan(ASSETS / "scenes" / f"{kind}_{k}.toml", catalogue) for k in (0, 1)]
+            sheet = scenes_sheet([*papers, *(world.scene for world in worlds if world.scene is not None)])
+            write_picture(sheet, options.sheets, f"worlds-{kind}.jpg", 1600)
+            for world in worlds:
+                world.scene = None
         everything += worlds
     refused = reasons.total() + len(failures) * MAX_DRAWS
     share = refused / max(refused + len(everything), 1)
