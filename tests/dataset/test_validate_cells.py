@@ -17,7 +17,7 @@ UNTOLD = {"box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px", "target_visible_at
 # What others say or refer to is told at them.
 TOLD_ELSEWHERE = {
     "landmark_id": "unknown_landmark", "selected": "selected_anchor", "description": "task_text", "name": "task_goal",
-    "paraphrases": "task_text", "reference_image_id": "task_goal",
+    "paraphrases": "task_text", "reference_image_id": "task_goal", "shape_held_out": "task_goal",
 }  # fmt: skip
 
 

@@ -228,7 +228,8 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for name, column in theirs.items():
         own, expected = rows.column(name), column.take(_at(target))
         # The other modality's goal is null, and `goal_of_modality` sees to that.
-        for row in np.flatnonzero(unequal(own, expected) & fit & _valid(own) & _valid(expected)):
+        both = np.True_ if name == "shape_seen_in_train" else _valid(own) & _valid(expected)
+        for row in np.flatnonzero(unequal(own, expected) & fit & both):
             yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(expected[int(row)].as_py()))
 
 
