@@ -13,6 +13,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 _ELSEWHERE = {"in the wood", "beside a path", "beside the stream"}
 _STRUCTURE = {"ground", "wooden_fence", "reed_clump"}
+_LIFE = {"person", "dog", "crow"}
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +24,9 @@ def forest(scene_of: Callable[[str], Scene]) -> Scene:
 @pytest.fixture(scope="module")
 def things(forest: Scene) -> list[Instance]:
     return [
-        i for i in forest.instances if i.category not in _STRUCTURE and i.attributes.get("place") not in _ELSEWHERE
+        i
+        for i in forest.instances
+        if i.category not in _STRUCTURE | _LIFE and i.attributes.get("place") not in _ELSEWHERE
     ]
 
 
