@@ -77,7 +77,7 @@ class Catalogue:
     ) -> Instance:
         """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order.
 
-        Its design is the first of its category where none is given.
+        Its design is the first of its category where none is given. `scale` multiplies the category's own.
         """
         prop = self[category]
         look = self._draw_variant(prop, variant, rng)
@@ -97,6 +97,7 @@ class Catalogue:
                     self._parts.clear()
                 self._parts[key] = self._assembled(prop, look, form, sizes, surfaces, words, shape_seed)
             assembly = self._parts[key]
+        scale = scale * prop.scale
         placed_parts, kept_faces = _placed(assembly.parts, position, yaw_deg, scale)
         if not placed_parts:
             raise AssetError(f"{prop.source}: no triangle of variant {look.name!r} has an area")

@@ -19,11 +19,12 @@ from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KE
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark", "life")
 Range = tuple[float, float]
 _CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells",
-                  "designs")  # fmt: skip
+                  "designs", "scale")  # fmt: skip
 _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "tells")
 _MIRRORS = ("x", "y", "xy")
 _MAX_PARTS = 1000
 _MAX_VALUE = 10_000.0
+_LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ class Category:
     front: str = ""
     identifying_parts: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
     designs: tuple[Design, ...] = (PLAIN,)  # Proportions that it comes in; the first is what its parts say
+    scale: float = 1.0  # Factor of all that its parts or its builder say
 
     def design(self, name: str) -> Design:
         """Look a design up; an `AssetError` names the nearest one."""
@@ -123,6 +125,9 @@ def parse_category(
     if isinstance(chosen, str) and chosen not in sets:
         raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
     designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
+    scale = body.get("scale", 1.0)
+    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _LEAST_SCALE <= scale <= _MOST_SCALE:
+        raise AssetError(f"{where}: scale must be a number from {_LEAST_SCALE:g} to {_MOST_SCALE:g}, got {scale!r}")
     known = [one.name for one in designs]
     for k, part in enumerate(parts):
         for one in designs_of(part):
@@ -143,6 +148,7 @@ def parse_category(
         front,
         identifying_parts,
         designs,
+        float(scale),
     )
 
 
