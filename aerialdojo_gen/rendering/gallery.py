@@ -91,13 +91,15 @@ def props_sheet(
 
 def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
     """Picture a scene from above, from four sides and twice at flying height; (H, W, 3) uint8 sRGB."""
-    return contact_sheet(*zip(*_scene_pictures(scene, width, height), strict=True), 3)
+    images, labels = zip(*_scene_pictures(scene, width, height), strict=True)
+    return contact_sheet(images, labels, 3)
 
 
 def scenes_sheet(scenes: Iterable[Scene], width: int = 320, height: int = 220) -> Image:
     """Picture scenes from above, from the south-west and at flying height; (H, W, 3) uint8 sRGB."""
-    pictures = [one for scene in scenes for one in _scene_pictures(scene, width, height, (0, 1, 5))]
-    return contact_sheet(*zip(*pictures, strict=True), 6)
+    pictures = (one for scene in scenes for one in _scene_pictures(scene, width, height, (0, 1, 5)))
+    images, labels = zip(*pictures, strict=True)
+    return contact_sheet(images, labels, 6)
 
 
 def _scene_pictures(
