@@ -25,11 +25,8 @@ _STAND, _WALK, _SIT, _WORK, _CALL = range(5)
 def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Person who stands, walks, sits, works bent or calls, in what the parameters dress them in."""
     posture = round(params["posture"])
-    seat_m = params["seat"]
     lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0}.get(posture, 0.0)
-    hip_m = (
-        seat_m + 0.11 if posture == _SIT else _HIP - (0.09 if posture == _WORK else 0.015 if posture == _WALK else 0)
-    )
+    hip_m = {_SIT: params["seat"] + 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
     upper = _upper(rng, params, posture, lean_deg)
     out = [
         (role, translated(rotated(body, rotation(0.0, lean_deg, 0.0)), vec(0.0, 0.0, hip_m))) for role, body in upper
