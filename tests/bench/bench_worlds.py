@@ -192,7 +192,7 @@ def main() -> int:
         if options.sheets is not None:
             papers = [build_plan(ASSETS / "scenes" / f"{kind}_{k}.toml", catalogue) for k in (0, 1)]
             sheet = scenes_sheet([*papers, *(world.scene for world in worlds if world.scene is not None)])
-            write_picture(sheet, options.sheets, f"worlds-{kind}.jpg", 1600)
+            write_picture(sheet, options.sheets, f"worlds-{kind}.jpg", 1280)
             for world in worlds:
                 world.scene = None
         everything += worlds
