@@ -1,14 +1,15 @@
 """What making worlds costs, how many draws are refused and why, and how unlike the worlds of a type are.
 
     python tests/bench/bench_worlds.py [--types U_* N_Coast] [--worlds 20] [--held-out 4] [--first-seed 1000]
-        [--sheets DIR]
+        [--sheets DIR] [--digests FILE]
 
 Makes worlds of every type and prints a Markdown table. Times are CPU seconds of a world, the refused draws before it
 among them. *Near*: share of the objects that have one of the same category within 5 m in another world of the type,
 mean over pairs of worlds (wanted: at most 10 %). *Alike*: share of the objects whose mesh, turned and moved, another
 world has too, mean over pairs (at most 20 %). *Relief*: median over pairs of the correlation of the heights seen from
 above, metre by metre about the middle (at most 0.3). Objects are what tasks may ask for, plants left out.
-`--sheets` writes a picture a type of the paper's two scenes, the first eight worlds and two that are held out.
+`--sheets` writes a picture a type of the paper's two scenes, the first eight worlds and two that are held out;
+`--digests` the SHA-256 of every plan, as `tests/golden/worlds.sha256` has them.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Made:
     """What is kept of a world."""
 
     seconds: float
+    digest: str  # Of its plan
     topology: str
     refused: list[str]
     nodes: int
@@ -100,7 +102,8 @@ def made(world: World, catalogue: Catalogue, pictured: bool) -> Made | str:
     for thing in things:
         places.setdefault(thing.category, []).append(thing.centroid[:2])
     return Made(
-        seconds, found.topology, [reason_of(*one) for one in found.refused], len(found.scene.instances),
+        seconds, hashlib.sha256(found.text.encode()).hexdigest(), found.topology,
+        [reason_of(*one) for one in found.refused], len(found.scene.instances),
         found.scene.n_triangles, {category: np.array(at) for category, at in places.items()},
         Counter(mesh_digest(thing) for thing in things), heights_of(found.scene), found.scene if pictured else None,
     )  # fmt: skip
@@ -164,6 +167,7 @@ def main() -> int:
     parser.add_argument("--held-out", type=int, default=4)
     parser.add_argument("--first-seed", type=int, default=1000)
     parser.add_argument("--sheets", type=Path)
+    parser.add_argument("--digests", type=Path)
     options = parser.parse_args()
     catalogue = load_catalogue(ASSETS)
     kinds = [kind for kind in type_names(ASSETS) if any(fnmatch(kind, one) for one in options.types)]
@@ -175,6 +179,7 @@ def main() -> int:
     reasons: Counter[str] = Counter()
     failures: list[str] = []
     meshes: set[str] = set()
+    digests: list[str] = []
     for kind in kinds:
         worlds, failed = [], 0
         for world in worlds_of(kind, options):
@@ -185,6 +190,7 @@ def main() -> int:
                 failed += 1
                 continue
             worlds.append(one)
+            digests.append(f"{one.digest}  {world.name}\n")
             reasons.update(f"{kind}{' held out' * world.held_out}: {reason}" for reason in one.refused)
             meshes |= one.meshes.keys()
         if worlds:
@@ -196,6 +202,8 @@ def main() -> int:
             for world in worlds:
                 world.scene = None
         everything += worlds
+    if options.digests is not None:
+        options.digests.write_text("".join(digests))
     refused = reasons.total() + len(failures) * MAX_DRAWS
     share = refused / max(refused + len(everything), 1)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
