@@ -63,9 +63,25 @@ def test_people_stand_where_people_walk(catalogue, built):
     assert on["people"] * 0.8 <= len(people) <= on["people"]
     for person in people:
         x, y, _ = person.centroid
+        if person.bounds[0, 2] > built.ground_z(float(x), float(y)) + 0.4:
+            assert on["decks"]
+            continue
         assert built.ground_material(float(x), float(y)).partition(":")[0] in on.get("ground", WALKED)
         assert np.abs(person.centroid[:2]).max() < max(built.head.size_m) / 2 - 3.0
     assert len({p.variant for p in people}) >= min(len(people), 6)
+
+
+def test_people_stand_on_platforms(catalogue):
+    """Away from the edges, and no more than two in five."""
+    scene = build_plan(ASSETS / "scenes" / "I_RailCorridor_0.toml", catalogue)
+    tops = [i.bounds for i in scene.instances if i.category == "platform"]
+    people = living(catalogue, scene.instances, {"person"})
+    above = [
+        p for p in people for low, high in tops
+        if (p.centroid[:2] > low[:2] + 0.4).all() and (p.centroid[:2] < high[:2] - 0.4).all()
+        and abs(p.bounds[0, 2] - high[2]) < 0.1
+    ]  # fmt: skip
+    assert 3 <= len(above) <= 0.4 * len(people) + 1
 
 
 def test_nobody_floats_or_stands_in_another(catalogue, built):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import shapely
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
@@ -38,6 +39,7 @@ _RIM_M = 4.0  # nobody stands at the edge of the world
 _ROOM_M, _NEXT_M = 0.8, 0.35  # free about a group's first, and about those who join them
 _APART_M = 1.6
 _LEVEL_M = 0.12  # most that the ground rises or falls under two feet
+_ON_DECKS, _EDGE_M = 0.4, 0.5
 _HERD_M = 9.0
 _DRY_M = 0.15
 _ELBOW_M = 0.6  # birds stand so far from one another
@@ -48,12 +50,14 @@ _LEDGE_M2 = (0.01, 40.0)  # a smaller face bears no bird, and on a large roof th
 @site_builder
 def life(
     site: Site, people: int = 0, who: Sequence[str] = ("town",), animals: dict[str, int] | None = None,
-    birds: dict[str, int] | None = None, ground: Sequence[str] = WALKED, stream: str = "life",
+    birds: dict[str, int] | None = None, ground: Sequence[str] = WALKED, decks: Sequence[str] = (),
+    stream: str = "life",
 ) -> None:  # fmt: skip
     """Set out people alone and in groups, animals in herds, and birds on walls, roofs and lamps.
 
     People come from the variants of ``person`` whose names begin with one of `who`; they and the animals stand on
     ground of the materials `ground`, where it is level and nothing else is. Where there is no room there are fewer.
+    Up to two in five of the people stand on structures of the categories `decks`: platforms, jetties, piers.
     """
     dressed = [v.name for v in site.catalogue["person"].variants if v.name.split("_")[0] in who]
     known = sorted({v.name.split("_")[0] for v in site.catalogue["person"].variants})
@@ -64,7 +68,8 @@ def life(
     spots = iter(poisson_disc(site.extent.buffer(-_RIM_M), _APART_M, rng, limit=6000))
     wet = [thing.bounds for thing in site.instances if any(p.material.startswith("water") for p in thing.parts)]
     spots = (spot for spot in spots if not _under_water(site, spot, wet))
-    _people(site, people, dressed, spots, ground, rng)
+    above = _on_decks(site, round(_ON_DECKS * people), dressed, decks, site.rng_for("life", stream, "decks"))
+    _people(site, people - above, dressed, spots, ground, rng)
     for category, number in (animals or {}).items():
         _herd(site, category, number, spots, ground, rng)
     for category, number in (birds or {}).items():
@@ -111,6 +116,32 @@ def _people(
             yaw = pose.yaw_deg + float(rng.uniform(-14.0, 14.0))
             person = Placement("person", pose.x, pose.y, yaw, look, params={"posture": posture})
             placed += site.place(person, "skip", settle_m=0.2) is not None
+
+
+def _on_decks(site: Site, number: int, dressed: Sequence[str], decks: Sequence[str], rng: np.random.Generator) -> int:
+    """Place people one by one on the level tops of structures, away from their edges; returns how many."""
+    placed = 0
+    spots = [spot for thing in site.instances if thing.category in decks for spot in _deck_spots(thing, rng)]
+    for k in rng.permutation(len(spots)):
+        pose, z = spots[int(k)]
+        if placed < number and site.is_free(pose.x, pose.y, _ROOM_M, z + 0.05):
+            look, posture = dressed[int(rng.integers(len(dressed)))], int(rng.choice([_STAND, _STAND, _WALK, _CALL]))
+            site.place(Placement("person", *pose, look, z=z, params={"posture": posture}))
+            placed += 1
+    return placed
+
+
+def _deck_spots(thing: Instance, rng: np.random.Generator) -> list[tuple[Pose, float]]:
+    """Poses on the height at which a structure has most level surface, and that height."""
+    corners, sizes = thing.vertices[thing.faces], areas(thing.vertices, thing.faces)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    level = (np.ptp(corners[:, :, 2], axis=1) < 1e-3) & (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0.0)
+    if not level.any():
+        return []
+    heights, which = np.unique(np.round(corners[level, 0, 2], 2), return_inverse=True)
+    k = int(np.argmax(np.bincount(which, weights=sizes[level])))
+    top = shapely.union_all(shapely.polygons(corners[level][which == k][:, :, :2]))
+    return [(pose, float(heights[k])) for pose in poisson_disc(top.buffer(-_EDGE_M), _APART_M, rng, limit=200)]
 
 
 def _beside(first: Pose, posture: int, k: int) -> Pose:

@@ -277,8 +277,7 @@ class Draft:
             kind: {c: n for c, (low, high) in of.items() if (n := self.whole(low, high, "life", c))}
             for kind, of in (("animals", life.animals), ("birds", life.birds))
         }
-        if life.ground:
-            some["ground"] = life.ground
+        some |= {"ground": life.ground, "decks": life.decks}
         self.section("People and animals")
         people = self.whole(*life.people, "life", "people")
         self.make("life", people=people, who=life.who, **{key: value for key, value in some.items() if value})

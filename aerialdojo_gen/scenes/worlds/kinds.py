@@ -91,6 +91,7 @@ class Life(_Strict):
     animals: dict[str, tuple[int, int]] = {}
     birds: dict[str, tuple[int, int]] = {}
     ground: list[str] = []  # Materials that they stand on, where these are not the builder's own
+    decks: list[str] = []  # Categories of structures on which people stand too
 
 
 class SceneType(_Strict):
