@@ -93,7 +93,11 @@ def _leans(instance: Instance, kind: str, feet: NDArray[np.int64]) -> bool:
     high = float(np.ptp(instance.bounds[:, 2]))
     # Whichever way it faces.
     foot, narrow = _narrow_side(instance.vertices[feet]), _narrow_side(instance.vertices)
-    return foot >= _LEAST_M and (kind == "vehicle" or high <= _SLENDER * narrow)
+    low = high <= _SLENDER * narrow
+    if kind == "vehicle":
+        # A boat on land lies on its keel.
+        return foot >= _LEAST_M or (low and narrow >= _LEAST_M)
+    return foot >= _LEAST_M and low
 
 
 def _narrow_side(points: Floats) -> float:

@@ -35,7 +35,8 @@ def head_of(noun):
 
 def test_every_category_has_synonyms_and_none_names_another_category(catalogue):
     by_category = {category: nouns(catalogue, category) for category in catalogue}
-    assert [category for category in catalogue if len(by_category[category]) < 2] == []
+    spoken_of = [category for category in catalogue if catalogue[category].kind != "life"]
+    assert [category for category in spoken_of if len(by_category[category]) < 2] == []
     names = {category: catalogue[category].name.lower() for category in catalogue}
     faults = [
         (category, noun, other)
