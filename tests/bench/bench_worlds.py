@@ -9,7 +9,7 @@ mean over pairs of worlds (wanted: at most 10 %). *Alike*: share of the objects 
 world has too, mean over pairs (at most 20 %). *Relief*: median over pairs of the correlation of the heights seen from
 above, metre by metre about the middle (at most 0.3). Objects are what tasks may ask for, plants left out.
 `--sheets` writes a picture a type of the paper's two scenes, the first eight worlds and two that are held out;
-`--digests` the SHA-256 of every plan, as `tests/golden/worlds.sha256` has them.
+`--digests` the SHA-256 of every plan.
 """
 
 from __future__ import annotations
