@@ -61,10 +61,6 @@ def plural(name: str) -> str:
     return name + "s"
 
 
-# People and animals move: what stands beside them is not described by them.
-LIFE = "life"
-
-
 @dataclass(frozen=True)
 class Words:
     """Words that drafts use for a category."""
@@ -124,7 +120,8 @@ def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] 
         collectives=tuple(entry.get("collective", ())),
         verbs=tuple((verb, participle) for verb, participle in verbs),
         group=str(entry.get("group", "")),
-        reference=bool(entry.get("reference", in_catalogue and kind != LIFE)),
+        # People and animals move: what stands beside them is not described by them.
+        reference=bool(entry.get("reference", in_catalogue and kind != "life")),
         target=bool(in_catalogue and target and entry.get("target", True)),
     )
 

@@ -18,6 +18,8 @@ from aerialdojo_gen.pipeline.stages.work.rules import settings_of
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
 from aerialdojo_gen.store.schemas import APPROACH, DIFFICULTY_COLUMNS, SETTINGS, SPLIT_COLUMNS, STOP, VIEWS
 
+# Shapes of imported meshes have no digest: `task_goal` compares that column, null or not.
+_SPLITS = tuple(name for name in SPLIT_COLUMNS if name != "shape_seen_in_train")
 _LENGTH_M = 1e-6
 # What FCL says of a body this much thinner or thicker counts: rounding does not.
 _THICKNESS_M = 1e-3
@@ -46,10 +48,6 @@ def _all_known(rows: Rows, *names: str) -> Mask:
 
 def _known(rows: Rows, name: str) -> Mask:
     return np.asarray(rows.column(name).is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)
-
-
-# Shapes of imported meshes have no digest: `task_goal` compares that column, null or not.
-_SPLITS = tuple(name for name in SPLIT_COLUMNS if name != "shape_seen_in_train")
 
 
 @check("routes", after=_OF_ROUTE)
