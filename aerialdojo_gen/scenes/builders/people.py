@@ -26,7 +26,7 @@ def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Person who stands, walks, sits, works bent or calls, in what the parameters dress them in."""
     posture = round(params["posture"])
     lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0}.get(posture, 0.0)
-    hip_m = {_SIT: params["seat"] + 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
+    hip_m = {_SIT: 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
     upper = _upper(rng, params, posture, lean_deg)
     out = [
         (role, translated(rotated(body, rotation(0.0, lean_deg, 0.0)), vec(0.0, 0.0, hip_m))) for role, body in upper
@@ -140,11 +140,8 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
     for side in (-1.0, 1.0):
         hip = vec(0.0, side * 0.092, hip_m)
         if posture == _SIT:
-            spread, seat_m = float(rng.uniform(0.0, 0.06)), hip_m - 0.11
-            if seat_m < 0.2:
-                knee, ankle = vec(0.33, side * (0.14 + spread), 0.43), vec(0.56, side * (0.13 + spread), _ANKLE)
-            else:
-                knee, ankle = vec(0.42, side * (0.11 + spread), hip_m - 0.02), vec(0.44, side * 0.11, _ANKLE)
+            spread = float(rng.uniform(0.0, 0.06))
+            knee, ankle = vec(0.33, side * (0.14 + spread), 0.43), vec(0.56, side * (0.13 + spread), _ANKLE)
         elif posture == _WALK:
             ahead = -side * 24.0
             knee = hip + _THIGH * _way(ahead, 0.0)
@@ -154,19 +151,12 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
             apart = 0.15 if posture == _WORK else 0.105
             bend = 0.09 if posture == _WORK else 0.012
             knee, ankle = vec(bend, side * (apart + 0.01), _KNEE), vec(-0.01 + bend / 2, side * apart, _ANKLE)
+        thigh = [hip + vec(0.0, 0.0, 0.03), hip, (hip + knee) / 2]
+        shin = [(hip + knee) / 2, knee, (knee + ankle) / 2, ankle]
         out += [
-            (
-                "legs",
-                limb([hip + vec(0.0, 0.0, 0.03), hip, (hip + knee) / 2], [0.08, 0.094 * stout, 0.08 * stout], 7),
-            ),
-            (
-                bare,
-                limb([(hip + knee) / 2, knee, (knee + ankle) / 2, ankle], [0.078 * stout, 0.061, 0.056, 0.042], 6),
-            ),
-            (
-                ("legs" if bare == "legs" else "skin"),
-                translated(sphere(radii=(0.063, 0.061, 0.063), subdivisions=0), knee),
-            ),
+            ("legs", limb(thigh, [0.08, 0.094 * stout, 0.08 * stout], 7)),
+            (bare, limb(shin, [0.078 * stout, 0.061, 0.056, 0.042], 6)),
+            (bare, translated(sphere(radii=(0.063, 0.061, 0.063), subdivisions=0), knee)),
         ]
         toe = 24.0 if posture == _WALK and side > 0 else 0.0
         shoe = merge([
@@ -179,8 +169,8 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
             [(0, 0, _KNEE + 0.02), (0, 0, hip_m - 0.02), (0, 0, hip_m + 0.12)], [0.26, 0.185 * stout, 0.15], 12
         )
         out.append(("legs", stretched(skirt, np.array([0.85, 1.0, 1.0]))))
-    if posture == _SIT and hip_m < 0.3:
-        # Who sits on the ground sits on it: the trunk's end is round.
+    if posture == _SIT:
+        # They sit on the ground: the trunk's end is round.
         out.append(("legs", translated(sphere(radii=(0.15, 0.19 * stout, 0.13)), vec(0.02, 0.0, hip_m))))
     return out
 
