@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -90,6 +92,7 @@ class TriangleRayCaster:
         if not len(self._face):
             raise ValueError("no triangle with an area to cast rays at")
         self._corner, self._normal = triangles[self._face, 0], normals[self._face]
+        self._corners, self._normals = triangles, normals
         self._centre = (triangles.min(axis=(0, 1)) + triangles.max(axis=(0, 1))) / 2.0
         self._scene = EmbreeScene(robust=True)
         TriangleMesh(
@@ -97,6 +100,12 @@ class TriangleRayCaster:
             (np.asarray(vertices, dtype=np.float64) - self._centre).astype(np.float32),
             np.ascontiguousarray(faces[self._face], dtype=np.int32),
         )
+
+    @cached_property
+    def triangles(self) -> tuple[Floats, Floats]:
+        """Corners (n, 3, 3), world metres, and unit normals (n, 3) of all faces: of a face without area, zeros."""
+        length = np.linalg.norm(self._normals, axis=1, keepdims=True)
+        return self._corners, self._normals / np.where(length > 0.0, length, 1.0)
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
         """First hit along rays (origins and directions (n, 3), world metres).

@@ -13,8 +13,8 @@ from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.geometry.start_visibility import start_visibility, view_of
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import start_visibility, view_of
 
 coordinates = st.floats(-50, 50)
 BALL = instance("ball", trimesh.creation.icosphere(3, radius=0.5).apply_translation([10.0, 0.0, 2.0]))
@@ -42,7 +42,7 @@ def test_a_view_has_the_points_that_its_camera_has(point, place, yaw):
         assume(abs(depth) > 1e-6 and np.abs(np.abs(uv - 50.0) - 50.0).min() > 1e-6)
         holds.append(bool(depth > 0 and (np.abs(uv - 50.0) <= 50.0).all()))
     assert sum(holds) <= 1
-    found = view_of(np.array([point]), np.array([[*place, yaw]]))[0]
+    found = view_of(np.array([point]), np.array([[*place, yaw]]))[0, 0]
     assert found == (holds.index(True) if any(holds) else -1)
 
 

@@ -15,8 +15,8 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.rays import instance_caster
+from aerialdojo_gen.geometry.start_visibility import start_visibility
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.geometry.viewpoints import start_visibility
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.scenes.model import Instance
@@ -29,7 +29,7 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
     """Pair the shortlisted anchors of every object with the selected anchor of every other one.
 
     Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`. Of every other
-    one it is said how much of the target the start sees (`aerialdojo_gen.geometry.viewpoints.start_visibility`).
+    one it is said how much of the target the start sees (`aerialdojo_gen.geometry.start_visibility`).
     """
     anchors = job.read("anchors")
     object_id = anchors["object_id"].to_numpy()
