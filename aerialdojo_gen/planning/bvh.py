@@ -1,7 +1,8 @@
 """A bounding-volume hierarchy of triangles for queries inside numba kernels.
 
 The tree is implicit: node i has children 2i and 2i + 1, the leaves are the last level, and leaf j holds triangles
-``LEAF*j`` to ``LEAF*(j+1)`` of an array sorted along a Morton curve: two plain arrays, no pointers.
+``LEAF*j`` to ``LEAF*(j+1)`` of a sorted array: two plain arrays, no pointers. Every node's triangles are split in the
+middle of its longest axis: a query visits half the nodes of a tree along a Morton curve, which is built faster.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.triangles import morton_codes, point_triangle_d2, segment_triangle_d2
+from aerialdojo_gen.geometry.triangles import point_triangle_d2, segment_triangle_d2
 
 LEAF = 4
 _STACK = 64
@@ -20,16 +21,70 @@ def build_bvh(
     triangles: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Sort triangles (n, 9) into a tree: sorted triangles, node boxes (2 m, 6; row 0 unused) and the order."""
-    n = len(triangles)
-    order = np.arange(n)
-    if n:
-        centres = triangles.reshape(-1, 3, 3).mean(axis=1)
-        order = np.argsort(morton_codes(centres), kind="stable")
-        triangles = np.ascontiguousarray(triangles[order])
     leaves = 1
-    while leaves * LEAF < n:
+    while leaves * LEAF < len(triangles):
         leaves *= 2
+    order = _split_at_medians(triangles.reshape(-1, 3, 3).mean(axis=1), leaves)
+    triangles = np.ascontiguousarray(triangles[order])
     return triangles, _node_boxes(triangles, leaves), order
+
+
+@njit(cache=True)
+def _split_at_medians(centres: NDArray[np.float64], leaves: int) -> NDArray[np.int64]:
+    """Order of the triangles with these centres (n, 3) in a tree of so many leaves; all but the last are full."""
+    order = np.arange(len(centres))
+    stack = np.empty((_STACK, 3), np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2] = 0, len(centres), leaves
+    top = 1
+    while top > 0:
+        top -= 1
+        first, last, slots = stack[top]
+        middle = first + slots // 2 * LEAF
+        if slots == 1 or first >= last:
+            continue
+        if middle < last:
+            _partition(order, centres[:, _longest_axis(order[first:last], centres)], first, last, middle)
+        stack[top, 0], stack[top, 1], stack[top, 2] = first, min(middle, last), slots // 2
+        stack[top + 1, 0], stack[top + 1, 1], stack[top + 1, 2] = middle, last, slots // 2
+        top += 2
+    return order
+
+
+@njit(cache=True)
+def _longest_axis(rows: NDArray[np.int64], centres: NDArray[np.float64]) -> int:
+    """Axis along which some centres lie furthest apart."""
+    best, longest = 0, -1.0
+    for axis in range(3):
+        low, high = np.inf, -np.inf
+        for k in rows:
+            low, high = min(low, centres[k, axis]), max(high, centres[k, axis])
+        if high - low > longest:
+            best, longest = axis, high - low
+    return best
+
+
+@njit(cache=True)
+def _partition(order: NDArray[np.int64], keys: NDArray[np.float64], first: int, last: int, middle: int) -> None:
+    """Put the smallest keys of a range of `order` before `middle`, and the others from there on (quickselect)."""
+    last -= 1
+    while first < last:
+        pivot = keys[order[(first + last) // 2]]
+        i, j = first, last
+        while i <= j:
+            while keys[order[i]] < pivot:
+                i += 1
+            while keys[order[j]] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            last = j
+        elif middle >= i:
+            first = i
+        else:
+            return
 
 
 @njit(cache=True)

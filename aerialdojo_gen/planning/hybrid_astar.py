@@ -3,9 +3,12 @@
 A state is (x, y, z, heading): positions are continuous, headings 15° apart from the start's yaw, duplicates are
 states of one cell and heading sector. An edge is a translation together with the turns that it needs: to fly in any
 of the 24 directions the body turns until that direction lies ahead, to its left or to its right, whichever takes
-fewer turns. Turning adds nothing to the length, so every action carries a small cost that breaks ties. The Approach,
-with the turns before it, is an edge to the goal like any other, and so is the direct path
-(`aerialdojo_gen.planning.direct`), which ends most searches early.
+fewer turns. Turning adds nothing to the length, so every action carries a small cost that breaks ties.
+
+The Approach, with the turns before it, is an edge to the goal, and so is the direct path
+(`aerialdojo_gen.planning.direct`), which ends most searches early. Two thirds of the expansions would go into proving
+that the best one found is the best there is, which it mostly is: so the search ends where no other can be cheaper by
+a tolerance that grows with the expansions.
 
 Edges are pushed unchecked and tested for collisions when they are popped (lazy evaluation): most never are. Their
 clearance cost is computed then too, and an edge that costs more is pushed again.
@@ -39,14 +42,13 @@ from aerialdojo_gen.planning.translations import (
     wrap_heading,
 )
 
-# Edges to the goal: the Approach alone, and the direct path.
-_TO_GOAL, _DIRECT = N_TRANSLATIONS, N_TRANSLATIONS + 1
-# Once one is known, another must be cheaper by this to be tried.
+# Once a way to the goal is known, a direct path must be cheaper by this to be tried.
 _MIN_GAIN_M = 0.1
 # The direct path is tried from states nearer than all before, and from every fourth of the others.
 _DIRECT_EVERY = 4
 # Factor on the direct path's clearance cost: the search may still find a clearer one.
 _CLEARANCE_FACTOR = 3.0
+_MAX_TOLERANCE_M = 2.0
 # When a direction's shortest step is worse than the state by this, its longer steps are pushed when it is popped.
 _DEFERRED, _DEFER_MARGIN_M = 100, 0.3
 
@@ -94,11 +96,12 @@ class SearchOptions(NamedTuple):
     sideways: float
     prefer: Preference  # Costs other than metres and actions
     goal_tolerance: float  # An edge to the goal is accepted though another may be cheaper by this, metres
+    tolerance_growth: float  # Added to it by every expansion, up to `_MAX_TOLERANCE_M`
 
 
 def make_search_arrays(budget: int) -> SearchArrays:
     """Reserve memory for searches of up to `budget` expansions; untouched pages cost nothing."""
-    n, edges = budget + 2, (budget + 2) * (N_TRANSLATIONS + 2)
+    n, edges = budget + 2, (budget + 2) * N_TRANSLATIONS
     slots = 1 << max(10, math.ceil(math.log2(4 * n)))
     return SearchArrays(
         np.empty((n, 3)), np.empty(n), np.empty(n, np.int8), np.empty(n, np.int8), np.empty(n, np.int32),
@@ -202,30 +205,32 @@ def search(
     # The start is an edge from nowhere.
     edge_parent[0], edge_move[0], edge_next[0], heads[0] = -1, 0, -1, 0
     n, n_edges, lowest, highest = 0, 1, 0, -1
-    nearest = np.inf
+    nearest, best, best_parent, best_is_direct = np.inf, np.inf, -1, False
     legs, metres = np.zeros(3, np.int64), np.zeros(3, np.int64)
     no_moves = np.empty(0, np.int8)
     while True:
-        # 1. Take the cheapest edge.
+        # 1. Find the cheapest edge, and end the search if the best one to the goal is as good.
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
+        tolerance = min(o.goal_tolerance + o.tolerance_growth * n, max(_MAX_TOLERANCE_M, o.goal_tolerance))
+        if best - tolerance < (lowest + 1) * _BUCKET_M:
+            found_moves = _backtrack(best_parent, parents, moves)
+            if best_is_direct:
+                x, y, z = pose[best_parent, 0], pose[best_parent, 1], pose[best_parent, 2]
+                direct_legs(
+                    x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
+                )  # fmt: skip
+                found_moves = append_legs(found_moves, legs, metres)
+            return FOUND, n, found_moves
         if lowest == _N_BUCKETS:
             return EXHAUSTED, n, no_moves
+        # 2. Take it.
         if lowest > highest:
             highest = lowest
             s.highest[0] = f0 + (lowest + 1) * _BUCKET_M
         entry, level = heads[lowest], lowest
         heads[lowest] = edge_next[entry]
         parent, move = edge_parent[entry], int(edge_move[entry])
-        # 2. An edge to the goal ends the search.
-        if move == _TO_GOAL:
-            return FOUND, n, _backtrack(parent, parents, moves)
-        if move == _DIRECT:
-            x, y, z = pose[parent, 0], pose[parent, 1], pose[parent, 2]
-            direct_legs(
-                x, y, z, start[3], goal, goal_yaw, 0.0, np.inf, o.radius, o.approach, o.prefer, grid, legs, metres
-            )  # fmt: skip
-            return FOUND, n, append_legs(_backtrack(parent, parents, moves), legs, metres)
         # 3. Of a direction whose longer steps were deferred, push them now.
         clearance_known = move < 0
         if clearance_known:
@@ -282,7 +287,7 @@ def search(
         keys[slot], stamps[slot] = key, now
         pose[n, 0], pose[n, 1], pose[n, 2] = x, y, z
         cost[n], headings[n], moves[n], parents[n] = g, heading, move, parent
-        # 7. Push the edges to the goal: the Approach, and the direct path.
+        # 7. Keep the best edge to the goal: the Approach, or the direct path.
         gap = math.sqrt((x - goal[0]) ** 2 + (y - goal[1]) ** 2 + (z - goal[2]) ** 2)
         if gap <= o.approach and segment_free(x, y, z, goal[0], goal[1], goal[2], o.radius, grid, False):
             f = g + gap + o.action_cost * (turns_between(heading, goal_heading) + 1) - f0
@@ -290,26 +295,22 @@ def search(
                 goal[0] - x, goal[1] - y, goal_yaw, gap, o.prefer.ahead_cos, o.prefer.approach_penalty
             )
             f += clearance_penalty(x, y, z, goal[0], goal[1], goal[2], near_m, near_weight, ox, oy, oz, edge, field)
-            f -= o.goal_tolerance
-            if f < f_max:
-                f_max = f
-                lowest = min(lowest, _push(f, n, _TO_GOAL, n_edges, edge_parent, edge_move, edge_next, heads))
-                n_edges += 1
+            if f < best:
+                best, best_parent, best_is_direct = f, n, False
         h = cost_between(x, y, z, ox, oy, oz, edge, cost_to_go)
         direct, extra = np.inf, 0.0
-        max_direct = f_max + f0 + o.goal_tolerance - g - _MIN_GAIN_M
+        max_direct = best + f0 - g - _MIN_GAIN_M
         if h <= max_direct and (h < nearest or n % _DIRECT_EVERY == 0):
             direct, extra = direct_legs(
                 x, y, z, start[3], goal, goal_yaw, h, max_direct, o.radius, o.approach, o.prefer, grid, legs, metres
             )  # fmt: skip
         nearest = min(nearest, h)
         if direct < np.inf:
-            f = g + direct + _CLEARANCE_FACTOR * extra - f0 - o.goal_tolerance
+            f = g + direct + _CLEARANCE_FACTOR * extra - f0
             f += o.action_cost * count_actions(heading, goal_heading, legs, metres)
-            if f < f_max:
-                f_max = f
-                lowest = min(lowest, _push(f, n, _DIRECT, n_edges, edge_parent, edge_move, edge_next, heads))
-                n_edges += 1
+            if f < best:
+                best, best_parent, best_is_direct = f, n, True
+        f_max = min(f_max, best - tolerance)
         # 8. Push the translations: in every direction the steps that stay inside, then up and down.
         f_near = g + o.weight * h - f0 + _DEFER_MARGIN_M
         for m in range(0, N_FLAT, N_STEPS):

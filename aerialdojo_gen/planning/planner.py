@@ -287,7 +287,7 @@ class Planner:
             options = SearchOptions(
                 g.radius_m + attempt.extra_radius_m, attempt.weight, c.action_cost_m, c.max_approach_m,
                 attempt.budget, attempt.duplicate_cell_m, attempt.heading_sectors, c.sideways_actions_per_m,
-                self._prefer, _GOAL_TOLERANCE_M,
+                self._prefer, _GOAL_TOLERANCE_M, attempt.tolerance_growth_m,
             )  # fmt: skip
             result = plan_once(start, goal[:3], heading, cost, g.arrays, memory, options, self.radius_m, g.cap_m)
             expansions += result.expansions
