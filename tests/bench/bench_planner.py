@@ -95,7 +95,11 @@ def main() -> None:
 
     t_field, plans, routes, certificates, whole = [], [], [], [], 0.0
     exact = Planner(
-        scene, PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25),)), RADIUS
+        scene,
+        PlanConfig(
+            ladder=(SearchAttempt(weight=0.97, budget=400_000, duplicate_cell_m=0.25, tolerance_growth_m=0.0),)
+        ),
+        RADIUS,
     )
     ratios = []
     for _ in range(options.targets):

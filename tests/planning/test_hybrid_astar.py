@@ -184,7 +184,9 @@ def test_no_route_makes_a_loop_where_the_way_across_is_free():
 def test_routes_are_as_short_as_an_exhaustive_search_finds():
     _, triples = planned()
     # Weight below 1 / 1.028: the cost-to-go never overestimates, so that the search is exhaustive.
-    plain = PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=150_000, duplicate_cell_m=0.25, tolerance_growth_m=0.0),))
+    plain = PlanConfig(
+        ladder=(SearchAttempt(weight=0.97, budget=150_000, duplicate_cell_m=0.25, tolerance_growth_m=0.0),)
+    )
     exact = Planner(town(), plain, RADIUS)
     ratios = []
     for k in (0, 25, 50):

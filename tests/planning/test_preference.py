@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
-from aerialdojo_gen.base.config.sections import PlanConfig
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.dataset.episode import Reference, fly, shortcoming
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.difficulty import agent_actions, difficulty_of, straight_lines_free
@@ -20,7 +20,12 @@ from aerialdojo_gen.planning.preference import clearance_penalty
 from aerialdojo_gen.store.schemas import APPROACH
 
 RADIUS = 0.25
-INDIFFERENT = PlanConfig(clearance_weight=0.0, max_approach_angle_deg=180.0)
+# The shortest there is: the control that preferences are seen against.
+INDIFFERENT = PlanConfig(
+    clearance_weight=0.0,
+    max_approach_angle_deg=180.0,
+    ladder=(SearchAttempt(weight=1.05, budget=20_000, tolerance_growth_m=0.0),),
+)
 
 
 @lru_cache(maxsize=1)
