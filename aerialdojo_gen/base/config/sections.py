@@ -151,7 +151,7 @@ class SearchAttempt(Section):
     heading_sectors: Literal[1, 2, 3, 4, 6, 8, 12, 24] = Field(1, description="headings told apart in a cell")
     extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
     tolerance_growth_m: float = Field(
-        0.004,
+        0.002,
         ge=0,
         le=1,
         description="a route is taken though another may be cheaper by 0.15 m, and by this an expansion: at most 2 m",
