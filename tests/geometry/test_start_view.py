@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.handmade import box, instance, scene
 
@@ -86,3 +86,23 @@ def test_poses_are_judged_each_by_itself():
     for k, pose in enumerate(poses):
         one, which = start_visibility(caster, own, POINTS, pose[None])
         assert (one[0], which[0]) == (share[k], view[k])
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_triangles_that_hide_points_for_certain_change_nothing(seed):
+    """Most rays are never cast: shares and views are those that rays to all points give."""
+    rng = np.random.default_rng(seed)
+    low = np.column_stack([rng.uniform(-9, 7, (6, 2)), np.zeros(6)])
+    high = low + rng.uniform(0.1, 5.0, (6, 3))
+    world = scene(BALL, *(instance(f"box_{k}", box(a, b)) for k, (a, b) in enumerate(zip(low, high, strict=True))))
+    caster, own = TriangleRayCaster(*soup(world.instances)), instance_caster(BALL)
+    poses = np.column_stack([rng.uniform(-14, 20, (20, 2)), rng.uniform(0, 7, 20), rng.uniform(-3, 3, 20)])
+    view, ends = view_of(POINTS, poses), (poses[:, None, :3], POINTS[None])
+    rays = [np.broadcast_to(end, (20, len(POINTS), 3)).reshape(-1, 3) for end in ends]
+    seen = caster.unobstructed(*rays).reshape(view.shape) & (view >= 0)
+    whole = (own.unobstructed(*rays).reshape(view.shape) | seen).sum(axis=1)
+    share, best = start_visibility(caster, own, POINTS, poses)
+    assert (share == np.where(seen.any(axis=1), seen.sum(axis=1) / np.maximum(whole, 1), 0.0)).all()
+    votes = np.stack([(seen & (view == k)).sum(axis=1) for k in range(len(VIEWS))], axis=1)
+    assert (best == np.where(seen.any(axis=1), votes.argmax(axis=1), -1)).all()

@@ -198,6 +198,15 @@ def test_routes_are_as_short_as_an_exhaustive_search_finds():
     assert max(ratios) <= 1.10
 
 
+def test_a_tolerance_that_grows_saves_expansions_and_costs_little_length():
+    _, triples = planned()
+    steady = PlanConfig(ladder=(SearchAttempt(weight=1.05, budget=20_000, tolerance_growth_m=0.0),))
+    goal, starts, routes = triples[0][0], [s for _, s, _ in triples[:25]], [r for _, _, r in triples[:25]]
+    proven = Planner(town(), steady, RADIUS).plan_target(goal, starts)
+    assert sum(r.expansions for r in routes) < 0.9 * sum(r.expansions for r in proven)
+    assert sum(r.length_m for r in routes) < 1.005 * sum(r.length_m for r in proven)
+
+
 def test_planning_again_gives_the_same_routes():
     _, triples = planned()
     again = Planner(town(), PlanConfig(), RADIUS)
