@@ -48,7 +48,7 @@ _MIN_GAIN_M = 0.1
 _DIRECT_EVERY = 4
 # Factor on the direct path's clearance cost: the search may still find a clearer one.
 _CLEARANCE_FACTOR = 3.0
-_MAX_TOLERANCE_M = 2.0
+_MAX_TOLERANCE_M = 1.0
 # When a direction's shortest step is worse than the state by this, its longer steps are pushed when it is popped.
 _DEFERRED, _DEFER_MARGIN_M = 100, 0.3
 

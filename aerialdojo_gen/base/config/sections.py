@@ -154,7 +154,7 @@ class SearchAttempt(Section):
         0.002,
         ge=0,
         le=1,
-        description="a route is taken though another may be cheaper by 0.15 m, and by this an expansion: at most 2 m",
+        description="a route is taken though another may be cheaper by 0.15 m, and by this an expansion: at most 1 m",
     )
 
 
