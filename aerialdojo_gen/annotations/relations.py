@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
@@ -53,6 +54,11 @@ class SceneGeometry:
         self._corners: dict[int, Floats] = {}
         self._covers: dict[int, frozenset[int]] = {}
         self._level_faces: dict[int, NDArray[np.intp]] = {}
+
+    @classmethod
+    def of(cls, scene: Scene) -> SceneGeometry:
+        """Return the scene context's geometry."""
+        return context_of(scene).part("geometry", lambda: cls(scene))
 
     @cached_property
     def _tree(self) -> shapely.STRtree:

@@ -9,6 +9,7 @@ from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -46,6 +47,11 @@ class Vocabulary:
         self.nouns = [
             noun_of(self._drop_false_colour(i), w) for i, w in zip(scene.instances, self.words, strict=True)
         ]
+
+    @classmethod
+    def of(cls, scene: Scene, catalogue: Catalogue) -> Vocabulary:
+        """Return the scene context's vocabulary of a catalogue."""
+        return context_of(scene).part("vocabulary", lambda: cls(scene, catalogue), catalogue)
 
     def _drop_false_colour(self, instance: Instance) -> Instance:
         """Remove a colour attribute that the surface does not support."""

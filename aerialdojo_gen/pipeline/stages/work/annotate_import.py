@@ -14,6 +14,7 @@ from aerialdojo_gen.annotations.check import check_source
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Annotations, parse_annotations
 from aerialdojo_gen.annotations.positions import Fault
+from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
@@ -33,9 +34,9 @@ def run(job: Job, config: AnnotateImportConfig) -> Output:
     except UnicodeDecodeError as error:
         raise AnnotationError(f"{path} is not UTF-8: {error}") from None
     source = parse_annotations(text)
-    vocabulary = Vocabulary(job.scene_model(), load_catalogue(job.roots.scene_assets))
+    vocabulary = Vocabulary.of(job.scene_model(), load_catalogue(job.roots.scene_assets))
     counts = paper_counts().get(job.scene) if config.paper_counts else None
-    checked = check_source(source, vocabulary, counts)
+    checked = check_source(source, vocabulary, counts, SceneGeometry.of(vocabulary.scene))
     if checked.faults or checked.claims is None:
         raise AnnotationError(_report(path, checked.faults))
     tables = annotation_tables(source.annotations, checked.claims)
