@@ -22,31 +22,22 @@ _FRONT, _LEFT, _RIGHT, _DOWN = (VIEWS.index(view) for view in ("front", "left", 
 
 
 @njit(cache=True)
-def _view(px: float, py: float, pz: float, cos: float, sin: float) -> int:
-    """View that a direction lies in, world frame; the first one of `VIEWS` where two meet, -1 behind and above."""
-    forward, left = cos * px + sin * py, cos * py - sin * px
-    x, y, z = abs(forward), abs(left), abs(pz)
-    if forward > 0 and y <= x and z <= x:
+def view_towards(x: float, y: float, z: float, cos: float, sin: float) -> int:
+    """Index into `VIEWS` of the 90° view that holds a direction, world frame, at a yaw with this cosine and sine.
+
+    The first one where two meet; -1 behind and above.
+    """
+    forward, left = cos * x + sin * y, cos * y - sin * x
+    ahead, across, up = abs(forward), abs(left), abs(z)
+    if forward > 0 and across <= ahead and up <= ahead:
         return _FRONT
-    if left > 0 and x <= y and z <= y:
+    if left > 0 and ahead <= across and up <= across:
         return _LEFT
-    if left < 0 and x <= y and z <= y:
+    if left < 0 and ahead <= across and up <= across:
         return _RIGHT
-    if pz < 0 and x <= z and y <= z:
+    if z < 0 and ahead <= up and across <= up:
         return _DOWN
     return -1
-
-
-@njit(cache=True)
-def view_of(points: Floats, poses: Floats) -> Codes:
-    """Index into `VIEWS` of the 90° view that holds each point (m, 3) for each pose (n, 4): (n, m), -1 for none."""
-    out = np.empty((len(poses), len(points)), np.int8)
-    for i in range(len(poses)):
-        cos, sin = np.cos(poses[i, 3]), np.sin(poses[i, 3])
-        for k in range(len(points)):
-            x, y, z = points[k, 0] - poses[i, 0], points[k, 1] - poses[i, 1], points[k, 2] - poses[i, 2]
-            out[i, k] = _view(x, y, z, cos, sin)
-    return out
 
 
 @njit(cache=True)
@@ -96,7 +87,7 @@ def _hidden(planes: Floats, x: float, y: float, z: float) -> bool:
 def _undecided(
     points: Floats, box: Floats, poses: Floats, faces: Ints, triangles: Floats, normals: Floats
 ) -> tuple[Ints, Ints, Codes]:
-    """Poses and points that no triangle among the pose's faces (n, p) surely parts, with their views: none is -1."""
+    """Poses and points in a view that no triangle among the pose's faces (n, p) surely parts, with their views."""
     n, m = len(poses), len(points)
     row, column, view, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), np.empty(n * m, np.int8), 0
     left, planes = np.empty(m, np.int32), np.empty((4, 4))
@@ -134,7 +125,7 @@ def _undecided(
             many = kept
         for n_left in range(many):
             k = left[n_left]
-            seen_by = _view(points[k, 0] - eye[0], points[k, 1] - eye[1], points[k, 2] - eye[2], cos, sin)
+            seen_by = view_towards(points[k, 0] - eye[0], points[k, 1] - eye[1], points[k, 2] - eye[2], cos, sin)
             if seen_by >= 0:
                 row[count], column[count], view[count] = i, k, seen_by
                 count += 1
@@ -170,4 +161,4 @@ def _left_to_cast(scene: TriangleRayCaster, points: Floats, poses: Floats) -> tu
     origins = np.repeat(poses[:, :3], len(probes), axis=0)
     _, faces = scene.first_hit(origins, np.tile(probes, (len(poses), 1)) - origins)
     box = np.stack([points.min(axis=0), points.max(axis=0)])
-    return _undecided(points, box, poses, faces.reshape(len(poses), -1), *scene.triangles)
+    return _undecided(points, box, poses, faces.reshape(len(poses), len(probes)), *scene.triangles)

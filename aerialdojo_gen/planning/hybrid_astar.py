@@ -212,7 +212,7 @@ def search(
         # 1. Find the cheapest edge, and end the search if the best one to the goal is as good.
         while lowest < _N_BUCKETS and heads[lowest] < 0:
             lowest += 1
-        tolerance = min(o.goal_tolerance + o.tolerance_growth * n, max(_MAX_TOLERANCE_M, o.goal_tolerance))
+        tolerance = min(o.goal_tolerance + o.tolerance_growth * n, _MAX_TOLERANCE_M)
         if best - tolerance < (lowest + 1) * _BUCKET_M:
             found_moves = _backtrack(best_parent, parents, moves)
             if best_is_direct:

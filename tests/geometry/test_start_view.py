@@ -13,7 +13,7 @@ from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.geometry.start_visibility import start_visibility, view_of
+from aerialdojo_gen.geometry.start_visibility import start_visibility, view_towards
 from aerialdojo_gen.geometry.surface import Surface
 
 coordinates = st.floats(-50, 50)
@@ -42,7 +42,7 @@ def test_a_view_has_the_points_that_its_camera_has(point, place, yaw):
         assume(abs(depth) > 1e-6 and np.abs(np.abs(uv - 50.0) - 50.0).min() > 1e-6)
         holds.append(bool(depth > 0 and (np.abs(uv - 50.0) <= 50.0).all()))
     assert sum(holds) <= 1
-    found = view_of(np.array([point]), np.array([[*place, yaw]]))[0, 0]
+    found = view_towards(*np.subtract(point, place), math.cos(yaw), math.sin(yaw))
     assert found == (holds.index(True) if any(holds) else -1)
 
 
@@ -98,7 +98,10 @@ def test_triangles_that_hide_points_for_certain_change_nothing(seed):
     world = scene(BALL, *(instance(f"box_{k}", box(a, b)) for k, (a, b) in enumerate(zip(low, high, strict=True))))
     caster, own = TriangleRayCaster(*soup(world.instances)), instance_caster(BALL)
     poses = np.column_stack([rng.uniform(-14, 20, (20, 2)), rng.uniform(0, 7, 20), rng.uniform(-3, 3, 20)])
-    view, ends = view_of(POINTS, poses), (poses[:, None, :3], POINTS[None])
+    view = np.array(
+        [[view_towards(*p - pose[:3], math.cos(pose[3]), math.sin(pose[3])) for p in POINTS] for pose in poses]
+    )
+    ends = poses[:, None, :3], POINTS[None]
     rays = [np.broadcast_to(end, (20, len(POINTS), 3)).reshape(-1, 3) for end in ends]
     seen = caster.unobstructed(*rays).reshape(view.shape) & (view >= 0)
     whole = (own.unobstructed(*rays).reshape(view.shape) | seen).sum(axis=1)

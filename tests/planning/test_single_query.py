@@ -182,6 +182,6 @@ def test_planning_one_trajectory_is_a_single_query():
     (route,) = Planner(town(), PlanConfig(), RADIUS).plan_target(ends[1], [ends[0]])
     assert route.outcome == "SOLVED"
     same(plan(town(), *ends), route)
-    exhaustive = PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=50_000),))
+    exhaustive = PlanConfig(ladder=(SearchAttempt(weight=0.97, budget=50_000, tolerance_growth_m=0.0),))
     (route,) = Planner(town(), exhaustive, RADIUS).plan_target(ends[1], [ends[0]])
     same(plan(town(), *ends, config=exhaustive), route)
