@@ -53,15 +53,26 @@ class _Shapes(threading.local):
 
 
 @njit(cache=True)
-def _boxes_touching(
-    boxes: NDArray[np.float64], lx: float, ly: float, lz: float, hx: float, hy: float, hz: float
+def _boxes_on_the_way(
+    boxes: NDArray[np.float64], ax: float, ay: float, az: float, bx: float, by: float, bz: float, r: float
 ) -> NDArray[np.int64]:
-    """Rows of boxes (n, 6) that the box (l, h) touches."""
+    """Rows of boxes (n, 6) that the segment ab enters once they are wider by r on all sides."""
     found = np.empty(len(boxes), np.int64)
     n = 0
     for k in range(len(boxes)):
         b = boxes[k]
-        if b[0] <= hx and b[3] >= lx and b[1] <= hy and b[4] >= ly and b[2] <= hz and b[5] >= lz:
+        # Slabs: the part of the segment, 0 to 1, that is between the planes of each axis.
+        first, last = 0.0, 1.0
+        for a, way, low, high in (
+            (ax, bx - ax, b[0] - r, b[3] + r), (ay, by - ay, b[1] - r, b[4] + r), (az, bz - az, b[2] - r, b[5] + r),
+        ):  # fmt: skip
+            if abs(way) < 1e-12:
+                if a < low or a > high:
+                    last = -1.0
+            else:
+                enter, leave = (low - a) / way, (high - a) / way
+                first, last = max(first, min(enter, leave)), min(last, max(enter, leave))
+        if first <= last:
             found[n] = k
             n += 1
     return found[:n]
@@ -155,10 +166,7 @@ class CollisionWorld:
     ) -> bool:  # fmt: skip
         """Whether a shape, all of it within a radius of the segment ab, touches a surface."""
         r = radius_m + _BOX_MARGIN_M
-        candidates = _boxes_touching(
-            self._boxes, min(ax, bx) - r, min(ay, by) - r, min(az, bz) - r, max(ax, bx) + r, max(ay, by) + r,
-            max(az, bz) + r,
-        )  # fmt: skip
+        candidates = _boxes_on_the_way(self._boxes, ax, ay, az, bx, by, bz, r)
         return any(fcl.collide(self._object(k), shape, self._request) for k in candidates.tolist())
 
 

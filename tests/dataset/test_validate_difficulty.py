@@ -1,7 +1,11 @@
 """Wrong words on difficulty and on the splits, each found by a check of its own and by no other."""
 
+import numpy as np
+from support.handmade import box, instance
 from support.planting import check
 
+from aerialdojo_gen.dataset.validate.difficulty import _edge_on
+from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
 
 SIDES = ("routes/train", "routes/test")
@@ -41,6 +45,13 @@ def test_wrong_words_on_difficulty(planted):
         used.add(row["nav_id"])
         expected.setdefault(found_by, []).append(f"nav_id={row['nav_id']}")
     assert check(planted) == {name: sorted(keys) for name, keys in expected.items()}
+
+
+def test_points_of_a_face_that_is_seen_edge_on_may_count_or_not():
+    """Single precision meets such a face anywhere along itself: N_Forest_0 has a table as high as a start."""
+    own = instance_caster(instance("table", box((0, 0, 0), (2, 1, 1))))
+    top = np.column_stack([np.linspace(0.1, 1.9, 19), np.full(19, 0.5), np.ones(19)])
+    assert [_edge_on(own, np.array([-10.0, 0.5, z]), top) for z in (1.0, 1.001, 1.2, 4.0)] == [19, 19, 0, 0]
 
 
 def test_a_release_of_an_older_version_is_not_at_fault(planted):

@@ -12,7 +12,7 @@ from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
-from aerialdojo_gen.geometry.rays import instance_caster
+from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
 from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
@@ -30,6 +30,8 @@ _SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
 _WHOLE = 1e-6
 # Rays to points of the object that meet its own edges: so many at least, and one in so many.
 _EITHER_WAY, _ONE_IN = 2, 128
+# Sine of the angle between a ray and a face, below which it is met centimetres before or behind.
+_EDGE_ON = 2e-3
 _UNSEEN = "nothing is seen, and no view is named"
 _OF_ROUTE = (
     "list_lengths_differ", "action_order", "n_actions", "route_length", "euclidean_distance", "replay_differs",
@@ -147,30 +149,26 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for k, row in data.sampled_routes(*_OF_ROUTE):
         if np.isfinite(stored[row]):
             of_target.setdefault(int(data.target_of_route[row]), []).append(k)
-    camera = Camera(2, 2, 90.0)
     for target, routes in of_target.items():
         item = things.get(str(nodes[target])) if target >= 0 else None
         if item is None:
             continue
         points = surface_points(data.scene, ids[target], item, n)
-        origins, aims = np.repeat(paths.starts[routes, :3], n, axis=0), np.tile(points, (len(routes), 1))
-        facing = instance_caster(item).unobstructed(origins, aims).reshape(-1, n)
-        open_air = mesh.rays.visible(origins, aims).reshape(-1, n)
-        for k, bare, clear in zip(routes, facing, open_air, strict=True):
-            position, yaw = paths.starts[k, :3], float(paths.starts[k, 3])
-            free = bare & clear
-            shown = [free & _in_picture(camera, view_pose(position, yaw, view), points) for view in VIEWS]
-            share = float(np.any(shown, axis=0).sum() / max(bare.sum(), 1))
-            best = {
-                view for view, seen in zip(VIEWS, shown, strict=True) if seen.sum() == np.sum(shown, axis=1).max()
-            }
-            row = int(paths.rows[k])
+        starts = np.repeat(paths.starts[routes], n, axis=0)
+        own, aims = instance_caster(item), np.tile(points, (len(routes), 1))
+        facing = own.unobstructed(starts[:, :3], aims)
+        free = np.flatnonzero(facing)
+        free = free[mesh.rays.visible(starts[free, :3], aims[free])]
+        inside = _in_pictures(starts[free], aims[free])
+        by_view = np.stack([np.bincount(free[shown] // n, minlength=len(routes)) for shown in inside])
+        in_any = np.bincount(free[inside.any(axis=0)] // n, minlength=len(routes))
+        for k, seen, some, bare in zip(routes, by_view.T, in_any, facing.reshape(-1, n).sum(axis=1), strict=True):
+            row, whole = int(paths.rows[k]), max(int(bare), 1)
+            share, best = float(some) / whole, {VIEWS[view] for view in np.flatnonzero(seen == seen.max())}
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
-            whole, either_way = max(int(bare.sum()), 1), max(_EITHER_WAY, n // _ONE_IN)
-            counted = stored[row] * np.arange(max(whole - either_way, 1), whole + either_way + 1)
-            if (
-                abs(share - stored[row]) > (either_way + 0.5) / whole
-                or np.abs(counted - np.rint(counted)).min() > _WHOLE
+            either_way = max(_EITHER_WAY, n // _ONE_IN)
+            if not _is_share(stored[row], share, whole, either_way) and not _is_share(
+                stored[row], share, whole, either_way + _edge_on(own, paths.starts[k, :3], points)
             ):
                 yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
@@ -178,10 +176,33 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"visible_view_at_start = {views[row]}", expected)
 
 
-def _in_picture(camera: Camera, pose: Floats, points: Floats) -> Mask:
-    uv, depth = project(camera, pose, points)
-    inside = (uv >= 0.0).all(axis=1) & (uv <= (camera.width, camera.height)).all(axis=1)
-    return np.asarray((depth > 0.0) & inside)
+def _is_share(stored: float, share: float, whole: int, either_way: int) -> bool:
+    """Whether a stored share is one of about so many whole points, and near the one found anew."""
+    counted = stored * np.arange(max(whole - either_way, 1), whole + either_way + 1)
+    return bool(
+        abs(share - stored) <= (either_way + 0.5) / whole and np.abs(counted - np.rint(counted)).min() <= _WHOLE
+    )
+
+
+def _edge_on(own: TriangleRayCaster, start: Floats, points: Floats) -> int:
+    """Count the points (m, 3) whose face is seen edge-on: rays in single precision meet it anywhere along itself."""
+    rays = points - start
+    face = own.first_hit(np.tile(start, (len(points), 1)), rays)[1]
+    slope = (own.triangles[1][face] * rays).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
+    return int(((face >= 0) & (np.abs(slope) < _EDGE_ON)).sum())
+
+
+def _in_pictures(starts: Floats, points: Floats) -> Mask:
+    """Whether points (n, 3) are inside the pictures of each view from their starts (n, 4): (views, n)."""
+    off = points - starts[:, :3]
+    c, s = np.cos(starts[:, 3]), np.sin(starts[:, 3])
+    local = np.column_stack([c * off[:, 0] + s * off[:, 1], c * off[:, 1] - s * off[:, 0], off[:, 2]])
+    camera = Camera(2, 2, 90.0)
+    inside = []
+    for view in VIEWS:
+        uv, depth = project(camera, view_pose(np.zeros(3), 0.0, view), local)
+        inside.append((depth > 0.0) & (uv >= 0.0).all(axis=-1) & (uv <= (camera.width, camera.height)).all(axis=-1))
+    return np.array(inside)
 
 
 @check("tasks", needs=("routes",), after=_OF_TASK)

@@ -22,6 +22,8 @@ _BLANK = 2.0
 # Rays are cast through every so many pixels: all of them take a tenth of a second a picture.
 _EVERY = 4
 _SHARE, _EDGE = 0.002, 0.03
+# Pixels around an object's box in which parts of it are looked for: the box is right to the step of the rays.
+_AROUND = 2 * _EVERY
 # Least number of pixels of a recognisable part: 7 x 7 of 320 x 320.
 _TELL_SHARE = 0.0005
 _SAME_PLACE = 1e-6
@@ -133,14 +135,18 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
 
 
-@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "object_node", "image_pose"))
+@check(
+    "objects",
+    needs=("mesh",),
+    after=("image_missing", "image_damaged", "image_box", "image_target", "object_node", "image_pose"),
+)
 def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture says which of the parts that make its object's name true it does not show."""
     mesh = scene_mesh(data)
     first = dict(zip(mesh.rays.nodes, np.cumsum([0, *(len(i.faces) for i in mesh.scene.instances)]), strict=False))
     nodes, shown, missing = rows.texts("mesh_node"), rows.floats("tells_shown"), rows.texts("tells_missing")
-    triangles, places = triangle_caster(mesh.scene), rows.floats(*POSE)
-    for row, picture in _decoded(data, rows):
+    triangles, places, boxes = triangle_caster(mesh.scene), rows.floats(*POSE), rows.floats(*_BOX).reshape(-1, 4)
+    for row, picture in _decoded(data, rows, "image_box"):
         place = places[row]
         anatomy = mesh.scene[str(nodes[row])].anatomy if nodes[row] in mesh.scene else None
         tells = () if anatomy is None else anatomy.identifying_parts
@@ -151,10 +157,11 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
             continue
         camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
         pose = view_pose(place[:3], float(place[3]), "front")
-        hit = (
-            triangles.first_hit(pose[:3, 3], camera.rays().reshape(-1, 3) @ pose[:3, :3].T)[1]
-            - first[str(nodes[row])]
-        )
+        rays = camera.rays()
+        if np.isfinite(boxes[row]).all():
+            u0, v0, u1, v1 = boxes[row].astype(int).tolist()
+            rays = rays[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
+        hit = triangles.first_hit(pose[:3, 3], rays.reshape(-1, 3) @ pose[:3, :3].T)[1] - first[str(nodes[row])]
         counts = {tell: int(np.isin(hit, mesh.scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
         least = _TELL_SHARE * picture.size
         stored = [word for word in (missing[row] or "").split(", ") if word]

@@ -122,12 +122,12 @@ class Paths:
         """Poses of the k-th route."""
         return slice(int(self.first[k]), int(self.first[k + 1]))
 
-    @property
+    @cached_property
     def starts(self) -> Floats:
         """First poses, (n, 4) float64: metres and radians."""
         return np.column_stack([self.xyz[self.first[:-1]], self.yaw[self.first[:-1]]])
 
-    @property
+    @cached_property
     def ends(self) -> Floats:
         """Last poses, (n, 4) float64: metres and radians."""
         return np.column_stack([self.xyz[self.first[1:] - 1], self.yaw[self.first[1:] - 1]])
