@@ -127,6 +127,12 @@ def smoke(project: Path, shared: Path) -> Path:
     return data
 
 
+@pytest.fixture(scope="session")
+def worlds_cache(shared: Path) -> Path:
+    """A cache of worlds from seeds that the session's processes have in common; whoever asks first makes a world."""
+    return shared / "worlds"
+
+
 @pytest.fixture
 def planted(smoke: Path, tmp_path: Path) -> Planted:
     """A copy of the smoke run's release and meshes, to plant faults in; its scene is U_Courtyard_0."""

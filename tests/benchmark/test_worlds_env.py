@@ -27,14 +27,9 @@ def episodes(env: gymnasium.Env, n: int) -> list[tuple[str, str]]:
     return found
 
 
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("worlds")
-
-
 @pytest.mark.slow
-def test_episodes_go_through_worlds_that_are_made_once(cache: Path) -> None:
-    env = gymnasium.make("AerialDojo-v0", **GIVEN, cache=cache)
+def test_episodes_go_through_worlds_that_are_made_once(worlds_cache: Path) -> None:
+    env = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
     first = episodes(env, 6)
     env.close()
     worlds = [world for world, _ in first]
@@ -42,16 +37,19 @@ def test_episodes_go_through_worlds_that_are_made_once(cache: Path) -> None:
     assert worlds[0] == worlds[1]
     assert worlds[2] == worlds[3] != worlds[0]
     assert all(task.startswith(world) for world, task in first)
-    made = {path: path.stat().st_mtime_ns for path in cache.glob("*/*/data/release/tasks/**/*.parquet")}
+    tasks = "*/*/data/release/tasks/**/*.parquet"
+    made = {path: path.stat().st_mtime_ns for path in worlds_cache.glob(tasks)}
     assert made
-    again = gymnasium.make("AerialDojo-v0", **GIVEN, cache=cache)
+    again = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
     assert episodes(again, 6) == first, "the seed alone decides worlds and tasks"
     again.reset(options={"world": "N_Snowfield-1001"})
     assert again.unwrapped.world == "N_Snowfield-1001"
     with pytest.raises(UsageError, match="no world 'N_Snowfield-1002'"):
         again.reset(options={"world": "N_Snowfield-1002"})
     again.close()
-    assert {path: path.stat().st_mtime_ns for path in cache.glob("*/*/data/release/tasks/**/*.parquet")} == made
+    assert {
+        path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/tasks/**/*.parquet")
+    } == made
 
 
 def test_closing_stops_the_process_that_makes_a_world(tmp_path: Path) -> None:

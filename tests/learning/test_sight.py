@@ -89,6 +89,7 @@ def test_what_is_seen_is_learned_apart_from_all_else(trained):
     assert all(torch.equal(with_it[name], tensor) for name, tensor in without.items())
 
 
+@pytest.mark.nightly
 def test_killed_while_it_learns_to_see_it_goes_on_and_ends_the_same(smoke, cache, trained, tmp_path):
     file, out = tmp_path / "own.toml", tmp_path / "out"
     file.write_text(TEXT % 12)

@@ -157,6 +157,7 @@ def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_pa
         train(smoke, other, out=learned.policy.parent, cache=cache, device="cpu", workers=1)
 
 
+@pytest.mark.nightly
 def test_to_restart_is_to_learn_anew(smoke, cache, learned, tmp_path):
     out = tmp_path / "again"
     options = {"out": out, "cache": cache, "device": "cpu", "workers": 1}
@@ -365,6 +366,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
             assert episode.path_length_m <= route.length_m * 1.02 + 0.1
 
 
+@pytest.mark.nightly
 def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache, learned, tmp_path):
     own = tmp_path / "drawn"
     again = recipe(train={"epochs": 1}, dagger={"rounds": 1, "episodes": 4, "epochs": 1, "teacher_share": 0.0})

@@ -45,7 +45,7 @@ def open_edges(parts):
     return places[np.column_stack([ways // len(places), ways % len(places)])[lacking]]
 
 
-@pytest.mark.parametrize("name", [nightly_unless(k % 8 == 0, name) for k, name in enumerate(sorted(USES))])
+@pytest.mark.parametrize("name", [nightly_unless(k % 16 == 0, name) for k, name in enumerate(sorted(USES))])
 def test_what_a_builder_makes_is_sound_or_refused_in_a_line(name):
     built = 0
     for use, label in islice(settings_of(name, USES[name]), SETTINGS):
