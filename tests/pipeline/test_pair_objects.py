@@ -123,9 +123,9 @@ def test_a_pair_whose_shortest_route_is_as_long_as_the_limit_is_too_far(tmp_path
 
 def test_points_of_two_objects_are_drawn_apart():
     balls = [instance(f"ball_{k}", trimesh.creation.icosphere(2, radius=0.4)) for k in range(2)]
-    first, second = (pair_objects.surface_points(SCENE, k, ball, 16) for k, ball in enumerate(balls))
+    first, second = (pair_objects.surface_points(SCENE, k, ball, 16)[0] for k, ball in enumerate(balls))
     assert not (first == second).any()
-    assert (pair_objects.surface_points(SCENE, 0, balls[0], 16) == first).all()
+    assert (pair_objects.surface_points(SCENE, 0, balls[0], 16)[0] == first).all()
 
 
 def test_start_variants_limits_starts_and_not_goals(tmp_path):

@@ -12,7 +12,7 @@ from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
-from aerialdojo_gen.geometry.rays import TriangleRayCaster, instance_caster
+from aerialdojo_gen.geometry.rays import instance_caster
 from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id
@@ -153,10 +153,10 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
         item = things.get(str(nodes[target])) if target >= 0 else None
         if item is None:
             continue
-        points = surface_points(data.scene, ids[target], item, n)
+        points, normals = surface_points(data.scene, ids[target], item, n)
         starts = np.repeat(paths.starts[routes], n, axis=0)
-        own, aims = instance_caster(item), np.tile(points, (len(routes), 1))
-        facing = own.unobstructed(starts[:, :3], aims)
+        aims = np.tile(points, (len(routes), 1))
+        facing = instance_caster(item).unobstructed(starts[:, :3], aims)
         free = np.flatnonzero(facing)
         free = free[mesh.rays.visible(starts[free, :3], aims[free])]
         inside = _in_pictures(starts[free], aims[free])
@@ -168,7 +168,7 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
             either_way = max(_EITHER_WAY, n // _ONE_IN)
             if not _is_share(stored[row], share, whole, either_way) and not _is_share(
-                stored[row], share, whole, either_way + _edge_on(own, paths.starts[k, :3], points)
+                stored[row], share, whole, either_way + _edge_on(paths.starts[k, :3], points, normals)
             ):
                 yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
@@ -184,12 +184,10 @@ def _is_share(stored: float, share: float, whole: int, either_way: int) -> bool:
     )
 
 
-def _edge_on(own: TriangleRayCaster, start: Floats, points: Floats) -> int:
+def _edge_on(start: Floats, points: Floats, normals: Floats) -> int:
     """Count the points (m, 3) whose face is seen edge-on: rays in single precision meet it anywhere along itself."""
     rays = points - start
-    face = own.first_hit(np.tile(start, (len(points), 1)), rays)[1]
-    slope = (own.triangles[1][face] * rays).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-9)
-    return int(((face >= 0) & (np.abs(slope) < _EDGE_ON)).sum())
+    return int((np.abs((normals * rays).sum(axis=1)) < _EDGE_ON * np.linalg.norm(rays, axis=1)).sum())
 
 
 def _in_pictures(starts: Floats, points: Floats) -> Mask:

@@ -70,9 +70,9 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
     return Output({"pairs": table}, rows_in=len(keep), rows_out=table.num_rows, counts=counts)
 
 
-def surface_points(scene: str, object_id: int, item: Instance, n: int) -> Floats:
-    """Draw the points of an object that starts are judged by, (n, 3) float64, metres, world frame."""
-    return Surface.of(item).sample(n, generator(0, "pair-objects", scene, object_id))
+def surface_points(scene: str, object_id: int, item: Instance, n: int) -> tuple[Floats, Floats]:
+    """Draw the points of an object that starts are judged by, and their normals, (n, 3) each, world metres."""
+    return Surface.of(item).sample_normals(n, generator(0, "pair-objects", scene, object_id))
 
 
 def _seen_at_start(
@@ -94,7 +94,7 @@ def _seen_at_start(
                 f"run {command('annotate-import', scene=job.scene)}"
             )
         rows = np.flatnonzero(targets == target)
-        points = surface_points(job.scene, target, item, config.surface_points)
+        points, _ = surface_points(job.scene, target, item, config.surface_points)
         share[rows], view[rows] = start_visibility(caster, instance_caster(item), points, starts[rows])
     return share, view
 
