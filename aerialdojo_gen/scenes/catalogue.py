@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -74,14 +74,19 @@ class Catalogue:
         roles: Mapping[str, str] | None = None,
         attributes: Mapping[str, str] | None = None,
         design: str | None = None,
+        stretch: tuple[float, float, float] | None = None,
     ) -> Instance:
         """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order.
 
-        Its design is the first of its category where none is given. `scale` multiplies the category's own.
+        Its design is the first of its category where none is given. `scale` multiplies the category's own, `stretch`
+        the design's.
         """
         prop = self[category]
         look = self._draw_variant(prop, variant, rng)
         form = prop.designs[0] if design is None else prop.design(design)
+        if stretch is not None:
+            x, y, z = (own * factor for own, factor in zip(form.stretch, stretch, strict=True))
+            form = replace(form, name=f"{form.name} {x:.4f} {y:.4f} {z:.4f}", stretch=(x, y, z))
         sizes = self._draw_params(prop, look, {**form.params, **(params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
         surfaces = dict(prop.roles) | dict(look.roles) | dict(roles or {})

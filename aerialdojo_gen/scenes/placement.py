@@ -35,6 +35,7 @@ class Placement:
     node: str | None = None  # The next free one of the category where absent
     design: str | None = None  # One of the scene's side, drawn for the node, where absent
     scale: float = 1.0
+    stretch: tuple[float, float, float] | None = None  # Factors along its own axes, beside its design's
     params: Mapping[str, float] | None = None
     roles: Mapping[str, str] | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)

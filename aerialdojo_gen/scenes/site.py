@@ -148,7 +148,7 @@ class Site:
         attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
         options: dict[str, Any] = {
             "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
-            "roles": thing.roles, "attributes": attributes or None,
+            "stretch": thing.stretch, "roles": thing.roles, "attributes": attributes or None,
             "design": thing.design or self.design(thing.category, name),
         }  # fmt: skip
         instance = self.catalogue.instantiate(

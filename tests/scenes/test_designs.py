@@ -13,7 +13,7 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.designs import of_side, parse_designs
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.plans.build import build_plan
+from aerialdojo_gen.scenes.plans.build import build_plan, build_tables
 
 ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 # Made to a standard, joined to what stands beside them, or varied by their own builder.
@@ -68,6 +68,27 @@ def test_what_is_round_stays_round(catalogue, category, part, axes):
         round_m[design.name] = extents[0] / extents[1]
         assert part != "tyre" or abs(thing.bounds[0, 2]) < 0.02
     assert np.allclose(list(round_m.values()), round_m["plain"], rtol=1e-4), round_m
+
+
+def test_vehicles_in_bays_differ_beside_their_designs_and_stand_on_round_wheels(catalogue):
+    bays = {"make": "parking_rows", "rows": [[0, 0, 90, 24]], "occupancy": 1.0, "vehicles": {"sedan": 1.0}}
+    plan = {"plan": 1, "seed": 3, "size_m": [80, 40], "ceiling_m": 12, "sky": "#a9c6e8"}
+    plain = np.ptp(made(catalogue, "sedan", "plain").bounds, axis=0)
+    for differ, different in ((0.0, range(1, 11)), (0.06, [24])):
+        cars = [
+            thing
+            for thing in build_tables("U_Test_0", plan | {"site": [bays | {"differ": differ}]}, catalogue).instances
+            if thing.category == "sedan"
+        ]
+        assert len(cars) == 24
+        assert len({car.shape for car in cars}) in different
+        for car in cars:
+            tyre = car.vertices[car.faces[car.copies_of("tyre")[0]]].reshape(-1, 3)
+            assert abs(car.bounds[0, 2]) < 0.02
+            # Its radius is the same ahead and upwards: along x and y the car's yaw mixes it with the tyre's width.
+            around = np.linalg.norm(np.ptp(tyre, axis=0)[:2])
+            assert np.ptp(tyre[:, 2]) < around < 1.3 * np.ptp(tyre[:, 2])
+            assert (np.abs(np.ptp(car.bounds, axis=0)[2] / plain[2] - 1.0) < 0.25).all()
 
 
 def test_out_of_distribution_scenes_have_held_out_designs(catalogue):

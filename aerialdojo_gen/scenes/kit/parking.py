@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated
 
@@ -32,6 +33,8 @@ _Count = Annotated[int, Field(ge=1, le=200)]
 _Levels = Annotated[int, Field(ge=2, le=3)]
 _Row = tuple[Number, Number, Number, _Count]
 _Box = tuple[Number, Number, Number, Number]
+# How much the proportions of vehicles differ beside their designs, as a share: 0 in scenes that were drawn before.
+_Differ = Annotated[Number, Field(ge=0, le=0.1)]
 _Weights = Annotated[dict[str, Annotated[float, Field(gt=0)]], Field(min_length=1)]
 
 
@@ -39,25 +42,26 @@ _Weights = Annotated[dict[str, Annotated[float, Field(gt=0)]], Field(min_length=
 def parking_rows(
     site: Site, *, rows: list[_Row], bay_m: tuple[Number, Number] = (2.6, 5.2), material: Material = "marking",
     marks: bool = True, occupancy: _Share = 0.0, phrase: str = "", on: Number | None = None,
-    vehicles: _Weights = VEHICLES,
+    vehicles: _Weights = VEHICLES, differ: _Differ = 0.0,
 ) -> None:  # fmt: skip
     """Mark rows of parking bays, and park vehicles in a share of them.
 
     A row is (x, y, yaw_deg, count): the middle of its closed side, the direction towards it, and the number of bays
-    of (width, depth). Vehicles are categories and how often they come; `on` is the floor's height, the ground's by
-    default, and above the ground no bays are marked.
+    of (width, depth). Vehicles are categories and how often they come; their proportions differ by a share of
+    `differ` from their designs. `on` is the floor's height, the ground's by default, and above it no bays are marked.
     """
     bays: list[Pose] = []
     for x, y, yaw_deg, count in rows:
         floor = on if marks else 0.0
         bays += grammar_streets.parking_row(site, x, y, yaw_deg, count, bay_m=bay_m, z=floor, material=material)
-    park_cars(site, bays, occupancy, phrase, z=on, kinds=vehicles)
+    park_cars(site, bays, occupancy, phrase, z=on, kinds=vehicles, differ=differ)
 
 
 @site_builder
 def slanted_bays(
     site: Site, *, rows: list[tuple[Number, Number, bool, _Count]], slant_deg: Number = 60.0, pitch_m: Number = 3.1,
     depth_m: Number = 5.0, occupancy: _Share = 0.0, phrase: str = "", vehicles: _Weights = VEHICLES,
+    differ: _Differ = 0.0,
 ) -> None:  # fmt: skip
     """Mark slanted bays along x from a point eastwards, and park vehicles in a share of them.
 
@@ -73,12 +77,12 @@ def slanted_bays(
             site.paint(Polygon([(x, y), (x + 0.16, y), (x + 0.16 + c, far), (x + c, far)]), "marking")
             if k < count:
                 bays.append(Pose(x + (pitch_m + c) / 2, y + up * depth_m / 2, up * slant_deg))
-    park_cars(site, bays, occupancy, phrase, kinds=vehicles)
+    park_cars(site, bays, occupancy, phrase, kinds=vehicles, differ=differ)
 
 
 def park_cars(
     site: Site, bays: Sequence[Pose], occupancy: float, place: str, *, z: float | None = None,
-    kinds: Mapping[str, float] = VEHICLES,
+    kinds: Mapping[str, float] = VEHICLES, differ: float = 0.0,
 ) -> None:  # fmt: skip
     """Park vehicles in a share of bays (middle, and the way in), some backwards and none quite straight."""
     names, weights = list(kinds), np.array(list(kinds.values()))
@@ -90,6 +94,9 @@ def park_cars(
         yaw = bay.yaw_deg + (180.0 if rng.random() < 0.25 else 0.0) + rng.uniform(-2.0, 2.0)
         shift = rng.uniform(-0.15, 0.15)
         car = Placement(category, bay.x + shift, bay.y - shift, yaw, DRAWN, z, attributes={"place": place})
+        if differ:
+            x, y, z_ = np.round(rng.uniform(1.0 - differ, 1.0 + differ / 2, 3), 3).tolist()
+            car = replace(car, stretch=(x, y, z_))
         site.place(car, "skip")
 
 
@@ -131,13 +138,13 @@ def parking_deck(
 @site_builder
 def deck_cars(
     site: Site, *, box: _Box, levels: _Levels = 3, level_m: Number = 3.7, occupancy: _Share,
-    vehicles: _Weights = VEHICLES,
+    vehicles: _Weights = VEHICLES, differ: _Differ = 0.0,
 ) -> None:  # fmt: skip
     """Park vehicles in a share of the bays of a parking deck, which has the same `box` and levels."""
     for k in range(levels):
         name = "ground floor" if k == 0 else "roof" if k == levels - 1 else "middle floor"
         parking_rows(site, rows=_rows(*box), marks=False, occupancy=occupancy, on=k * level_m if k else None,
-                     phrase=f"on the {name} of the parking deck", vehicles=vehicles)  # fmt: skip
+                     phrase=f"on the {name} of the parking deck", vehicles=vehicles, differ=differ)  # fmt: skip
 
 
 def _rows(x0: float, y0: float, x1: float, y1: float) -> list[_Row]:

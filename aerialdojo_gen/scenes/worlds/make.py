@@ -14,7 +14,7 @@ from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.kinds import load_type
 from aerialdojo_gen.scenes.worlds.types import generator_of
-from aerialdojo_gen.scenes.worlds.world import VERSION, World
+from aerialdojo_gen.scenes.worlds.world import World, version_of
 
 MAX_DRAWS = 12
 MAX_BYTES = 50_000
@@ -39,8 +39,8 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
     AssetError
         The type, a knob or the version of the generator is unknown, or no draw makes a sound scene.
     """
-    if world.version != VERSION:
-        raise AssetError(f"{world.name}: generator version {world.version} is not this one's, which is {VERSION}")
+    if world.version != (today := version_of(world.type)):
+        raise AssetError(f"{world.name}: generator version {world.version} is not this one's, which is {today}")
     kind = load_type(world.type, scene_assets, catalogue)
     refused: list[tuple[str, str]] = []
     for trial in range(MAX_DRAWS):

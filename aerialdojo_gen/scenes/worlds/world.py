@@ -9,8 +9,9 @@ from typing import Literal
 
 from aerialdojo_gen.base.errors import AssetError
 
-# Raised when a generator gives another plan for a seed: plans of older versions are refused by name.
-VERSION = 2
+# A generator's version is raised when it gives another plan for a seed: plans of older versions are refused by name.
+# Those of the other types are at version 2.
+VERSIONS = {"U_Community": 3, "U_Mall": 3, "U_ParkingLot": 3}
 # Seeds of the test and of the validation worlds; all that follow are for training.
 TEST_SEEDS, VALIDATION_SEEDS = range(200), range(200, 1000)
 MAX_SEED = 2**31 - 1
@@ -25,7 +26,11 @@ class World:
     seed: int
     knobs: Mapping[str, float] = field(default_factory=dict)  # Those that a user set; the others are drawn
     held_out: bool = False  # Topologies, palettes and props that no other world has
-    version: int = VERSION
+    version: int = 0  # Of its generator: today's where none is given
+
+    def __post_init__(self) -> None:
+        """Resolve the version."""
+        object.__setattr__(self, "version", self.version or version_of(self.type))
 
     @property
     def name(self) -> str:
@@ -36,6 +41,11 @@ class World:
     def side(self) -> Literal["test", "validation", "train"]:
         """Side of the splits, by the seed alone."""
         return "test" if self.seed in TEST_SEEDS else "validation" if self.seed in VALIDATION_SEEDS else "train"
+
+
+def version_of(kind: str) -> int:
+    """Today's version of a type's generator."""
+    return VERSIONS.get(kind, 2)
 
 
 def is_world(name: str) -> bool:

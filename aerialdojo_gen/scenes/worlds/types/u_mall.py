@@ -31,7 +31,7 @@ def write(draft: Draft) -> None:
     draft.section("The street")
     half = street_along(draft, [(-w, -d + 5.6), (w, -d + 5.6)])
     mall = _TOPOLOGIES[draft.topology](draft, Box(-w + 3.0, -d + 5.6 + half + 1.2, w - 3.0, d - 3.0))
-    mall = mall if flip > 0 else _mirrored(mall)
+    mall = _with_gardens(draft, mall if flip > 0 else _mirrored(mall))
     draft.section("Car parks")
     for k, lot in enumerate(mall.lots):
         _car_park(draft, lot, k)
@@ -64,6 +64,20 @@ def _mirrored(mall: _Mall) -> _Mall:
 
     shops = [(over([box])[0], tuple((180.0 - side) % 360.0 for side in sides)) for box, sides in mall.shops]
     return _Mall(shops, over(mall.stores), over(mall.courts), over(mall.lanes), over(mall.lots))
+
+
+def _with_gardens(draft: Draft, mall: _Mall) -> _Mall:
+    """Leave car parks two or three double rows deep; what is behind them is paved or planted for people."""
+    lots, gardens = [], []
+    for k, lot in enumerate(mall.lots):
+        deep = 5.4 + draft.whole(2, 3, "double rows", k) * (2 * _DEPTH_M + _AISLE_M)
+        if lot.depth < deep + 12.0:
+            lots.append(lot)
+            continue
+        lots.append(lot._replace(y1=lot.y0 + deep))
+        gardens.append(lot._replace(y0=lot.y0 + deep + 1.5))
+        edge_slots(draft, "tree", gardens[-1].grown(-1.2), 5.5, (3.0, 3.0))
+    return mall._replace(courts=[*mall.courts, *gardens], lots=lots)
 
 
 def _shops(draft: Draft, mall: _Mall) -> None:
@@ -106,7 +120,7 @@ def _car_park(draft: Draft, lot: Box, k: int) -> None:
             draft.slot("island", at, y - 2.2, 90.0, (2.2, 4.0))
         y += 2 * _DEPTH_M + _AISLE_M
     if rows:
-        draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
+        draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
         for u, v, _, many in rows[::2]:
             draft.take(shapely.box(u - many * _BAY_M / 2, v - _DEPTH_M, u + many * _BAY_M / 2, v + _DEPTH_M))
     edge_slots(draft, "verge", lot.grown(-1.4), 5.6, (3.0, 3.0))

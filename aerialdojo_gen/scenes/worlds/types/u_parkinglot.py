@@ -97,7 +97,7 @@ def _rows(draft: Draft, lot: Box) -> None:
         y += 2 * _DEPTH_M + _AISLE_M
     if not rows:
         raise NoRoomError("no room for a row of bays")
-    draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"))
+    draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
     for x, y, yaw, n in rows:
         for k in range(int(n)):
             draft.slot("bays", x + (k + 0.5 - n / 2) * _BAY_M, y - (2.5 if yaw > 0 else -2.5), yaw, (5.0, 2.5))
@@ -130,7 +130,7 @@ def _fishbone(draft: Draft, lot: Box) -> None:
         y += 17.6
     if not rows:
         raise NoRoomError("no room for a row of bays")
-    draft.make("slanted_bays", rows=rows, occupancy=draft.knob("occupancy"))
+    draft.make("slanted_bays", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
 
 
 def _deck(draft: Draft, lot: Box) -> None:
@@ -144,7 +144,7 @@ def _deck(draft: Draft, lot: Box) -> None:
     levels = draft.whole(2, 3, "levels")
     colour = draft.material("steel")
     draft.make("parking_deck", box=box, levels=levels, band=colour, tower=f"tiles:{colour}", **{"as": "deck_roof"})
-    draft.make("deck_cars", box=box, levels=levels, occupancy=draft.knob("occupancy"))
+    draft.make("deck_cars", box=box, levels=levels, occupancy=draft.knob("occupancy"), differ=0.06)
     draft.take(Box(*box).grown(6.0).shape())
     for x, y in grid(Box(*box).grown(-4.0), 5.4):
         draft.slot("wheels", x, y, 0.0, (2.4, 1.4), on="deck_roof")
