@@ -57,9 +57,11 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
             area.mkdir(parents=True, exist_ok=True)
             item.mkdir()
             lease = (item / _LEASE).open("x+", encoding="utf-8", errors="surrogateescape")
-        except (FileNotFoundError, FileExistsError):
-            # Another process removed the area: pathlib reports the second where that came while it made it.
-            if time.monotonic() > end:
+        except (FileNotFoundError, FileExistsError) as error:
+            # Another process removed the area: pathlib reports the second where that came while it made it. Where the
+            # area itself was not made though its folder is there, nobody removed it: there nothing can be made.
+            impossible = isinstance(error, FileNotFoundError) and error.filename == str(area) and area.parent.is_dir()
+            if impossible or time.monotonic() > end:
                 raise
             continue
         if _lock(lease, unknown=True) and _is_at(lease, item / _LEASE):
