@@ -9,7 +9,7 @@ import numpy as np
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN, Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.model import Instance, Scene
 
 # Margins by which the tallest is called tallest, and the northernmost northernmost.
 _TALLER = 1.1
@@ -43,7 +43,7 @@ def choose_landmarks(
             # Few names: the extreme one in each direction has a unique name, however low it is.
             rest = [i for i in prominent if names.of(i)][:n]
     else:
-        rest = [i for i in scene.instances if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+        rest = [i for i in _inside(scene) if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
         if len(chosen) + len(rest) < n and at_most:
             # Mapped towns often have no landmark of the catalogue: use the tallest buildings.
             named = _UniqueNames(vocabulary)
@@ -75,9 +75,15 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
     return min(gaps, default=1000.0)
 
 
+def _inside(scene: Scene) -> list[Instance]:
+    """Things with their middle in the scene's bounds, as landmarks have: a mast may be too high for a low ceiling."""
+    low, high = scene.bounds
+    return [i for i in scene.instances if ((i.centroid >= low) & (i.centroid <= high)).all()]
+
+
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
     """The things of an imported mesh, highest first, those without a name last."""
-    things = [i for i in vocabulary.scene.instances if i.category not in NON_OBJECTS]
+    things = [i for i in _inside(vocabulary.scene) if i.category not in NON_OBJECTS]
     return sorted(things, key=lambda i: (i.category == UNKNOWN, -float(i.bounds[1, 2]), i.node))
 
 
