@@ -1,7 +1,6 @@
 """Coordinate frames, and angles and orientations in them.
 
 World (ENU): right-handed, x east, y north, z up, metres; yaw in radians, counter-clockwise from +x.
-NED, the frame of most autopilots and of AirSim: x north, y east, z down; yaw clockwise from north.
 """
 
 from __future__ import annotations
@@ -32,17 +31,6 @@ def compass_heading(yaw_rad: float) -> tuple[str, int]:
     """Compass direction and whole degrees clockwise from north of a yaw in radians counter-clockwise from east."""
     heading = round(90.0 - math.degrees(yaw_rad)) % 360
     return DIRECTIONS[math.floor((90.0 - heading + 22.5) / 45.0) % 8], heading
-
-
-def enu_to_ned(xyz_m: ArrayLike) -> Floats:
-    """Turn positions (..., 3) from east-north-up to north-east-down, metres."""
-    p = np.asarray(xyz_m, dtype=np.float64)
-    return np.stack([p[..., 1], p[..., 0], -p[..., 2]], axis=-1)
-
-
-def yaw_enu_to_ned(yaw_rad: ArrayLike) -> Floats:
-    """Turn a yaw (radians, counter-clockwise from east) into a heading (clockwise from north) in (-π, π]."""
-    return wrap_angle_rad(math.pi / 2.0 - np.asarray(yaw_rad, dtype=np.float64))
 
 
 def yaw_to_quaternion_xyzw(yaw_rad: ArrayLike) -> Floats:

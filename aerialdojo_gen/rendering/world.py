@@ -20,7 +20,6 @@ from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.rendering.texels import Backdrop, downscale
-from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.staging import scratch_folder
@@ -195,11 +194,6 @@ def _projection(camera: Camera, near_m: float, far_m: float) -> Floats:
             [0.0, 0.0, -1.0, 0.0],
         ]
     )
-
-
-def render_world(scene: Scene) -> RenderWorld:
-    """Return the scene's world in TinyRenderer, owned by its context: do not close it."""
-    return context_of(scene).part("render world", lambda: RenderWorld(scene))
 
 
 def write_obj(path: Path, surface: Surface) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 import shapely
-import trimesh
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -98,21 +97,6 @@ def clashes(
             shared = outlines[a].intersection(outlines[b]).area
             if shared > share * min(outlines[a].area, outlines[b].area):
                 out.append((props[a].node, props[b].node))
-    return out
-
-
-def walled_in(scene: Scene, catalogue: Catalogue, structure: Collection[str]) -> list[str]:
-    """List the props whose top lies inside closed structure of these categories: an odd number of faces above it."""
-    solids = [trimesh.Trimesh(i.vertices, i.faces, process=False) for i in scene.instances if i.category in structure]
-    props = [i for i in props_of(scene, catalogue) if catalogue[i.category].kind != "building"]
-    above = np.array([[*p.centroid[:2], p.bounds[1, 2] + 0.05] for p in props])
-    out: list[str] = []
-    for solid in solids:
-        low, high = solid.bounds
-        for k in np.flatnonzero(((above > low) & (above < high)).all(axis=1)):
-            hits = solid.ray.intersects_location([above[k]], [[0.0, 0.0, 1.0]], multiple_hits=True)[0]
-            if len(hits) % 2:
-                out.append(props[int(k)].node)
     return out
 
 

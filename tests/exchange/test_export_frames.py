@@ -15,7 +15,6 @@ from aerialdojo_gen.exchange.frames import (
     world_to_habitat,
     yaw_to_habitat_quaternion_xyzw,
 )
-from aerialdojo_gen.geometry.frames import enu_to_ned, yaw_enu_to_ned
 
 frames = st.sampled_from(list(FRAMES.values()))
 coordinates = st.floats(-1e5, 1e5, allow_subnormal=False)
@@ -82,10 +81,13 @@ def test_habitats_frame_keeps_handedness(a, b, c):
 
 @settings(deadline=None)
 @given(points, yaws)
-def test_ned_is_that_of_the_geometry(point, yaw):
-    assert FRAMES["ned"].positions_from_world(point).tolist() == enu_to_ned(point).tolist()
-    difference = float(FRAMES["ned"].yaw_from_world(yaw) - yaw_enu_to_ned(yaw))
-    assert abs(math.remainder(difference, 2 * math.pi)) < 1e-12
+def test_ned_is_north_east_down_and_a_heading_points_the_same_way(point, yaw):
+    ned = FRAMES["ned"]
+    x, y, z = point
+    assert ned.positions_from_world(point).tolist() == [y, x, -z]
+    heading = float(ned.yaw_from_world(yaw))
+    ahead = ned.positions_from_world([math.cos(yaw), math.sin(yaw), 0.0])
+    assert ahead[:2] == pytest.approx([math.cos(heading), math.sin(heading)], abs=1e-9)
 
 
 @pytest.mark.parametrize(

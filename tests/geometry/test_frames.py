@@ -69,22 +69,6 @@ def test_compass_direction_and_its_opposite(dx, dy):
     assert (there - back) % 8 == 4
 
 
-@given(points)
-def test_ned_round_trip_and_axes(p):
-    ned = frames.enu_to_ned(p)
-    assert ned.tolist() == [p[1], p[0], -p[2]]
-    assert frames.enu_to_ned(ned).tolist() == list(p), "its own inverse"
-
-
-@given(angles)
-def test_ned_heading_points_the_same_way(yaw):
-    heading = float(frames.yaw_enu_to_ned(yaw))
-    ahead = frames.enu_to_ned([math.cos(yaw), math.sin(yaw), 0.0])
-    assert ahead[:2] == pytest.approx([math.cos(heading), math.sin(heading)], abs=1e-9)
-    again = float(frames.yaw_enu_to_ned(heading))
-    assert float(wrap_angle_rad(again - yaw)) == pytest.approx(0.0, abs=1e-9)
-
-
 @given(angles, st.sampled_from([-3.0, -1.0, 0.5, 1.0]))
 def test_quaternion_round_trip_whatever_its_length_and_sign(yaw, length):
     q = frames.yaw_to_quaternion_xyzw(yaw)

@@ -17,11 +17,11 @@ from aerialdojo_gen.base.errors import ConfigError, RenderError
 from aerialdojo_gen.cli.render import profile_keys
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.pipeline.options import RunLimits
+from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.codecs import VideoWriter
 from aerialdojo_gen.rendering.estimate import estimate
 from aerialdojo_gen.rendering.placement import TILED
 from aerialdojo_gen.rendering.reader import open_view, read_recording
-from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 
@@ -55,7 +55,7 @@ def test_a_trajectory_is_one_file_and_every_row_says_where_its_view_lies(data):
 def test_every_view_comes_back_as_it_was_drawn(data):
     """In an order that jumps, as training does, and each view by itself."""
     recording = read_recording(data / "media" / SCENE / "nav_a")
-    world, camera = render_world(courtyard()), Camera(64, 64, 90.0)
+    world, camera = scene_renderer(courtyard(), "pybullet"), Camera(64, 64, 90.0)
     assert (len(recording), recording.fps) == (6, 15.0)
     for k, view in [(4, "down"), (1, "front"), (1, "left"), (5, "right"), (0, "front"), (-1, "right"), (3, "left")]:
         p, yaw = [ROUTE[a][k] for a in ("x_m", "y_m", "z_m")], ROUTE["yaw_rad"][k]

@@ -18,10 +18,10 @@ from support.rendered import courtyard
 from aerialdojo_gen.base.config.sections import ReferenceImagesConfig
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.pipeline.stages.work import reference_images
+from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.rendering.trajectory import by_steps, by_time
-from aerialdojo_gen.rendering.world import render_world
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows
@@ -72,7 +72,7 @@ def test_frames_line_up_with_the_trajectory_and_the_videos(data, outputs):
     recording = read_recording(data / "media" / SCENE / "nav_a")
     camera = Camera(64, 64, 90.0)
     assert len(recording) == 6
-    world = render_world(courtyard())
+    world = scene_renderer(courtyard(), "pybullet")
     for f in (frames[4], frames[1]):
         for view in schemas.VIEWS:
             picture = world.render(camera, view_pose((f["x_m"], f["y_m"], f["z_m"]), f["yaw_rad"], view))

@@ -9,9 +9,10 @@ from support.rendered import MATERIALS, block, courtyard
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, project, view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.gallery import contact_sheet, look_at
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import RenderWorld, render_world
+from aerialdojo_gen.rendering.world import RenderWorld
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
@@ -139,7 +140,7 @@ def test_many_worlds_one_after_the_other(scene):
 def test_previews_keep_the_latest_scene_and_sheets_hold_all_pictures(scene):
     image = look_at(scene, (-6, -6, 6), (5.5, 1.5, 1.5), 200, 120)
     assert image.shape == (120, 200, 3)
-    assert render_world(scene) is render_world(scene)
+    assert scene_renderer(scene, "pybullet") is scene_renderer(scene, "pybullet")
     sheet = contact_sheet([image] * 5, list("abcde"), columns=3)
     assert sheet.shape[0] > 2 * 120
     assert sheet.shape[1] > 3 * 200

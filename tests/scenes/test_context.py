@@ -25,7 +25,7 @@ from aerialdojo_gen.rendering.casters import ray_caster, triangle_caster
 from aerialdojo_gen.rendering.checks import Solid, scene_solid
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.rendering.raycast import RayRenderer, ray_renderer
-from aerialdojo_gen.rendering.world import RenderWorld, render_world
+from aerialdojo_gen.rendering.world import RenderWorld
 from aerialdojo_gen.scenes.context import context_of, keep_scene, open_contexts, open_scene, release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
 
@@ -112,10 +112,10 @@ def test_a_scene_and_all_that_is_built_on_it_are_gone_before_the_next_one_is_rea
         assert _planner(place, PlanConfig(), 0.25) is planner
         world = World.of(place, 0.25, 0.05)
         made = (place, planner, world.collisions, world.rays, scene_solid(place), ray_renderer(place),
-                orthographic_pictures(place), render_world(place), scene_renderer(place, "pybullet"))  # fmt: skip
+                orthographic_pictures(place), scene_renderer(place, "pybullet"))  # fmt: skip
         held += [weakref.ref(part) for part in made]
         del place, planner, world, made
-    assert alive_while_reading == [[False] * 9 * k for k in range(4)]
+    assert alive_while_reading == [[False] * 8 * k for k in range(4)]
 
 
 def test_one_embree_scene_and_one_fcl_world_for_all(meshes):
@@ -162,9 +162,10 @@ def test_what_is_shared_answers_as_one_built_alone(meshes):
 def test_what_draws_is_closed_when_its_scene_goes(meshes):
     path, digest = meshes[0]
     place = open_scene(path, digest).scene
-    world, client = render_world(place), render_world(place)._client
     renderer = scene_renderer(place, "pybullet")
     assert scene_renderer(place, "pybullet", reopen=True) is not renderer
+    world = scene_renderer(place, "pybullet")._world
+    client = world._client
     assert pybullet.isConnected(client)
     open_scene(*meshes[1])
     assert not pybullet.isConnected(client)

@@ -5,7 +5,9 @@ from collections.abc import Collection, Iterable
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 
 from aerialdojo_gen.scenes import checks
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
@@ -67,4 +69,15 @@ def clashes(scene: Scene, share: float = 0.2, bearers: Collection[str] = ()) -> 
 
 
 def walled_in(scene: Scene, structure: Collection[str]) -> list[str]:
-    return checks.walled_in(scene, catalogue(), structure)
+    """List the props whose top lies inside closed structure of these categories: an odd number of faces above it."""
+    solids = [trimesh.Trimesh(i.vertices, i.faces, process=False) for i in scene.instances if i.category in structure]
+    props = [i for i in checks.props_of(scene, catalogue()) if catalogue()[i.category].kind != "building"]
+    above = np.array([[*p.centroid[:2], p.bounds[1, 2] + 0.05] for p in props])
+    out: list[str] = []
+    for solid in solids:
+        low, high = solid.bounds
+        for k in np.flatnonzero(((above > low) & (above < high)).all(axis=1)):
+            hits = solid.ray.intersects_location([above[k]], [[0.0, 0.0, 1.0]], multiple_hits=True)[0]
+            if len(hits) % 2:
+                out.append(props[int(k)].node)
+    return out
