@@ -8,15 +8,20 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
+
 from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
-SCENE = "U_Courtyard_0"
+BOTH = ["U_Courtyard_0", "U_Courtyard_1"]
 
 
-def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke: Path, project: Path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", SCENE, "--data", cloud]
+@pytest.mark.parametrize("scenes", [BOTH[:1], pytest.param(BOTH, marks=pytest.mark.nightly)], ids=["one", "both"])
+def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
+    cloud: str, smoke: Path, project: Path, scenes: list[str]
+) -> None:
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", *scenes, "--data", cloud]
     environment = os.environ | {"AERIALDOJO_LEASE_S": "3"}
     root, local = open_root(cloud), open_root(smoke)
     killed = subprocess.Popen([*command, "--workers", "2"], cwd=project, env=environment, stderr=subprocess.DEVNULL)
@@ -31,13 +36,14 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(cloud: str, smoke
     done = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     root.refresh()
-    assert scenes_there(root) == [SCENE]
+    assert scenes_there(root) == scenes
     for table, place in store.LAYOUT.items():
-        if place.command != "evaluate":
-            assert store.content(root, table, SCENE) == store.content(local, table, SCENE), table
-    assert root.digest(f"meshes/{SCENE}.glb", reread=True) == local.digest(f"meshes/{SCENE}.glb")
-    for row in store.read_scene(root, "recordings", SCENE, ["path", "bytes", "sha256"]).to_pylist():
-        assert root.is_whole(row["path"], row["bytes"], row["sha256"], reread=True)
+        for scene in scenes if place.command != "evaluate" else []:
+            assert store.content(root, table, scene) == store.content(local, table, scene), (table, scene)
+    for scene in scenes:
+        assert root.digest(f"meshes/{scene}.glb", reread=True) == local.digest(f"meshes/{scene}.glb")
+        for row in store.read_scene(root, "recordings", scene, ["path", "bytes", "sha256"]).to_pylist():
+            assert root.is_whole(row["path"], row["bytes"], row["sha256"], reread=True)
     again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
     assert again.returncode == 0, again.stderr
     assert "nothing to do: all 10 stages are up to date" in again.stderr, again.stderr
