@@ -242,15 +242,13 @@ class LocalRoot(DataRoot):
                 raise disk_error(error, path) from None
             self._sweep_once(file)
             sweep(self.path)
+            # At the end, after this run's own item: what workers were at when an error or Ctrl-C ended them.
+            stack.callback(sweep, self.path)
             # An item of this run keeps the staging folder there until its end: workers need not make it anew for each
             # file. On a full disk a run that has nothing to write goes on without.
             with suppress(OSError):
                 stack.enter_context(staged(self.path, path))
-            try:
-                yield
-            finally:
-                # What workers were at when an error or Ctrl-C ended them.
-                sweep(self.path)
+            yield
 
     def _sweep_once(self, lock: TextIO) -> None:
         """Remove what killed runs of earlier versions left, once in a data directory's life."""
