@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pydantic_core
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
@@ -97,6 +97,8 @@ class SceneHead(BaseModel):
     seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
     size_m: tuple[Extent, Extent]  # Extent along x and y, metres; the origin lies in the middle
     ceiling_m: Height  # Highest z that a drone may fly at, metres
+    # Of the built scene, counter-clockwise; everything else in the file is in the frame before it, but the sun.
+    turn_deg: Literal[0, 90, 180, 270] = 0
     sky: Colour = "#96bee6"
     sun: Sun = (0.45, -0.35, 0.82)  # Direction towards the sun, of any length
     light: LightHead = LightHead()
@@ -108,6 +110,12 @@ class SceneHead(BaseModel):
     origin: Origin | None = None  # Where on earth that is
     level: Annotated[tuple[Level, ...], Field(max_length=200)] = ()
     moves: Annotated[dict[str, Move], Field(max_length=500)] = {}
+
+    @model_validator(mode="after")
+    def _a_real_place_keeps_its_north(self) -> SceneHead:
+        if self.origin is not None and self.turn_deg:
+            raise ValueError("turn_deg: a real place, with [origin], is not turned")
+        return self
 
     @property
     def sun_direction(self) -> tuple[float, float, float]:

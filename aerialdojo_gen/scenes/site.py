@@ -28,6 +28,7 @@ from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.placement import DRAWN, Fit, Placement, Room
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
+from aerialdojo_gen.scenes.turn import turned
 
 # The largest scene of the dataset has 479.
 MAX_NODES = 5_000
@@ -292,10 +293,11 @@ class Site:
         specs = sorted({p.material for i in (*instances, *beyond) for p in i.parts})
         materials = {s: self.catalogue.materials[s] for s in specs}
         sky, sun = parse_colour(self.head.sky), self.head.sun_direction
-        return Scene(
+        scene = Scene(
             self.name, instances, materials, bounds, sky, sun, self.head.light.weather, backdrop=beyond,
             attribution=self.head.attribution,
         )  # fmt: skip
+        return turned(scene, self.head.turn_deg)
 
     def _bring_into_contact(self) -> None:
         """Let what stands on a slope lean with it, sink in, or stand on a plinth."""

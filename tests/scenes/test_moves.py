@@ -73,3 +73,38 @@ def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
             assert np.ptp(site.terrain.z(x, y)) < 1e-9
         else:
             np.testing.assert_array_equal(site.terrain.z(x, y), own.z(x, y))
+
+
+@pytest.mark.parametrize("turn_deg", [90, 180, 270])
+def test_a_turned_plan_is_the_same_scene_turned(tmp_path, turn_deg):
+    """Every vertex, front and bound is turned exactly, the land beyond too; the sun stays where it is."""
+    before = built(tmp_path, "")
+    recipe = tmp_path / YARD.name
+    recipe.write_text(YARD.read_text().replace("ceiling_m", f"turn_deg = {turn_deg}\nceiling_m", 1))
+    after = build_scene(recipe, load_catalogue(ASSETS))
+    c, s = {90: (0, 1), 180: (-1, 0), 270: (0, -1)}[turn_deg]
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    assert after.sun == before.sun
+    corners = before.bounds @ turn.T
+    np.testing.assert_array_equal(after.bounds, [corners.min(axis=0), corners.max(axis=0)])
+    pairs = zip((*before.instances, *before.backdrop), (*after.instances, *after.backdrop), strict=True)
+    fronts = 0
+    for old, new in pairs:
+        assert (old.node, old.shape, old.attributes) == (new.node, new.shape, new.attributes)
+        np.testing.assert_array_equal(new.vertices, old.vertices @ turn.T)
+        np.testing.assert_array_equal(new.faces, old.faces)
+        if old.anatomy is not None:
+            fronts += len(old.anatomy.fronts_rad)
+            angles = np.array(
+                [(old.anatomy.yaw_rad, *old.anatomy.fronts_rad), (new.anatomy.yaw_rad, *new.anatomy.fronts_rad)]
+            )
+            np.testing.assert_allclose(np.exp(1j * angles[1]), np.exp(1j * (angles[0] + np.radians(turn_deg))))
+            assert (np.abs(angles) <= np.pi).all()
+    assert fronts
+    assert not np.array_equal(before.bounds, after.bounds) or turn_deg == 180
+
+
+def test_a_real_place_keeps_its_north():
+    head = {"size_m": (60, 60), "ceiling_m": 20, "turn_deg": 90, "origin": {"lon_deg": 7.0, "lat_deg": 50.0}}
+    with pytest.raises(ValueError, match="a real place"):
+        SceneHead.model_validate(head)

@@ -292,10 +292,11 @@ class Draft:
             "topology": self.topology, "palette": self.palette_name, "held_out": self.world.held_out,
             "knobs": {name: self.knob(name) for name in self.kind.knobs},
         }  # fmt: skip
+        turn = {"turn_deg": self.pick((0, 90, 180, 270), "turn")} if self.kind.turns else {}
         return {
             "plan": 1, "seed": rank(self.world.seed, STAGE, self._trial) % 2**31,
-            "size_m": [self.width_m, self.depth_m], "ceiling_m": self.whole(low, high, "ceiling"), **self.head,
-            **({"designs": "held_out"} if self.world.held_out else {}),
+            "size_m": [self.width_m, self.depth_m], "ceiling_m": self.whole(low, high, "ceiling"), **turn,
+            **self.head, **({"designs": "held_out"} if self.world.held_out else {}),
             "world": world, "floor_m": self.floors, "lines": self.lines, "areas": self.areas,
             "ground": self.ground, "site": self._site,
         }  # fmt: skip

@@ -100,6 +100,7 @@ class SceneType(_Strict):
     about: str  # One line for the page of worlds
     size_m: tuple[Range, Range]
     ceiling_m: Range
+    turns: bool = False  # Whether a world may lie any way round: what is laid out always runs along x, or faces south
     topologies: Annotated[dict[str, Topology], Field(min_length=4)]
     knobs: dict[str, Knob] = {}
     palettes: Annotated[dict[str, Palette], Field(min_length=2)]

@@ -20,6 +20,11 @@ def write(draft: Draft) -> None:
     settle(draft, _TOPOLOGIES[draft.topology](draft, draft.width_m / 2, draft.depth_m / 2))
 
 
+def _off_shore(draft: Draft, bay_deg: float) -> Point:
+    """Middle of an island that lies off the site's, so that the open sea before its bay is wide."""
+    return ahead((0, 0), bay_deg + 180, draft.number(5, 12, "middle"))
+
+
 def _cone(at: Point, radius_m: float, height_m: float, lobes: int) -> dict[str, str]:
     """Formulas of a volcano with a crater."""
     x, y = at
@@ -39,15 +44,16 @@ def _knoll(name: str, at: Point, radius_m: float, height_m: float) -> dict[str, 
 
 def _volcano(draft: Draft, w: float, d: float) -> Isle:
     bay = draft.number(0, 360, "bay")
-    land = coast(draft, "coast", (0, 0), (w * 0.79, d * 0.79), [(bay, 0.36, 38)])
-    top, height = ahead((0, 0), bay + 180 + draft.number(-30, 30, "top"), 15), draft.number(13, 18, "height")
+    middle = _off_shore(draft, bay)
+    land = coast(draft, "coast", middle, (w * 0.75, d * 0.75), [(bay, 0.36, 38)])
+    top, height = ahead(middle, bay + 180 + draft.number(-30, 30, "top"), 14), draft.number(13, 18, "height")
     islands(draft, [{"polygon": ["coast"]}], land, draft.knob("relief_m"),
             heights=_cone(top, draft.number(25, 30, "radius"), height, draft.whole(5, 9, "lobes")),
             total="cone")  # fmt: skip
     draft.paint({"blob": [*top, 19, draft.whole(0, 999, "lava"), 0.3]}, draft.material("rock"))
     draft.make("paint_heights", material=draft.material("cliff", "top"), above_m=round(height * 0.7, 1))
     draft.paint({"disc": [*top, 2.6]}, draft.pick(["#e2602a", "#b8402a", "water:#4fb0a8"], "crater"))
-    village = inside(land, (0, 0), bay, 13.0)
+    village = inside(land, middle, bay, 13.0)
     heads = [inside(land, village, bay + off, 10.0) for off in (105.0, -105.0)]
     return Isle(land, village, bay, heads, shapely.Point(top).buffer(19.0))
 
@@ -140,8 +146,9 @@ def _skerries(draft: Draft, w: float, d: float) -> Isle:
 def _fort(draft: Draft, w: float, d: float) -> Isle:
     """A table of rock with a ruined fort, a village at its foot."""
     bay = draft.number(0, 360, "bay")
-    land = coast(draft, "coast", (0, 0), (w * 0.8, d * 0.78), [(bay, 0.3, 34)])
-    at, height = ahead((0, 0), bay + 180, 13), draft.number(7, 10, "height")
+    middle = _off_shore(draft, bay)
+    land = coast(draft, "coast", middle, (w * 0.76, d * 0.75), [(bay, 0.3, 34)])
+    at, height = ahead(middle, bay + 180, 12), draft.number(7, 10, "height")
     islands(draft, [{"polygon": ["coast"]}], land, draft.knob("relief_m"), total="table",
             heights={"away": f"hypot(x - {at[0]}, y - {at[1]}) + 2*noise",
                      "table": f"{height}*(1 - eased(away, 15, 21))"})  # fmt: skip
@@ -154,8 +161,9 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
                stone=draft.material("stone"),
                walls=[{"ends": e, "height_m": h} for e, h in zip(ends, high, strict=True)])  # fmt: skip
     about(draft, "lookout", at, (2.0, 4.6), 5, (2.8, 2.8))
-    heads = [inside(land, inside(land, (0, 0), bay, 13.0), bay + off, 10.0) for off in (105.0, -105.0)]
-    return Isle(land, inside(land, (0, 0), bay, 13.0), bay, heads, shapely.Point(at).buffer(21.0))
+    village = inside(land, middle, bay, 13.0)
+    heads = [inside(land, village, bay + off, 10.0) for off in (105.0, -105.0)]
+    return Isle(land, village, bay, heads, shapely.Point(at).buffer(21.0))
 
 
 _TOPOLOGIES: dict[str, Callable[[Draft, float, float], Isle]] = {
