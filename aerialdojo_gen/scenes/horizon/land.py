@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,8 @@ _FAN = 10  # Sectors of a corner
 # Where the edge's own heights, a road, and the level land end, metres from the edge.
 _BLEND_M, _ROAD_M, _HILLS_M, _ISLANDS_M = 60.0, 300.0, 200.0, 800.0
 _SHORE_M = 70.0
+# Shallows at the edge end here; beyond, all water is what most of the edge's is.
+_SHALLOW_M = 16.0
 _STEP_M = 0.25
 _NATURAL = frozenset(
     {"grass", "meadow", "dirt", "sand", "snow", "rock", "moss", "leaf_litter", "gravel", "mud", "soil"}
@@ -102,12 +104,16 @@ def base_material(border: Sequence[Stretch], kind: Kind) -> str:
     """Choose the material of the land: what most of the scene's edge is made of, if that is natural ground."""
     if kind.ground:
         return kind.ground
+    natural = _longest((one.material, one.points) for one in border if one.material.split(":")[0] in _NATURAL)
+    return natural or (kind.fields or ("grass",))[0]
+
+
+def _longest(stretches: Iterable[tuple[str, Floats]]) -> str:
+    """Material that most of some stretches (k, 3) is made of; empty without any."""
     length: dict[str, float] = {}
-    for one in border:
-        if one.material.split(":")[0] in _NATURAL:
-            span_m = float(norm(one.points[-1] - one.points[0]))
-            length[one.material] = length.get(one.material, 0.0) + span_m
-    return max(length, key=lambda name: length[name]) if length else (kind.fields or ("grass",))[0]
+    for material, points in stretches:
+        length[material] = length.get(material, 0.0) + float(norm(points[-1] - points[0]))
+    return max(length, key=lambda name: length[name], default="")
 
 
 def make_land(border: Sequence[Stretch], kind: Kind, top_m: float, noise: Noise) -> Land:
@@ -200,6 +206,8 @@ _Faces = tuple[Floats, list[str], NDArray[np.bool_], NDArray[np.bool_]]
 def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> list[_Faces]:
     """The rings but the innermost: two triangles a strip."""
     out: list[_Faces] = []
+    wet = np.flatnonzero(strips.water)
+    sea = _longest((strips.material[k], strips.border[k]) for k in wet)
     for r in range(1, len(RINGS_M) - 1):
         a, b, c, d = v[:, 0, r], v[:, 0, r + 1], v[:, 1, r + 1], v[:, 1, r]
         middle = (a + b + c + d) / 4.0
@@ -209,7 +217,8 @@ def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> l
             natural = material == base or RINGS_M[r] >= _ROAD_M
             name = material
             if strips.water[k]:
-                name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (material, False)
+                near = material if RINGS_M[r] < _SHALLOW_M else sea
+                name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (near, False)
             elif natural:
                 name = base
                 if RINGS_M[r] >= 450.0:

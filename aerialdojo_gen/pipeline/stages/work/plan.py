@@ -28,7 +28,7 @@ from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 Floats = NDArray[np.float64]
 # Memory for goals' cost-to-go fields between estimation and search, plain and compressed to a tenth; fields that do
 # not fit are expanded again.
-_FIELDS_MB = 300.0, 250.0
+_FIELDS_MB = 0.0, 250.0
 
 
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
