@@ -74,7 +74,9 @@ def floating(
         bottom = float(prop.bounds[0, 2])
         low = prop.vertices[prop.vertices[:, 2] < bottom + 0.25]
         feet = np.array([low[:, :2].mean(axis=0), *low[:: max(len(low) // 8, 1), :2]])
-        heights = bottom + np.arange(0.05, reach_m, 0.15)
+        # Foundations of landmarks reach down 1.4 m, to where the ground has just begun.
+        deep_m = 0.15 if catalogue[prop.category].kind == "landmark" else 0.0
+        heights = bottom + np.arange(0.05, reach_m + deep_m, 0.15)
         origins = np.array([(x, y, z) for x, y in feet for z in heights])
         distance, _ = cast.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
         if not (origins[:, 2] - distance > bottom - 0.12).any():
