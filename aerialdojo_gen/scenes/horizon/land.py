@@ -23,8 +23,6 @@ _FAN = 10  # Sectors of a corner
 # Where the edge's own heights, a road, and the level land end, metres from the edge.
 _BLEND_M, _ROAD_M, _HILLS_M, _ISLANDS_M = 60.0, 300.0, 200.0, 800.0
 _SHORE_M = 70.0
-# Shallows at the edge end here; beyond, all water is what most of the edge's is.
-_SHALLOW_M = 16.0
 _STEP_M = 0.25
 _NATURAL = frozenset(
     {"grass", "meadow", "dirt", "sand", "snow", "rock", "moss", "leaf_litter", "gravel", "mud", "soil"}
@@ -206,8 +204,7 @@ _Faces = tuple[Floats, list[str], NDArray[np.bool_], NDArray[np.bool_]]
 def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> list[_Faces]:
     """The rings but the innermost: two triangles a strip."""
     out: list[_Faces] = []
-    wet = np.flatnonzero(strips.water)
-    sea = _longest((strips.material[k], strips.border[k]) for k in wet)
+    beyond = _without_shallows(strips)
     for r in range(1, len(RINGS_M) - 1):
         a, b, c, d = v[:, 0, r], v[:, 0, r + 1], v[:, 1, r + 1], v[:, 1, r]
         middle = (a + b + c + d) / 4.0
@@ -217,8 +214,7 @@ def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> l
             natural = material == base or RINGS_M[r] >= _ROAD_M
             name = material
             if strips.water[k]:
-                near = material if RINGS_M[r] < _SHALLOW_M else sea
-                name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (near, False)
+                name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (beyond[k], False)
             elif natural:
                 name = base
                 if RINGS_M[r] >= 450.0:
@@ -229,6 +225,19 @@ def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> l
             land.append(natural)
         faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
         out.append((faces, names * 2, np.tile(land, 2), np.tile(strips.water, 2)))
+    return out
+
+
+def _without_shallows(strips: _Strips) -> list[str]:
+    """Materials of the strips beyond the edge: patches in the sea end there, they would be bands to the horizon."""
+    names, water, n = strips.material, strips.water, len(strips.material)
+    sea = _longest((names[k], strips.border[k]) for k in np.flatnonzero(water))
+    out = list(names)
+    starts = [k for k in range(n) if names[k] != names[k - 1]]
+    for first, after in zip(starts, starts[1:] + starts[:1], strict=True):
+        if water[first] and water[first - 1] and water[after]:
+            for k in range(first, after if after > first else after + n):
+                out[k % n] = sea
     return out
 
 
