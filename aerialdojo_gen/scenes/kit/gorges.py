@@ -104,7 +104,7 @@ def paint_brook(
 ) -> None:  # fmt: skip
     """Paint a brook with gravel banks and a path beside it; nothing grows in it between two heights."""
     half = site.head.size_m[1] / 2
-    line = [(stream.x(float(y)), float(y)) for y in np.arange(-half, half + 1.0, 3.0)]
+    line = [(stream.x(float(y)), float(y)) for y in (*np.arange(-half, half, 3.0), half)]
     site.paint(ribbon(line, width_m + 2.0), bank)
     site.paint(ribbon(line, width_m), water)
     site.paint(ribbon([(x + path_offset_m, y) for x, y in line], 1.6), path)
