@@ -26,8 +26,8 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import OUTCOMES, PLANS
 
 Floats = NDArray[np.float64]
-# Megabytes of goals' cost-to-go fields kept between estimation and search, plain and compressed to a tenth; those that
-# do not fit are expanded again. Plain ones save a fiftieth of the mall's time and cost 0.2 GB.
+# Megabytes of goals' cost-to-go fields kept between estimation and search, plain and compressed to a tenth; what
+# does not fit is expanded again. Plain ones save a fiftieth of the mall's time and cost 0.2 GB.
 _FIELDS_MB = 0.0, 250.0
 
 
