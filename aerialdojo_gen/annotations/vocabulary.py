@@ -28,6 +28,7 @@ class Vocabulary:
         self.kinds = {category: catalogue[category].kind for category in catalogue}
         self._looks = {category: catalogue[category].looks for category in catalogue}
         self._surface = Surface(scene)
+        self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
         by_category: dict[str, Words] = {}
         for i in scene.instances:
@@ -65,9 +66,11 @@ class Vocabulary:
         return self._looks.get(instance.category, ())
 
     def true_looks(self, instance: Instance) -> tuple[str, ...]:
-        """Phrases that are true of an instance, and visible."""
-        true = valid_looks(self.catalogue_looks(instance), instance, self.scene.materials)
-        return tuple(look.phrase for look in true if self._surface.shows(look, instance))
+        """Phrases that are true of an instance, and visible; measured once."""
+        if instance not in self._true:
+            true = valid_looks(self.catalogue_looks(instance), instance, self.scene.materials)
+            self._true[instance] = tuple(look.phrase for look in true if self._surface.shows(look, instance))
+        return self._true[instance]
 
     def looks(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
