@@ -1,11 +1,10 @@
 """The agent clip: CLIP-H's rule, by a CLIP of a few bytes that knows colours."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from support.command_line import called
 from support.tiny_clip import write_clip
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
@@ -110,23 +109,11 @@ def test_what_it_cannot_do_without_is_named(clip):
 
 def test_it_flies_by_the_command(clip, smoke, tmp_path):
     paths = [f"{name}={getattr(clip, name)}" for name in ("vision", "text", "tokenizer")]
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--agent", "clip", "--setting", "base"]
-    command += [word for option in [*paths, "stop=0.99"] for word in ("--option", option)]
-    command += [
-        "--limit",
-        "2",
-        "--width",
-        "32",
-        "--height",
-        "32",
-        "--data",
-        smoke,
-        "--out",
-        tmp_path,
-        "--workers",
-        "1",
-    ]
-    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    given = [word for option in [*paths, "stop=0.99"] for word in ("--option", option)]
+    size = ["--width", "32", "--height", "32", "--limit", "2", "--workers", "1"]
+    told = called(
+        "evaluate", "--agent", "clip", "--setting", "base", *given, *size, "--data", smoke, "--out", tmp_path
+    )
     assert told.returncode == 0, told.stderr
     assert "clip: vision.onnx, text.onnx: embeddings of 3 numbers" in told.stderr
     episodes = read_run(tmp_path, "clip").to_pylist()

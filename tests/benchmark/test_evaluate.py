@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.compute as pc
 import pytest
+from support.command_line import called
 
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.benchmark import journal
@@ -299,17 +300,7 @@ def test_a_defect_of_the_agents_is_one_line_with_its_place(smoke, tmp_path):
 
 def test_the_command_in_one_line(project, smoke, tmp_path):
     def call(*args):
-        command = [
-            sys.executable,
-            "-m",
-            "aerialdojo_gen.cli",
-            "evaluate",
-            "--data",
-            str(smoke),
-            "--out",
-            str(tmp_path),
-        ]
-        return subprocess.run([*command, *args], cwd=project, capture_output=True, text=True, check=False)
+        return called("evaluate", "--data", smoke, "--out", tmp_path, *args, cwd=project)
 
     done = call("--agent", "random", "--option", "seed=3", "--limit", "4", "--setting", "base", "--workers", "1")
     assert done.returncode == 0, done.stderr
@@ -327,16 +318,14 @@ def test_the_command_in_one_line(project, smoke, tmp_path):
 
 
 def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke, tmp_path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", smoke, "--out", tmp_path, "--agent"]
-    command += ["oracle", "--limit", "5", "--workers", "1"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = ["evaluate", "--data", smoke, "--out", tmp_path, "--agent", "oracle", "--limit", "5", "--workers", "1"]
+    done = called(*command)
     assert done.returncode == 0, done.stderr
     last = done.stderr.splitlines()[-1]
     assert "evaluate oracle: 5 of 5 episodes finished, success rate 100.0%; 5 flown now" in last
     advised = last.partition("; for all scores: aerialdojo-gen ")[2]
     assert advised == f"report oracle --log {tmp_path} --data {smoke}"
-    shown = [sys.executable, "-m", "aerialdojo_gen.cli", *advised.split(), "--json"]
-    told = subprocess.run(shown, capture_output=True, text=True, check=False)
+    told = called(*advised.split(), "--json")
     assert told.returncode == 0, told.stderr
     assert '"oracle"' in told.stdout
     some = Outcome(10, 8, 1, 9, 90, 0.0, 0, 1.0, successes=3)

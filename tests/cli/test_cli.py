@@ -1,12 +1,12 @@
 """The command line: quick help, one line and an exit code for what a user can get wrong."""
 
-import os
 import re
 import subprocess
 import sys
 
 import pytest
 import typer.main
+from support.command_line import called
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import choose_scenes
@@ -14,11 +14,6 @@ from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
 
 HEAVY = ("numpy", "pyarrow", "numba", "fcl", "pybullet", "trimesh", "cv2", "scipy", "av")
-
-
-def call(*args, **env):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
-    return subprocess.run(command, capture_output=True, text=True, env=os.environ | env, timeout=120, check=False)
 
 
 @pytest.mark.parametrize("args", [["--help"], ["plan", "--help"], ["render", "--help"]])
@@ -35,20 +30,20 @@ def test_help_imports_nothing_heavy(args):
 
 def test_every_stage_has_a_command_with_the_common_options():
     for one in STAGES:
-        text = call(one.name, "--help").stdout
+        text = called(one.name, "--help").stdout
         assert one.help.split()[0] in text
         for option in ("--data", "--scene", "--pipeline", "--workers", "--force", "--quiet"):
             assert option in text, (one.name, option)
 
 
 def test_the_stages_commands_say_what_the_stages_say():
-    text = " ".join(call("--help", COLUMNS="200").stdout.split())
+    text = " ".join(called("--help", COLUMNS="200").stdout.split())
     for one in STAGES:
         assert f"{one.name} {one.help}" in text
 
 
 def test_the_commands_are_listed_by_purpose():
-    text = call("--help", COLUMNS="80").stdout
+    text = called("--help", COLUMNS="80").stdout
     sections = dict(re.findall(r"^(\w[\w ]+):\n((?:  .*\n)+)", text, re.MULTILINE))
     assert list(sections)[1:] == [
         "Make a dataset", "Look at a dataset", "Evaluate and train agents", "Add your own scenes",
@@ -62,7 +57,7 @@ def test_the_commands_are_listed_by_purpose():
 
 
 def test_the_help_of_run_names_every_pipeline(project):
-    text = " ".join(call("run", "--help").stdout.split())
+    text = " ".join(called("run", "--help").stdout.split())
     for file in (project / "pipelines").glob("*.toml"):
         assert file.stem in text
 
@@ -78,7 +73,7 @@ def assert_one_line(result, code, *words):
 
 
 def test_unknown_scene_gives_the_nearest_names(tmp_path):
-    result = call("plan", "--scene", "U_Mal_0", "--data", str(tmp_path / "d"))
+    result = called("plan", "--scene", "U_Mal_0", "--data", str(tmp_path / "d"))
     assert_one_line(result, 2, "no scene 'U_Mal_0'", "U_Mall_0")
     assert not (tmp_path / "d").exists()
 
@@ -87,7 +82,7 @@ def test_unknown_key_in_a_pipeline(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("[plan]\nwieght = 2\n")
     assert_one_line(
-        call("run", str(path), "--data", str(tmp_path / "d")), 2, str(path), "[plan] unknown key 'wieght'"
+        called("run", str(path), "--data", str(tmp_path / "d")), 2, str(path), "[plan] unknown key 'wieght'"
     )
 
 
@@ -95,16 +90,16 @@ def test_unknown_stage_and_missing_folder(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("stages = ['plann']\n")
     assert_one_line(
-        call("run", str(path), "--data", str(tmp_path / "d")), 2, "no stage 'plann': did you mean 'plan'?"
+        called("run", str(path), "--data", str(tmp_path / "d")), 2, "no stage 'plann': did you mean 'plan'?"
     )
     path.write_text("recipes = 'nowhere'\n")
-    assert_one_line(call("run", str(path), "--data", str(tmp_path / "d")), 2, "nowhere", "set recipes")
+    assert_one_line(called("run", str(path), "--data", str(tmp_path / "d")), 2, "nowhere", "set recipes")
 
 
 def test_data_directory_that_cannot_be_written(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    assert_one_line(call("build-scenes", "--data", str(blocked / "data")), 1, "cannot write", "not a folder")
+    assert_one_line(called("build-scenes", "--data", str(blocked / "data")), 1, "cannot write", "not a folder")
 
 
 def test_scene_patterns():

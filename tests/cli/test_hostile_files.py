@@ -1,8 +1,6 @@
 """Files that would hang a command, fill the memory or end in a traceback: one line at the level of the user."""
 
 import json
-import subprocess
-import sys
 import tomllib
 
 import numpy as np
@@ -12,6 +10,7 @@ from shapely.geometry import Polygon
 from starlette.testclient import TestClient
 from support import annotating, rendered
 from support.annotating import AUTHOR, YARD
+from support.command_line import said
 
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -50,21 +49,11 @@ POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
         ('scene_assets = "a\\u0000b"', "scene_assets: has a NUL character"),
     ],
 )
-def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_path, text, place):
+def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_path, capsys, text, place):
     path = tmp_path / "p.toml"
     path.write_text(text)
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        "plan",
-        "--pipeline",
-        str(path),
-        "--data",
-        str(tmp_path / "d"),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (2, f"error: {path}: {place}\n")
+    code, _, err = said(capsys, "plan", "--pipeline", path, "--data", tmp_path / "d")
+    assert (code, err) == (2, f"error: {path}: {place}\n")
     assert not (tmp_path / "d").exists()
 
 
