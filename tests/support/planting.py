@@ -172,7 +172,7 @@ def rename(planted: Planted, new: Callable[[Row], str]) -> list[str]:
 
 
 def check(planted: Planted, **options) -> dict[str, list[str]]:
-    """Validate the scene that was planted in; the whole release with ``whole=True``."""
+    """Validate the scene that was planted in, no picture drawn anew; the whole release with ``whole=True``."""
     scenes = () if options.pop("whole", False) else (planted.scene,)
-    options = {"pipeline": definitions()} | options
+    options = {"pipeline": definitions(), "pictures": 0} | options
     return faults_of(validate(ValidationOptions(planted.release, scenes=scenes, **options)))
