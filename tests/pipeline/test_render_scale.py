@@ -133,21 +133,19 @@ def test_more_trajectories_keep_the_finished_ones_and_force_does_not(tmp_path, m
 
 
 @pytest.mark.parametrize("fault", ["lost", "short", "note"])
-def test_a_damaged_recording_is_made_again(tmp_path, fault):
-    write_inputs(tmp_path)
-    run_whole(tmp_path, CONFIG)
-    before = files_of(tmp_path)
-    (folder,) = (p for p in (tmp_path / "media" / SCENE).iterdir() if p.name == "nav_a")
+def test_a_damaged_recording_is_made_again(tmp_path, whole, fault):
+    data = shutil.copytree(whole, tmp_path / "data")
+    folder = data / "media" / SCENE / "nav_a"
     if fault == "lost":
         (folder / "down_depth.mkv").unlink()
     elif fault == "short":
         (folder / "left_rgb.mp4").write_bytes((folder / "left_rgb.mp4").read_bytes()[:-7])
     else:
         (folder / "recording.json").write_text("{")
-        for part in (tmp_path / "recordings" / SCENE).iterdir():
+        for part in (data / "recordings" / SCENE).iterdir():
             part.unlink()
-    run_whole(tmp_path, CONFIG)
-    assert files_of(tmp_path) == before
+    run_whole(data, ALL)
+    assert files_of(data) == files_of(whole)
 
 
 def test_a_flagged_view_is_rendered_once_again_and_a_fault_that_passes_leaves_no_flag(tmp_path, monkeypatch):
@@ -266,26 +264,23 @@ def test_shares_and_durations_are_read_or_refused():
             duration_s(text)
 
 
-def test_auto_chooses_only_where_something_is_to_be_drawn(tmp_path, monkeypatch):
-    write_some(tmp_path)
-    auto = CONFIG.model_copy(update={"renderer": "auto"})
-    run_whole(tmp_path, CONFIG)
-    drawn = files_of(tmp_path)
+def test_auto_chooses_only_where_something_is_to_be_drawn(tmp_path, whole, monkeypatch):
+    data, auto = shutil.copytree(whole, tmp_path / "data"), ALL.model_copy(update={"renderer": "auto"})
 
     def choose(_name):
         raise RenderError("asked")
 
     monkeypatch.setattr(backend, "choose_renderer", choose)
     # What one of the renderers drew is fresh, whichever it is.
-    (summary,) = run_whole(tmp_path, auto)
-    assert (summary.computed, summary.shards) == (0, len(list((tmp_path / "recordings").rglob("*.parquet"))))
-    assert files_of(tmp_path) == drawn
+    (summary,) = run_whole(data, auto)
+    assert (summary.computed, summary.shards) == (0, len(list((data / "recordings").rglob("*.parquet"))))
+    assert files_of(data) == files_of(whole)
     # Something is missing, or asked for anew: now it matters which.
     with pytest.raises(RenderError, match="asked"):
-        run_whole(tmp_path, auto, force=["render"])
-    next((tmp_path / "recordings").rglob("*.parquet")).unlink()
+        run_whole(data, auto, force=["render"])
+    next((data / "recordings").rglob("*.parquet")).unlink()
     with pytest.raises(RenderError, match="asked"):
-        run_whole(tmp_path, auto)
+        run_whole(data, auto)
 
 
 def test_the_row_says_what_drew_it(whole):
