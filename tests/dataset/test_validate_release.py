@@ -1,15 +1,13 @@
 """Files of a release that are missing, cut, changed or foreign; counts of the whole; the command and its reports."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from support.command_line import called
 from support.planting import SMOKE, check, faults_of
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -185,9 +183,7 @@ def test_splits_and_path_of_the_whole(planted, monkeypatch):
 
 
 def run(*args):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "validate", *map(str, args), "--pipeline", str(SMOKE)]
-    wide = os.environ | {"COLUMNS": "120"}
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=wide)
+    return called("validate", *args, "--pipeline", SMOKE, COLUMNS="120")
 
 
 def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(planted):
