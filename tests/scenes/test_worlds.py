@@ -1,6 +1,7 @@
 """Worlds: sound scenes from seeds and knobs, the same every time, and streams that do not depend on one another."""
 
 import ast
+import contextlib
 import hashlib
 import tomllib
 from collections import Counter, defaultdict
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.layout_checks import ASSETS, catalogue
+from support.layout_checks import ASSETS, catalogue, nightly_unless
 
 import aerialdojo_gen.scenes.worlds
 from aerialdojo_gen.annotations.appearance import SHADES
@@ -21,7 +22,7 @@ from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.kinds import load_type, type_names
-from aerialdojo_gen.scenes.worlds.make import MAX_BYTES, make_world
+from aerialdojo_gen.scenes.worlds.make import MAX_BYTES, MAX_DRAWS, make_world
 from aerialdojo_gen.scenes.worlds.paints import PAINTS, paintable
 from aerialdojo_gen.scenes.worlds.types import generator_of
 from aerialdojo_gen.scenes.worlds.world import World, world_of
@@ -45,6 +46,19 @@ def draft_of(world: World) -> Draft | None:
 
 
 @pytest.mark.parametrize("kind", TYPES)
+def test_a_draw_of_a_world_has_its_digest(kind: str) -> None:
+    world = World(kind, 1000)
+    for trial in range(MAX_DRAWS):
+        draft = Draft(world, load_type(kind, ASSETS, catalogue()), catalogue(), trial)
+        with contextlib.suppress(NoRoomError):
+            generator_of(kind)(draft)
+            draft.add_life()
+            if hashlib.sha256(draft.text().encode()).hexdigest() == DIGESTS[world.name]:
+                return
+    pytest.fail(f"no draw of {world.name} has its digest")
+
+
+@pytest.mark.parametrize("kind", [nightly_unless(k % 4 == 0, kind) for k, kind in enumerate(TYPES)])
 def test_a_world_is_sound_and_the_same_as_on_the_day_of_its_digest(kind: str) -> None:
     made = make_world(World(kind, 1000), ASSETS, catalogue())
     assert hashlib.sha256(made.text.encode()).hexdigest() == DIGESTS[made.world.name]
@@ -82,7 +96,7 @@ def test_every_type_of_the_scenes_has_a_generator_and_suns_on_all_sides() -> Non
         assert all(z > 0.05 for *_, z in suns)
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2)
 @given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
 def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
     made = make_world(World(kind, seed, held_out=held_out), ASSETS, catalogue())
