@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.command_line import called
 from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Status, Trickle, serving
 
 from aerialdojo_gen.base.errors import StoreError
@@ -24,20 +25,28 @@ KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."
 
 
-def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.CompletedProcess[str]:
+def command_of(smoke: Path, out: Path, agent: str, url: str, *more: str) -> list[str]:
     options = {
         "model": "m", "base_url": url + ("/v1" if agent == "openai" else ""), "request_retries": 0, "timeout_s": 20,
         "image_size_px": 32, "input_usd_per_million": 2.0, "output_usd_per_million": 10.0,
     }  # fmt: skip
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--agent", agent, "--data", str(smoke)]
-    command += ["--out", str(out), "--limit", "2", "--workers", "1", "--modality", "semantic"]
-    command += ["--option", "answer=text"]
+    command = ["evaluate", "--agent", agent, "--data", str(smoke), "--out", str(out), "--limit", "2"]
+    command += ["--workers", "1", "--modality", "semantic", "--option", "answer=text"]
     for name, value in options.items():
         command += ["--option", f"{name}={json.dumps(value)}"]
-    command += more
+    return [*command, *more]
+
+
+def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.CompletedProcess[str]:
+    """In a process of its own, which logs all that the packages log."""
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *command_of(smoke, out, agent, url, *more)]
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "ANTHROPIC_LOG": "debug"}
     environment[f"{agent.upper()}_API_KEY"] = KEY
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+
+
+def fly_here(smoke: Path, out: Path, url: str, *more: str) -> subprocess.CompletedProcess[str]:
+    return called(*command_of(smoke, out, "openai", url, *more), OPENAI_API_KEY=KEY)
 
 
 def paste(line: str, out: Path) -> subprocess.CompletedProcess[str]:
@@ -190,7 +199,7 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
     more = ("--limit", "30", "--attempts", "1", "--option", "timeout_s=4.0")
     with serving() as service:
         service.policy = striking(set(STRUCK))
-        done = fly(smoke, tmp_path, "openai", service.url, *more)
+        done = fly_here(smoke, tmp_path, service.url, *more)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
         key_is_nowhere(tmp_path, done)
@@ -208,11 +217,11 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
         assert f"{30 - len(STRUCK)} of 30 episodes finished, {len(STRUCK)} failed" in lines[-2]
 
         before = len(service.requests)
-        again = fly(smoke, tmp_path, "openai", service.url, *more)
+        again = fly_here(smoke, tmp_path, service.url, *more)
         assert again.returncode == 0
         assert len(service.requests) == before, "not without being asked"
         service.policy = striking(set())
-        again = fly(smoke, tmp_path, "openai", service.url, *more, "--rerun-failed")
+        again = fly_here(smoke, tmp_path, service.url, *more, "--rerun-failed")
         assert again.returncode == 0, again.stderr
         assert f"{len(STRUCK)} flown now" in again.stderr.splitlines()[-1], "exactly those that failed"
     assert (read_run(tmp_path, "openai").num_rows, read_run(tmp_path, "openai", "failures").num_rows) == (30, 0)
@@ -221,21 +230,20 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
 def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) -> None:
     with serving(Status(400, "no pictures here")) as service:
         more = ("--limit", "20", "--failures-in-row", "3", "--attempts", "4", "--quiet")
-        done = fly(smoke, tmp_path, "openai", service.url, *more)
+        done = fly_here(smoke, tmp_path, service.url, *more)
         assert done.returncode == 1
         assert len(service.requests) == 3, "what is refused for good is not tried again"
-        # The package's own debug log stands in between.
         (line,) = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
         assert line.startswith("error: stopped after 3 failures in a row of one kind (bad request).")
         assert "17 not begun: the same command goes on with them" in line
         # The service goes away in the middle: one line, and what was flown stays.
         service.script[:] = [Say(STOP)]
         more = ("--limit", "20", "--max-tokens", "2100", "--option", "request_retries=1")
-        done = fly(smoke, tmp_path, "openai", service.url, *more, "--restart")
+        done = fly_here(smoke, tmp_path, service.url, *more, "--restart")
         assert done.returncode == 0
         assert read_run(tmp_path, "openai").num_rows == 3, "3 x 1,020 tokens are enough"
         assert "stopped at --max-tokens 2100" in done.stderr
-    done = fly(smoke, tmp_path, "openai", service.url, "--limit", "20", "--option", "request_retries=1")
+    done = fly_here(smoke, tmp_path, service.url, "--limit", "20", "--option", "request_retries=1")
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert last.startswith("error: checked before the run, nothing flown: ")
@@ -275,10 +283,10 @@ def test_requests_keep_their_pace_over_several_workers(smoke: Path, tmp_path: Pa
     with serving() as service:
         service.policy = stop
         more = ("--limit", "6", "--workers", "2", "--requests-per-minute", "240")
-        done = fly(smoke, tmp_path, "openai", service.url, *more)
+        done = fly_here(smoke, tmp_path, service.url, *more)
         assert done.returncode == 0, done.stderr
     # Sent 0.25 s apart at least; a slow machine only makes it longer.
     assert len(times) == 6
     assert times[-1] - times[0] > 4 * 0.25
-    done = fly(smoke, tmp_path, "random", service.url, "--requests-per-minute", "60", "--run", "r")
-    assert done.returncode == 2
+    more = ("--agent", "random", "--requests-per-minute", "60", "--run", "r")
+    assert fly_here(smoke, tmp_path, service.url, *more).returncode == 2
