@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from support.command_line import called
 from support.preload import library, unshared
 
 KEPT = "finished shards are kept, the same command continues from where it stopped"
@@ -58,7 +59,7 @@ def test_a_file_system_without_locks(smoke, tmp_path, verb, number):
     ],
 )
 def test_what_is_empty_is_refused_and_is_not_the_working_directory(tmp_path, args, words):
-    assert_one_line(call(*args, cwd=tmp_path), 2, words)
+    assert_one_line(called(*args, cwd=tmp_path), 2, words)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -113,10 +114,10 @@ def test_a_run_that_ends_in_an_error_says_that_the_same_command_continues(tmp_pa
     data.mkdir()
     (data / "scenes").write_text("in the way")
     command = ["build-scenes", "U_Courtyard_0", "--pipeline", "smoke", "--data", str(data), "--workers", "1", "-q"]
-    assert_one_line(call(*command), 1, str(data / "scenes"), "not a folder", run=True)
-    assert "--force computes them again" in call(*command, "--force").stderr.splitlines()[-1]
+    assert_one_line(called(*command), 1, str(data / "scenes"), "not a folder", run=True)
+    assert "--force computes them again" in called(*command, "--force").stderr.splitlines()[-1]
     (data / "scenes").unlink()
-    assert call(*command).returncode == 0
+    assert called(*command).returncode == 0
 
 
 def test_targets_that_cannot_be_written(smoke, tmp_path):
@@ -135,7 +136,7 @@ def test_targets_that_cannot_be_written(smoke, tmp_path):
         ("/proc/out", release),
         (file / "out", ["gallery", *sheet, "--out"]),
     ):
-        done = call(*args, str(target))
+        done = called(*args, target)
         assert_one_line(done, 1, "cannot write", str(target))
     assert file.read_text() == "mine"
 

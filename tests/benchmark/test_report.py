@@ -9,13 +9,13 @@ import math
 import re
 import shutil
 import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from support.command_line import called
 from support.run_logs import write_run
 from typer.testing import CliRunner
 
@@ -415,7 +415,6 @@ def test_the_command_says_in_one_line_what_is_wrong(log: Path, tmp_path: Path) -
     shutil.copytree(log, tmp_path / "broken")
     shard = next((tmp_path / "broken" / "episodes" / "random").glob("*.parquet"))
     shard.write_bytes(shard.read_bytes()[:100])
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", "--data", str(tmp_path / "broken")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = called("report", "--data", tmp_path / "broken")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "is damaged" in done.stderr

@@ -21,6 +21,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.command_line import called
 from support.handmade import UNSPLIT
 
 from aerialdojo_gen.base.errors import StoreError
@@ -258,10 +259,7 @@ def test_a_broken_release_is_named_by_its_file_and_its_mend(broken, damage, mess
 def test_stats_of_a_broken_release_names_every_fault_and_shows_no_table(broken):
     remove(broken)
     truncate(broken)
-    done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(broken)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = called("stats", "--data", broken)
     assert done.returncode == 1
     assert done.stdout == ""
     damaged, missing = done.stderr.splitlines()

@@ -2,8 +2,6 @@
 
 import csv
 import io
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from collections import Counter
 from dataclasses import replace
@@ -12,6 +10,7 @@ import cv2
 import numpy as np
 import pandas as pd
 import pytest
+from support.command_line import called
 
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.dataset.contents import check_release
@@ -281,8 +280,7 @@ def test_a_release_that_does_not_say_has_no_such_tables(smoke):
 
 
 def stats(*arguments):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    return called("stats", *arguments)
 
 
 @pytest.fixture(scope="module")

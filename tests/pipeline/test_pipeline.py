@@ -4,8 +4,6 @@ import io
 import itertools
 import json
 import math
-import subprocess
-import sys
 
 import cv2
 import numpy as np
@@ -13,6 +11,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import trimesh
+from support.command_line import called
 
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import schemas
@@ -270,10 +269,7 @@ def test_the_card_is_written(smoke, tasks):
 
 def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
     before = {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")}
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "render", "--pipeline", "pipelines/smoke.toml"]
-    done = subprocess.run(
-        [*command, "--limit", "1", "--data", str(smoke)], cwd=project, capture_output=True, text=True, check=False
-    )
+    done = called("render", "--pipeline", "pipelines/smoke.toml", "--limit", 1, "--data", smoke, cwd=project)
     assert done.returncode == 0, done.stderr
     tasks = pd.read_parquet(smoke / "release/tasks")
     trained = tasks[tasks["subset"] == "train"].groupby(["scene", "setting"]).ngroups
@@ -283,8 +279,7 @@ def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
 
 def test_a_run_prints_what_stats_prints(smoke, project):
     def said(*args):
-        command = [sys.executable, "-m", "aerialdojo_gen.cli", *args, "--data", str(smoke)]
-        done = subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+        done = called(*args, "--data", smoke, cwd=project)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

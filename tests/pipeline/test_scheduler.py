@@ -2,12 +2,11 @@
 
 import json
 import shutil
-import subprocess
-import sys
 from collections import Counter
 
 import pytest
 from support import chores
+from support.command_line import called
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.build import open_pipeline
@@ -72,8 +71,7 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
 
 def run(project, data, pipeline, *args, verb="run"):
     where = [str(pipeline)] if verb == "run" else ["--pipeline", str(pipeline)]
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", verb, *where, "--data", str(data), "--workers", "1", *args]
-    return subprocess.run(command, cwd=project, capture_output=True, text=True, check=False)
+    return called(verb, *where, "--data", data, "--workers", "1", *args, cwd=project)
 
 
 @pytest.mark.pipeline

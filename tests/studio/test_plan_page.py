@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from support.browser import chromium, errors, until
+from support.command_line import called
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 PLAN = """\
@@ -83,8 +84,7 @@ def test_a_saved_plan_is_built_again_and_a_broken_one_keeps_the_last_scene(plan)
 
 
 def test_a_file_that_does_not_exist_is_named(tmp_path):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "build-scenes", "--watch", str(tmp_path / "U_Nil_0.toml")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = called("build-scenes", "--watch", tmp_path / "U_Nil_0.toml")
     assert done.returncode == 2
     assert "U_Nil_0.toml" in done.stderr
     assert "Traceback" not in done.stderr

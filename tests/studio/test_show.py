@@ -4,8 +4,6 @@ import dataclasses
 import html as markup
 import re
 import shutil
-import subprocess
-import sys
 
 import cv2
 import numpy as np
@@ -14,6 +12,7 @@ import pyarrow.compute as pc
 import pytest
 import trimesh
 from support.browser import chromium, errors
+from support.command_line import called
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
@@ -219,8 +218,7 @@ def test_an_unknown_id_gives_the_nearest(smoke, ids, tmp_path):
         StoreError, match=r"there is no release in .*: it has no folder release; name its folder with --data"
     ):
         find_task(tmp_path, ids[0])
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "show", wrong, "--data", str(smoke)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    done = called("show", wrong, "--data", smoke, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
     assert done.stderr.startswith(f"error: no task '{wrong}'")
     assert list(tmp_path.iterdir()) == []
