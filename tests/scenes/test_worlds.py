@@ -96,7 +96,7 @@ def test_every_type_of_the_scenes_has_a_generator_and_suns_on_all_sides() -> Non
         assert all(z > 0.05 for *_, z in suns)
 
 
-@settings(max_examples=2)
+@settings(max_examples=4, deadline=None)
 @given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
 def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
     made = make_world(World(kind, seed, held_out=held_out), ASSETS, catalogue())
