@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
@@ -24,12 +25,15 @@ from aerialdojo_gen.scenes.noise import fractal, texture_rng
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+Indices = NDArray[np.int64]
 
 CHUNK_TRIANGLES = 96
 _LARGEST_TEXTURE = 512
 _MORTON_BITS = 16
-# Cosine between a face and the mean about a corner beyond which the corner is sharp: that of a box is 0.58.
-_SHARP = 0.7
+# Cosine of the angle between two faces beyond which the edge between them is sharp: of land, of things, by material.
+_LAND, _THINGS = 0.45, 0.7
+_CREASES = dict.fromkeys(NATURAL, _LAND) | dict.fromkeys(("foliage", "needles", "hedge"), 1e-6)
 # Materials whose pattern has no scale: they are drawn with grain at every distance.
 _GRAINED = frozenset({*NATURAL, "asphalt", "hedge"})
 _GRAIN_SPREAD, _GRAIN_MOST = 0.7, 11.0  # of the pattern's own, and of 255: from afar joints and stones are one tone
@@ -101,6 +105,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
     far: list[tuple[NDArray[np.void], tuple[str, ...]]] = []
     beyond = [instance for instance in scene.backdrop if instance.surface == HORIZON]
     for k, instance in (*enumerate(scene.instances), *((-1, instance) for instance in beyond)):
+        soft: dict[float, list[NDArray[np.void]]] = {}
         for part in instance.parts:
             material = scene.materials[part.material]
             if is_foreign(part, material):
@@ -113,8 +118,15 @@ def own_kinds(scene: Scene) -> list[Kind]:
                 far.append((found, (*_tags(material), "HORIZON")))
             else:
                 rows[_tags(material)].append(found)
+                # Buildings are flat: shallow roofs have a ridge.
+                crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else 1.0)
+                soft.setdefault(crease, []).append(found)
+        for crease, parts in soft.items():
+            if crease < 1.0:
+                smooth(*parts, crease=crease)
     # Land of several materials is smooth across their seams.
-    smooth(*(found for found, _ in far))
+    if far:
+        smooth(*(found for found, _ in far), crease=_LAND)
     for found, tags in far:
         rows.setdefault(tags, []).append(found)
     layers = _layers(scene, names, grained)
@@ -129,20 +141,33 @@ def _tags(material: Material) -> tuple[str, ...]:
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
-def smooth(*parts: NDArray[np.void]) -> None:
-    """Give corners the mean normal of the faces about them, but at sharp edges, in place."""
-    if not parts:
-        return
+def smooth(*parts: NDArray[np.void], crease: float) -> None:
+    """Give corners the mean normal of the faces about them that turn less than a crease from their own, in place."""
     whole = np.concatenate(parts)
     at = np.ascontiguousarray(whole["position"].reshape(-1, 3)).view("V12").ravel()
-    _, point = np.unique(at, return_inverse=True)
-    normal = whole["normal"].reshape(-1, 3)
-    mean = np.stack([np.bincount(point, normal[:, axis]) for axis in range(3)], axis=1)
-    mean = (mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9))[point]
-    soft = np.einsum("ij,ij->i", mean, normal) > _SHARP
-    found = np.where(soft[:, None], mean, normal).reshape(-1, 3, 3)
-    for part, some in zip(parts, np.split(found, np.cumsum([len(p) for p in parts])[:-1]), strict=True):
-        part["normal"] = some
+    _, point, count = np.unique(at, return_inverse=True, return_counts=True)
+    normal = np.ascontiguousarray(whole["normal"]).reshape(-1, 3)
+    found = _mean_normals(normal, np.argsort(point, kind="stable"), np.cumsum(count), crease)
+    for part, some in zip(parts, np.split(found, np.cumsum([3 * len(p) for p in parts])[:-1]), strict=True):
+        part["normal"] = some.reshape(part["normal"].shape)
+
+
+@njit(cache=True)
+def _mean_normals(normal: Singles, order: Indices, ends: Indices, crease: float) -> Singles:
+    """Mean normals (n, 3) of corners; ``order`` has those of a point side by side."""
+    found = np.empty_like(normal)
+    start = 0
+    for end in ends:
+        for i in order[start:end]:
+            x = y = z = np.float32(0.0)
+            for j in order[start:end]:
+                dot = normal[i, 0] * normal[j, 0] + normal[i, 1] * normal[j, 1] + normal[i, 2] * normal[j, 2]
+                if dot > crease:
+                    x, y, z = x + normal[j, 0], y + normal[j, 1], z + normal[j, 2]
+            length = max(np.sqrt(x * x + y * y + z * z), np.float32(1e-9))
+            found[i, 0], found[i, 1], found[i, 2] = x / length, y / length, z / length
+        start = end
+    return found
 
 
 def is_foreign(part: Part, material: Material) -> bool:

@@ -73,7 +73,7 @@ uniform vec3 sun_rgb;
 uniform vec3 sky_rgb;
 uniform vec3 ground_rgb;
 #else
-flat out vec3 v_light;
+out vec3 v_light;
 flat out vec3 v_normal;
 out vec4 v_sun;
 out vec3 v_heights;
@@ -153,7 +153,7 @@ in vec3 v_light;
 flat in vec3 v_normal;
 in vec4 v_air;
 #else
-flat in vec3 v_light;
+in vec3 v_light;
 flat in vec3 v_normal;
 in vec4 v_sun;
 in vec3 v_heights;

@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.portable import distances_along, dot, norm, product
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
-_CLUMP_CORNERS = 24
+_CLUMP_CORNERS = 46
 
 
 def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
@@ -62,24 +62,15 @@ def clump(
     ragged: float = 0.3,
     belly: float = 0.6,
 ) -> Mesh:
-    """Make a clump of leaves: a lumpy closed ellipsoid bristling with sprays of twigs, 88 triangles."""
+    """Make a clump of leaves: a closed ellipsoid, lumpy by a share of its radii, 88 triangles."""
     directions, faces = _ball()
     turn = rng.uniform(0, 2 * np.pi)
     c, s = np.cos(turn), np.sin(turn)
     v = product(directions, np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
-    v = v * (1.0 - ragged * rng.uniform(0.0, 0.9, size=(len(v), 1)))
-    # Every other face carries a spray: a low pyramid whose tip stands out from the clump.
-    bare, sprayed = faces[::2], faces[1::2]
-    a, b, c3 = (v[sprayed[:, k]] for k in range(3))
-    weights = rng.dirichlet((3.0, 3.0, 3.0), size=len(sprayed))
-    tips = weights[:, :1] * a + weights[:, 1:2] * b + weights[:, 2:] * c3
-    tips = unit(tips)
-    tips = tips * (1.0 + ragged * rng.uniform(-0.1, 0.9, size=(len(tips), 1)))
-    k = np.arange(len(v), len(v) + len(tips))
-    corner = [np.column_stack([sprayed[:, i], sprayed[:, (i + 1) % 3], k]) for i in range(3)]
-    v = np.concatenate([v, tips])
+    lumps = np.cos(product(v, rng.normal(scale=3.0, size=(3, 4))) + rng.uniform(0, 2 * np.pi, size=4)).mean(axis=1)
+    v = v * (1.0 + ragged * (0.6 * lumps + rng.uniform(-0.8, 0.7, size=len(v))))[:, None]
     v[:, 2] = np.where(v[:, 2] < 0, v[:, 2] * belly, v[:, 2])
-    return mesh(v * np.asarray(radii) + np.asarray(centre), np.concatenate([bare, *corner]))
+    return mesh(v * np.asarray(radii) + np.asarray(centre), faces)
 
 
 @cache

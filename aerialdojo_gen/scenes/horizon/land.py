@@ -23,6 +23,8 @@ _FAN = 10  # Sectors of a corner
 # Where the edge's own heights, a road, and the level land end, metres from the edge.
 _BLEND_M, _ROAD_M, _HILLS_M, _ISLANDS_M = 60.0, 300.0, 200.0, 800.0
 _SHORE_M = 70.0
+# Pavement that meets the edge for longer than a road is wide ends this far from it, metres.
+_WIDEST_ROAD_M, _YARD_M = 20.0, 28.0
 _STEP_M = 0.25
 _NATURAL = frozenset(
     {"grass", "meadow", "dirt", "sand", "snow", "rock", "moss", "leaf_litter", "gravel", "mud", "soil"}
@@ -204,14 +206,14 @@ _Faces = tuple[Floats, list[str], NDArray[np.bool_], NDArray[np.bool_]]
 def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> list[_Faces]:
     """The rings but the innermost: two triangles a strip."""
     out: list[_Faces] = []
-    beyond = _without_shallows(strips)
+    beyond, reach = _without_shallows(strips), _reaches(strips)
     for r in range(1, len(RINGS_M) - 1):
         a, b, c, d = v[:, 0, r], v[:, 0, r + 1], v[:, 1, r + 1], v[:, 1, r]
         middle = (a + b + c + d) / 4.0
         pick = noise(middle[:, 0], middle[:, 1], 45.0 + RINGS_M[r] / 3.0, 5.0)
         names, land = [], []
         for k, material in enumerate(strips.material):
-            natural = material == base or RINGS_M[r] >= _ROAD_M
+            natural = material == base or RINGS_M[r] >= reach[k]
             name = material
             if strips.water[k]:
                 name, natural = (kind.far, False) if b[k, 2] > strips.foot[k, 0, 2] + 2.0 else (beyond[k], False)
@@ -228,16 +230,32 @@ def _quads(strips: _Strips, v: Floats, kind: Kind, base: str, noise: Noise) -> l
     return out
 
 
+def _runs(strips: _Strips) -> list[list[int]]:
+    """Strips of one material side by side, all round."""
+    names, n = strips.material, len(strips.material)
+    starts = [k for k in range(n) if names[k] != names[k - 1]]
+    ends = [*starts[1:], starts[0] + n] if starts else []
+    return [[k % n for k in range(first, after)] for first, after in zip(starts, ends, strict=True)]
+
+
 def _without_shallows(strips: _Strips) -> list[str]:
     """Materials of the strips beyond the edge: patches in the sea end there, they would be bands to the horizon."""
-    names, water, n = strips.material, strips.water, len(strips.material)
-    sea = _longest((names[k], strips.border[k]) for k in np.flatnonzero(water))
-    out = list(names)
-    starts = [k for k in range(n) if names[k] != names[k - 1]]
-    for first, after in zip(starts, starts[1:] + starts[:1], strict=True):
-        if water[first] and water[first - 1] and water[after]:
-            for k in range(first, after if after > first else after + n):
-                out[k % n] = sea
+    water, n = strips.water, len(strips.material)
+    sea = _longest((strips.material[k], strips.border[k]) for k in np.flatnonzero(water))
+    out = list(strips.material)
+    for run in _runs(strips):
+        if water[run[0]] and water[run[0] - 1] and water[(run[-1] + 1) % n]:
+            for k in run:
+                out[k] = sea
+    return out
+
+
+def _reaches(strips: _Strips) -> Floats:
+    """Distances (n,) to which the strips keep their material, metres: a yard wider than a road soon ends."""
+    width, out = norm(strips.foot[:, 1] - strips.foot[:, 0]), np.full(len(strips.material), _ROAD_M)
+    for run in _runs(strips):
+        if strips.material[run[0]].split(":")[0] not in _NATURAL and width[run].sum() > _WIDEST_ROAD_M:
+            out[run] = _YARD_M
     return out
 
 

@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import AssetError
 # A generator's version is raised when it gives another plan for a seed: plans of older versions are refused by name.
 # Those of the other types are at version 2.
 VERSIONS = {
-    "I_Bridge": 3, "I_RailCorridor": 3, "N_Island": 3, "N_Mountain": 3, "N_Snowfield": 3, "U_Community": 3,
+    "I_Bridge": 3, "I_RailCorridor": 3, "N_Island": 3, "N_Mountain": 3, "N_Snowfield": 3, "U_Community": 4,
     "U_Mall": 4, "U_ParkingLot": 4,
 }  # fmt: skip
 # Seeds of the test and of the validation worlds; all that follow are for training.
