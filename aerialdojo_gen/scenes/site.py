@@ -289,7 +289,7 @@ class Site:
         x, y = self.head.size_m
         floor = float(ground.bounds[0, 2])
         bounds = np.array([[-x / 2, -y / 2, floor], [x / 2, y / 2, self.head.ceiling_m]])
-        beyond = make_horizon(self.name, self.head.horizon, ground, bounds, self.catalogue.materials)
+        beyond = make_horizon(self.name, self.head.horizon, ground, self.instances, bounds, self.catalogue.materials)
         specs = sorted({p.material for i in (*instances, *beyond) for p in i.parts})
         materials = {s: self.catalogue.materials[s] for s in specs}
         sky, sun = parse_colour(self.head.sky), self.head.sun_direction

@@ -35,3 +35,25 @@ def test_a_road_goes_on_and_a_yard_ends() -> None:
     reach = {part.material: np.abs(part.vertices[:, :2]).max() for part in beyond.parts}
     assert reach[road] > 200.0
     assert 40.0 < reach[yard] < 80.0
+
+
+def test_a_river_that_is_a_sheet_of_water_over_its_bed_goes_on_between_its_banks() -> None:
+    bank, river = "grass:#6f8f46", "water:#4f7f8c"
+    plan = {
+        "plan": 1, "size_m": [80, 80], "ceiling_m": 20, "horizon": {"kind": "fields", "hills_m": 0},
+        "ground": {"material": bank, "steps": [
+            {"make": "rolling_ground", "cell_m": 2, "height_m": 0.1, "wavelength_m": 40},
+            {"make": "slope", "start_m": -14, "end_m": -10, "to_m": -4, "within": [-14, 0]},
+            {"make": "slope", "start_m": 14, "end_m": 10, "to_m": -4, "within": [0, 14]}]},
+        "site": [{"node": "river", "parts": [
+            {"shape": "block", "role": river, "corners": [-12, -40, 12, 40], "z": [-2, -1]}]}],
+    }  # fmt: skip
+    scene = build_tables("I_Test_0", plan, catalogue())
+    (beyond,) = scene.backdrop
+    water = [part for part in beyond.parts if part.material == river]
+    assert water
+    at = water[0].vertices
+    assert np.abs(at[:, 1]).max() > 1000.0
+    near = at[np.abs(at[:, 1]) < 43.0]
+    np.testing.assert_allclose(near[:, 2], -1.0, atol=1e-6)
+    assert np.abs(near[:, 0]).max() <= 14.0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.model import Instance, Part
 
 Floats = NDArray[np.float64]
+_Piece = tuple[float, Floats, str]  # Where it begins along its side, its ends (2, 3), its material
 
 _ON_M, _SHORT_M = 1e-3, 1e-6
 # Stretches of one material are joined up to this length, metres.
@@ -32,22 +34,29 @@ class Stretch:
     @property
     def water(self) -> bool:
         """Whether it is open water."""
-        return self.material.split(":")[0] == "water"
+        return is_water(self.material)
 
 
-def border_of(ground: Instance, bounds: Floats) -> list[Stretch]:
-    """List the stretches of the ground's edge, counter-clockwise from the south-western corner."""
+def border_of(ground: Instance, bounds: Floats, above: Iterable[Instance] = ()) -> list[Stretch]:
+    """List the stretches of the edge of ground and water, counter-clockwise from the south-western corner."""
+    water = [part for thing in above for part in thing.parts if is_water(part.material)]
     out: list[Stretch] = []
     for side in range(4):
-        pieces = sorted(
-            (piece for part in ground.parts for piece in _pieces(part, bounds, side)), key=lambda piece: piece[0]
+        land, sheets = (
+            sorted((piece for part in parts for piece in _pieces(part, bounds, side)), key=lambda piece: piece[0])
+            for parts in (ground.parts, water)
         )
-        out += _joined(side, pieces)
+        out += _joined(side, _topmost(side, land, sheets) if sheets else land)
     return out
 
 
-def _pieces(part: Part, bounds: Floats, side: int) -> list[tuple[float, Floats, str]]:
-    """Edges of the upward faces of a part that lie on a side: where each begins, its ends (2, 3), its material."""
+def is_water(material: str) -> bool:
+    """Whether a material is open water."""
+    return material.split(":")[0] == "water"
+
+
+def _pieces(part: Part, bounds: Floats, side: int) -> list[_Piece]:
+    """Edges of the upward faces of a part that lie on a side."""
     axis, way, upper = _SIDES[side]
     across = 1 - axis
     corners = part.vertices[part.faces]
@@ -64,7 +73,39 @@ def _pieces(part: Part, bounds: Floats, side: int) -> list[tuple[float, Floats, 
     return found
 
 
-def _joined(side: int, pieces: Sequence[tuple[float, Floats, str]]) -> list[Stretch]:
+def _topmost(side: int, land: Sequence[_Piece], sheets: Sequence[_Piece]) -> list[_Piece]:
+    """Cut land where sheets of water lie over it; they stand in its place there."""
+    axis, way, _ = _SIDES[side]
+
+    def at(ends: Floats, t: float) -> Floats:
+        first, last = (ends[:, axis] * way).tolist()
+        return np.asarray(ends[0] + (ends[1] - ends[0]) * ((t - first) / (last - first)))
+
+    out = []
+    for piece in land:
+        first, last = (piece[1][:, axis] * way).tolist()
+        cuts, over = {first, last}, []
+        for sheet in sheets:
+            low, high = np.clip(sheet[1][:, axis] * way, first, last).tolist()
+            if high - low <= _SHORT_M:
+                continue
+            over.append(sheet)
+            above = [float(at(piece[1], t)[2] - at(sheet[1], t)[2]) for t in (low, high)]
+            cuts |= {low, high}
+            if above[0] * above[1] < 0.0:
+                cuts.add(low + (high - low) * above[0] / (above[0] - above[1]))
+        if not over:
+            out.append(piece)
+            continue
+        for low, high in pairwise(sorted(cuts)):
+            middle = (low + high) / 2.0
+            here = [one for one in over if one[0] <= middle <= float(one[1][1, axis] * way)]
+            _, ends, material = max([piece, *here], key=lambda one: float(at(one[1], middle)[2]))
+            out.append((low, np.stack([at(ends, low), at(ends, high)]), material))
+    return out
+
+
+def _joined(side: int, pieces: Sequence[_Piece]) -> list[Stretch]:
     axis, way, _ = _SIDES[side]
     out: list[Stretch] = []
     points: list[Floats] = []

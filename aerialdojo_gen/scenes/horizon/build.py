@@ -26,11 +26,12 @@ _ABOVE_M = 15.0
 
 
 def make_horizon(
-    scene: str, head: HorizonHead, ground: Instance, bounds: NDArray[np.float64], materials: MaterialLibrary
-) -> tuple[Instance, ...]:
-    """Build the horizon of a scene from the edge of its ground; empty where the plan wants none."""
+    scene: str, head: HorizonHead, ground: Instance, above: Iterable[Instance], bounds: NDArray[np.float64],
+    materials: MaterialLibrary,
+) -> tuple[Instance, ...]:  # fmt: skip
+    """Build the horizon of a scene from the edge of its ground and water; empty where the plan wants none."""
     kind = kind_of(scene, head)
-    border = border_of(ground, bounds)
+    border = border_of(ground, bounds, above)
     if kind is None or not border:
         return ()
     noise, rng = Noise(head.seed, scene), generator(head.seed, "horizon-things", scene)

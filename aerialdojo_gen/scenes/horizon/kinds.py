@@ -38,7 +38,10 @@ KINDS: dict[str, Kind] = {
     ),
     "town": Kind(fields=("grass:#6f8f46",), near_m=1.0, houses="terraces", houses_ha=9.0, trees_ha=22, wood=0.1),
     "suburb": Kind(fields=_GREEN[:2], houses="detached", houses_ha=9.0, trees_ha=32, wood=0.2),
-    "works": Kind(fields=("gravel:#9a948a",), near_m=0.5, houses="sheds", houses_ha=4.0, trees_ha=12, wood=0.1),
+    "works": Kind(
+        fields=("grass:#75864f", "gravel:#8c867c", "meadow:#86894f"), near_m=0.5, houses="sheds", houses_ha=4.0,
+        trees_ha=12, wood=0.1,
+    ),
     "fields": Kind(fields=(*_GREEN, "dirt:#8f7a58"), near_m=2.5, houses="farms", houses_ha=0.5, trees_ha=7, wood=0.2),
     "woods": Kind(near_m=5.0, hills_m=70, trees_ha=150, trees=("round", "spire"), wood=0.95, far="meadow:#55703f"),
     "mountains": Kind(

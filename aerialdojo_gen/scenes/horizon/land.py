@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.portable import norm, power
-from aerialdojo_gen.scenes.horizon.border import OUTWARDS, Stretch
+from aerialdojo_gen.scenes.horizon.border import OUTWARDS, Stretch, is_water
 from aerialdojo_gen.scenes.horizon.kinds import Kind
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ class _Strips:
                 way.append(np.stack([np.cos(angle), np.sin(angle)], axis=1))
                 material.append(near.material if near.water else base)
                 points.append(corner[None])
-        water = np.array([name.split(":")[0] == "water" for name in material])
+        water = np.array([is_water(name) for name in material])
         return cls(np.array(foot), np.array(way), material, water, points)
 
 
