@@ -57,8 +57,9 @@ def draft_scene(
     *,
     force: bool = False,
     reporter: Reporter | None = None,
+    scene: Scene | None = None,
 ) -> Path:
-    """Draft a scene's annotations and write them to the annotations folder."""
+    """Draft a scene's annotations and write them to the annotations folder; builds the scene unless it is given."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     options = options or DraftOptions()
     if path.exists() and not force:
@@ -68,7 +69,7 @@ def draft_scene(
     exact = counts is not None and n_objects != AUTO
     most = n_objects if isinstance(n_objects, int) else counts[1] if counts and exact else _AUTO_OBJECTS
     catalogue = load_catalogue(roots.scene_assets)
-    scene = build_scene(roots.recipes / f"{name}.toml", catalogue)
+    scene = scene or build_scene(roots.recipes / f"{name}.toml", catalogue)
     vocabulary = Vocabulary(scene, catalogue)
     targets = Counter(i.category for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target)
     if not targets:

@@ -136,7 +136,7 @@ def _write_world(work: _Work) -> VariedWorld:
     folders = (home() / "scene_assets", project / "scenes", project / "annotations")
     paths = ProjectPaths(open_root(project / "data"), *folders)
     draft = DraftOptions(n_objects=options.n_objects, seed=world.seed)
-    draft_scene(world.name, pipeline, paths, draft, force=True)
+    draft_scene(world.name, pipeline, paths, draft, force=True, scene=made.scene)
     return VariedWorld(world.name, made=True, refused=made.refused)
 
 
