@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.motion import N_HEADINGS, TURN_RAD
 from aerialdojo_gen.planning.grid_kernels import GridArrays, bound_at, inside, segment_free
-from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
+from aerialdojo_gen.planning.preference import AHEAD_ROUNDING_M, Preference, approach_penalty, clearance_penalty
 from aerialdojo_gen.planning.translations import DOWN, UP
 
 # Orders of the three legs: along the nearer direction clockwise, counter-clockwise, vertical.
@@ -133,7 +133,9 @@ def direct_legs(
                 gap = math.sqrt(flat2 + ez * ez)
                 if gap > approach:
                     continue
-                cost = total + q + gap + (prefer.approach_penalty if ahead < prefer.ahead_cos * gap else 0.0)
+                cost = total + q + gap
+                if ahead < prefer.ahead_cos * gap - AHEAD_ROUNDING_M:
+                    cost += prefer.approach_penalty
                 if cost < best:
                     best, na, nb, nz = cost, p, total - p, q
     if best == np.inf:

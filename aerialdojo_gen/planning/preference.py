@@ -18,7 +18,7 @@ from aerialdojo_gen.base.kernels import njit
 _STEP_M = 0.5
 # Cells' costs are multiples of this, so that float32 adds them without rounding.
 CLEARANCE_COST_UNIT = 1.0 / 16
-_COS_ROUNDING = 1e-9
+AHEAD_ROUNDING_M = 1e-9  # Of the way ahead in an Approach, which may have no length
 
 
 class Preference(NamedTuple):
@@ -89,4 +89,4 @@ def clearance_penalty(
 @njit(cache=True, inline="always")
 def approach_penalty(dx: float, dy: float, yaw: float, length: float, ahead_cos: float, cost: float) -> float:
     """Extra cost, metres, of an Approach that does not fly ahead."""
-    return cost if dx * math.cos(yaw) + dy * math.sin(yaw) < (ahead_cos - _COS_ROUNDING) * length else 0.0
+    return cost if dx * math.cos(yaw) + dy * math.sin(yaw) < ahead_cos * length - AHEAD_ROUNDING_M else 0.0

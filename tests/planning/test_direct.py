@@ -3,7 +3,7 @@ from itertools import pairwise, permutations, product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from support.flying import town
 from support.handmade import scene
@@ -85,6 +85,7 @@ def metres(low, high):
 
 
 @settings(max_examples=60, deadline=None)
+@example((1.0, 0.0, 2.0), (0.0, 0.0, 2.0), 0.0, -1.0)  # Backwards onto the goal: what is left has no direction
 @given(
     st.tuples(*[metres(-40, 40)] * 2, metres(2, 40)),
     st.tuples(*[metres(-40, 40)] * 2, metres(2, 40)),
