@@ -119,11 +119,11 @@ def own_kinds(scene: Scene) -> list[Kind]:
             else:
                 rows[_tags(material)].append(found)
                 # Buildings are flat: shallow roofs have a ridge.
-                crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else 1.0)
-                soft.setdefault(crease, []).append(found)
+                crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else None)
+                if crease is not None:
+                    soft.setdefault(crease, []).append(found)
         for crease, parts in soft.items():
-            if crease < 1.0:
-                smooth(*parts, crease=crease)
+            smooth(*parts, crease=crease)
     # Land of several materials is smooth across their seams.
     if far:
         smooth(*(found for found, _ in far), crease=_LAND)

@@ -3,8 +3,8 @@
     python tests/golden/digests.py data > tests/golden/release.sha256
 
 One line per mesh, and per table and scene: a digest of the rows, without what footers say of the code, and its name.
-Of `anchors` and `pairs` it leaves out what counts rays: of some millions, one along the very edge of a triangle is a
-hit for Embree with AVX-512 and a miss without.
+It leaves out the columns that count rays: of some millions, one along the very edge of a triangle is a hit for Embree
+with AVX-512 and a miss without.
 """
 
 from __future__ import annotations

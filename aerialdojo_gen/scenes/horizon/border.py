@@ -37,7 +37,7 @@ class Stretch:
         return is_water(self.material)
 
 
-def border_of(ground: Instance, bounds: Floats, above: Iterable[Instance] = ()) -> list[Stretch]:
+def border_of(ground: Instance, bounds: Floats, above: Iterable[Instance]) -> list[Stretch]:
     """List the stretches of the edge of ground and water, counter-clockwise from the south-western corner."""
     water = [part for thing in above for part in thing.parts if is_water(part.material)]
     out: list[Stretch] = []

@@ -18,7 +18,6 @@ from aerialdojo_gen.scenes.worlds.wilds import strewn
 Point = tuple[float, float]
 _STOREY_M, _PITCH_M = 3.2, 6.4  # Of flats and of their balconies
 _NAMES = "ABCDEFGHIJKL"
-_LOW = ("fountain", "obelisk", "treehouse", "trophy_monument")  # Roofs hide them, but in the middle of the garden
 
 
 class _Estate(NamedTuple):
@@ -52,10 +51,7 @@ def write(draft: Draft) -> None:
     draft.section("Landmarks")
     site = Box(-draft.width_m / 2, -draft.depth_m / 2, draft.width_m / 2, draft.depth_m / 2)
     near = sorted(grid(site.grown(-6), 5.0), key=lambda p: math.dist(p, middle) + draft.number(0, 10, "near", *p))
-    if draft.chance(0.35, "low"):
-        draft.landmark([(*middle, 0.0)], _LOW)
-    high = [what for what in draft.kind.landmarks if what not in _LOW]
-    draft.landmark([(*middle, 0.0), *((*p, draft.pick(SIDES, "landmark", *p)) for p in near)], high)
+    draft.landmark([(*middle, 0.0), *((*p, draft.pick(SIDES, "landmark", *p)) for p in near)])
     if not draft.landmarks:
         raise NoRoomError("no room for a landmark")
     _courts(draft, middle)
