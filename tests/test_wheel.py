@@ -21,6 +21,9 @@ def unpacked(project, tmp_path_factory):
     (wheel,) = folder.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site-packages")
+    # Machine code goes by the digests of its sources: what is compiled already is not compiled again.
+    for kernels in (project / "aerialdojo_gen").rglob("__pycache__/kernels"):
+        shutil.copytree(kernels, folder / "site-packages" / kernels.relative_to(project))
     return folder / "site-packages"
 
 

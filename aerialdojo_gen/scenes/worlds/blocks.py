@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import shapely
 
@@ -13,35 +12,6 @@ from aerialdojo_gen.scenes.worlds.streets import Box, grid
 
 Point = tuple[float, float]
 SIDES = (0.0, 90.0, 180.0, 270.0)
-
-
-class Turn(NamedTuple):
-    """Quarter turns and a mirror that a layout is drawn under: else all of a topology would lie alike."""
-
-    quarter: int
-    flip: int
-
-    def at(self, x: float, y: float) -> Point:
-        """Turn a point."""
-        x = self.flip * x
-        for _ in range(self.quarter):
-            x, y = -y, x
-        return round(x, 2), round(y, 2)
-
-    def box(self, box: Box) -> Box:
-        """Turn a rectangle."""
-        (x0, y0), (x1, y1) = self.at(box.x0, box.y0), self.at(box.x1, box.y1)
-        return Box(min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))
-
-    def yaw(self, deg: float) -> float:
-        """Turn a direction."""
-        return ((180.0 - deg if self.flip < 0 else deg) + 90.0 * self.quarter) % 360.0
-
-
-def turned(draft: Draft) -> tuple[Turn, float, float]:
-    """Draw a turn; gives the half extents of the site before it as well."""
-    turn, w, d = Turn(draft.whole(0, 3, "quarter"), draft.pick([1, -1], "flip")), draft.width_m / 2, draft.depth_m / 2
-    return turn, *((d, w) if turn.quarter % 2 else (w, d))
 
 
 def split(draft: Draft, box: Box, lane_m: Point, size_m: Point, *key: object) -> tuple[list[Box], list[Box]]:

@@ -47,6 +47,8 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
         draft = Draft(world, kind, catalogue, trial)
         try:
             generator_of(world.type)(draft)
+            if not draft.landmarks:
+                raise NoRoomError("no room for a landmark")
             draft.add_life()
         except NoRoomError as error:
             refused.append((str(error), ""))

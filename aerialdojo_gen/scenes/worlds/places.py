@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.sizes import extents_m
 from aerialdojo_gen.scenes.worlds.street_maps import pose_on
 from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, clearing, step
@@ -170,5 +170,3 @@ def landmarks(draft: Draft, near: Sequence[Point] = (), margin_m: float = 7.0) -
     for what, x, y in draft.landmark([*wide, *poses]):
         reach = max(extents_m(draft.catalogue, what)) / 2 + 0.8
         step(draft, "level_area", area={"disc": [x, y, round(reach, 1)]}, blend_m=4)
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")

@@ -60,8 +60,6 @@ def settle(draft: Draft, isle: Isle) -> None:
     if draft.chance(0.6, "lighthouse"):
         draft.landmark(spots[: len(isle.heads)], of=["lighthouse"])
     draft.landmark(spots)
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     for head in isle.heads:
         about(draft, "lookout", head, (5.2, 7.4), 5, (3.4, 3.4))
     draft.level_things = False  # The land is gentle enough for small things

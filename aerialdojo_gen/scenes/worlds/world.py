@@ -12,8 +12,9 @@ from aerialdojo_gen.base.errors import AssetError
 # A generator's version is raised when it gives another plan for a seed: plans of older versions are refused by name.
 # Those of the other types are at version 2.
 VERSIONS = {
-    "I_Bridge": 3, "I_RailCorridor": 3, "N_Island": 3, "N_Mountain": 3, "N_Snowfield": 3, "U_Community": 4,
-    "U_Mall": 4, "U_ParkingLot": 4,
+    "D_Earthquake": 3, "D_Explosion": 3, "D_Flood": 3, "I_Bridge": 3, "I_RailCorridor": 3, "N_Island": 4,
+    "N_Mountain": 3, "N_Snowfield": 3, "U_Alley": 3, "U_Community": 5, "U_ConstructionSite": 3, "U_Factory": 3,
+    "U_Mall": 4, "U_ParkingLot": 5,
 }  # fmt: skip
 # Seeds of the test and of the validation worlds; all that follow are for training.
 TEST_SEEDS, VALIDATION_SEEDS = range(200), range(200, 1000)

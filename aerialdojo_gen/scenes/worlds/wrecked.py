@@ -9,7 +9,7 @@ from typing import Any
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.places import Pose, beside
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
 from aerialdojo_gen.scenes.worlds.wilds import step
@@ -169,8 +169,6 @@ def open_landmarks(draft: Draft, open_: Sequence[Box], shut: BaseGeometry) -> No
     free = [p for box in open_ for p in grid(box.grown(-2.6), 4.0) if not shut.intersects(shapely.Point(p))]
     yaws = (0.0, 90.0, 180.0, 270.0)
     draft.landmark([(*p, draft.pick(yaws, "landmark", *p)) for p in draft.shuffled(free, "landmarks")])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
 
 
 def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point, *, spread: float = 0.6) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import Turn, lane_streets, turned
+from aerialdojo_gen.scenes.worlds.blocks import lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.places import point
 from aerialdojo_gen.scenes.worlds.streets import Box
@@ -26,17 +26,17 @@ from aerialdojo_gen.scenes.worlds.wrecked import (
 
 def write(draft: Draft) -> None:
     """Lay the town out, let the fault run through it, then wreck its buildings, and set up camp where it is open."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     rolling(draft, 0.3, (26, 36), 1.6)
     draft.level_things = False
-    lots, lanes, open_ = ([turn.box(b) for b in boxes] for boxes in _TOPOLOGIES[draft.topology](draft, w, d))
+    lots, lanes, open_ = _TOPOLOGIES[draft.topology](draft, w, d)
     draft.section("Streets and open ground")
     for box in open_:
         draft.paint(box.rounded(), draft.material("square", *box))
     for box in lots:
         draft.paint(box.grown(-0.5).rounded(), draft.material("yard", *box))
     lane_streets(draft, lanes)
-    fault = _fault(draft, turn, w, d)
+    fault = _fault(draft, w, d)
     for lane in lanes:
         draft.take(lane.shape())
     open_landmarks(draft, open_, fault.buffer(5.0))
@@ -54,11 +54,11 @@ def write(draft: Draft) -> None:
     littered(draft)
 
 
-def _fault(draft: Draft, turn: Turn, w: float, d: float) -> shapely.LineString:
+def _fault(draft: Draft, w: float, d: float) -> shapely.LineString:
     """Let the ground on one side of a line through the site sink, with cracks about it."""
     far = draft.number(0.3, 0.6, "tilt") * d
     bends = [(-1.4, -1.0), (-0.5, -0.3), (0.1, 0.2), (0.6, 0.35), (1.4, 1.0)]
-    points = [turn.at(f * w, s * far + draft.number(-4, 4, "fault", k)) for k, (f, s) in enumerate(bends)]
+    points = [point(f * w, s * far + draft.number(-4, 4, "fault", k)) for k, (f, s) in enumerate(bends)]
     line = smoothed(points, 0)
     drop = draft.number(0.7, 1.8, "drop") * (1.6 if draft.topology == "scarp" else 1.0)
     step(draft, "fault", path=[list(p) for p in points], drop_m=round(drop, 2), width_m=1.4)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import lane_streets, split, turned
+from aerialdojo_gen.scenes.worlds.blocks import lane_streets, split
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.places import beside, point
 from aerialdojo_gen.scenes.worlds.streets import Box
@@ -20,10 +20,10 @@ Point = tuple[float, float]
 
 def write(draft: Draft) -> None:
     """Lay streets and lots out, blast a crater, then tear the buildings open, the more the nearer they stand."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     rolling(draft, 0.25, (22, 32), 1.6)
     draft.level_things = False
-    lots, lanes, open_ = ([turn.box(b) for b in boxes] for boxes in _TOPOLOGIES[draft.topology](draft, w, d))
+    lots, lanes, open_ = _TOPOLOGIES[draft.topology](draft, w, d)
     draft.section("Streets and open ground")
     for box in open_:
         draft.paint(box.rounded(), draft.material("square", *box))

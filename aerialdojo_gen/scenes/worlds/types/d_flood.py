@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import split, turned
+from aerialdojo_gen.scenes.worlds.blocks import split
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.places import Pose, beside, point
 from aerialdojo_gen.scenes.worlds.street_maps import pose_on
@@ -34,35 +34,29 @@ class _Land(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Raise dykes and mounds out of the water, drown houses, and set boats, tents and what drifts about them."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     land = _TOPOLOGIES[draft.topology](draft, w, d)
-    dykes = [[turn.at(*p) for p in line] for line in land.dykes]
-    mounds = [(turn.at(*at), radius) for at, radius in land.mounds]
-    houses = [(*turn.at(x, y), round(turn.yaw(yaw), 1)) for x, y, yaw in land.houses]
-    flats = [(turn.box(box), turn.yaw(yaw)) for box, yaw in land.flats]
+    mounds = land.mounds
     draft.head["palette"] = {role: draft.material(role) for role in ("mud", "bank", "foam", "stain")}
     step(draft, "water_level")
-    _banks(draft, dykes, mounds, [[turn.at(*p) for p in line] for line in land.currents])
+    _banks(draft, land)
     draft.section("Landmarks")
     draft.landmark([(*at, draft.number(0, 360, "landmark", *at)) for at, _ in draft.shuffled(mounds, "landmarks")])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     for at, radius in mounds:
         if radius > 8.0:
             about(draft, "mound", at, (radius - 3.0, radius - 1.6), 7, (7.0, 6.6))
         about(draft, "small", at, (radius - 2.6, radius - 1.0), 7, (2.6, 2.6))
         draft.take(shapely.Point(at).buffer(radius + 5.0))
     draft.section("Drowned houses")
-    _houses(draft, houses)
-    _flats(draft, flats)
-    _water(draft, w if not turn.quarter % 2 else d, d if not turn.quarter % 2 else w)
+    _houses(draft, land.houses)
+    _flats(draft, land.flats)
+    _water(draft, w, d)
     draft.fill_slots()
     _trees(draft)
 
 
-def _banks(
-    draft: Draft, dykes: Sequence[list[Point]], mounds: Sequence[tuple[Point, float]], currents: Sequence[list[Point]]
-) -> None:  # fmt: skip
+def _banks(draft: Draft, land: _Land) -> None:
+    dykes, mounds = land.dykes, land.mounds
     high = draft.number(2.4, 3.6, "dyke")
     names = []
     for k, line in enumerate(dykes):
@@ -74,7 +68,7 @@ def _banks(
         draft.areas[f"mound_{k}"] = {"disc": [*at, radius]}
         step(draft, "raise_bank", area=f"mound_{k}", to_m=draft.number(0.8, 1.8, "mound", k), slope_m=4)
     draft.section("Water, banks and mounds")
-    for line in currents:
+    for line in land.currents:
         draft.make("streaks", paths=[[list(p) for p in line]], width_m=draft.number(5, 9, "current"))
     for k in range(len(mounds)):
         draft.make("paint_island", area=f"mound_{k}", slope_m=4, way=draft.material("mound", k))

@@ -79,8 +79,6 @@ def write(draft: Draft) -> None:
     whole = Box(*port.land.bounds)
     room = [(*p, port.yaw(-90)) for p in draft.shuffled(grid(whole.grown(-6), 7.0), "landmarks")]
     draft.landmark([*heads, *room], of=[what for what in draft.kind.landmarks if what != "container_crane"])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     free = [p for p in grid(whole.grown(-4.0), 5.6) if draft.is_free(shapely.Point(p).buffer(2.9))]
     for x, y in draft.shuffled(free, "yard")[: round(draft.knob("goods"))]:
         draft.slot("yard", x, y, draft.pick([0.0, 90.0, 180.0, 270.0], "yard", x, y), (6.4, 4.6))

@@ -36,8 +36,6 @@ def write(draft: Draft) -> None:
     step(draft, "level_under_things")
     draft.section("Landmarks")
     draft.landmark(anywhere(draft))
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     strewn(draft, "wood", 44, (4.0, 4.0))
     draft.fill_slots()
     draft.section("The wood")

@@ -22,7 +22,7 @@ def write(draft: Draft) -> None:
 
 def _off_shore(draft: Draft, bay_deg: float) -> Point:
     """Middle of an island that lies off the site's, so that the open sea before its bay is wide."""
-    return ahead((0, 0), bay_deg + 180, draft.number(5, 12, "middle"))
+    return ahead((0, 0), bay_deg + 180, draft.number(8, 15, "middle"))
 
 
 def _cone(at: Point, radius_m: float, height_m: float, lobes: int) -> dict[str, str]:
@@ -45,7 +45,7 @@ def _knoll(name: str, at: Point, radius_m: float, height_m: float) -> dict[str, 
 def _volcano(draft: Draft, w: float, d: float) -> Isle:
     bay = draft.number(0, 360, "bay")
     middle = _off_shore(draft, bay)
-    land = coast(draft, "coast", middle, (w * 0.75, d * 0.75), [(bay, 0.36, 38)])
+    land = coast(draft, "coast", middle, (w * 0.72, d * 0.72), [(bay, 0.36, 38)])
     top, height = ahead(middle, bay + 180 + draft.number(-30, 30, "top"), 14), draft.number(13, 18, "height")
     islands(draft, [{"polygon": ["coast"]}], land, draft.knob("relief_m"),
             heights=_cone(top, draft.number(25, 30, "radius"), height, draft.whole(5, 9, "lobes")),
@@ -147,7 +147,7 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
     """A table of rock with a ruined fort, a village at its foot."""
     bay = draft.number(0, 360, "bay")
     middle = _off_shore(draft, bay)
-    land = coast(draft, "coast", middle, (w * 0.76, d * 0.75), [(bay, 0.3, 34)])
+    land = coast(draft, "coast", middle, (w * 0.73, d * 0.72), [(bay, 0.3, 34)])
     at, height = ahead(middle, bay + 180, 12), draft.number(7, 10, "height")
     islands(draft, [{"polygon": ["coast"]}], land, draft.knob("relief_m"), total="table",
             heights={"away": f"hypot(x - {at[0]}, y - {at[1]}) + 2*noise",

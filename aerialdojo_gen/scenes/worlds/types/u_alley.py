@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from aerialdojo_gen.scenes.worlds.blocks import Turn, dressed, inner_sides, split, square, strung, town_house, turned
+from aerialdojo_gen.scenes.worlds.blocks import Point, dressed, inner_sides, split, square, strung, town_house
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.streets import Box, grid, street_along
 
@@ -13,10 +13,9 @@ Layout = tuple[list[Box], list[Box], list[Box]]  # Houses, lanes and squares
 
 def write(draft: Draft) -> None:
     """Divide the ground into blocks, lanes and squares, put landmarks up, then houses, and fill lanes and squares."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     draft.section("The lanes and squares")
-    houses, lanes, squares = _TOPOLOGIES[draft.topology](draft, turn, w, d)
-    houses, lanes, squares = ([turn.box(box) for box in boxes] for boxes in (houses, lanes, squares))
+    houses, lanes, squares = _TOPOLOGIES[draft.topology](draft, w, d)
     for lane in lanes:
         middle = lane.middle
         half = 0.35
@@ -33,8 +32,6 @@ def write(draft: Draft) -> None:
     corners = [p for box in squares for p in grid(box.grown(-2.0), 3.0)]
     spots = [*middles, *draft.shuffled(corners, "corners")]
     draft.landmark([(*p, draft.pick([0.0, 90.0, 180.0, 270.0], "landmark", *p)) for p in spots])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     draft.section("The houses")
     most = round(draft.knob("storeys"))
     for k, house in enumerate(houses):
@@ -59,20 +56,23 @@ def _squares(draft: Draft, blocks: list[Box], number: int, least_m: float = 9.0)
     return [b for b in blocks if b not in open_], open_
 
 
-def _grid(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
+def _split_all(draft: Draft, areas: list[Box], lane_m: Point, size_m: Point) -> tuple[list[Box], list[Box]]:
+    """Split several areas, as `split` does one."""
+    parts = [split(draft, area, lane_m, size_m, k) for k, area in enumerate(areas)]
+    return [block for blocks, _ in parts for block in blocks], [lane for _, lanes in parts for lane in lanes]
+
+
+def _grid(draft: Draft, w: float, d: float) -> Layout:
     """Blocks of uneven sizes, two or three left open."""
     blocks, lanes = split(draft, Box(-w, -d, w, d), (4.4, 6.4), (11.0, 21.0))
     houses, squares = _squares(draft, blocks, draft.whole(2, 3, "squares"))
     return houses, lanes, squares
 
 
-def _spine(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
+def _spine(draft: Draft, w: float, d: float) -> Layout:
     """A wide lane from end to end with a dogleg, narrow houses in rows at both sides."""
-    wide, bend, shift = (
-        draft.number(6.5, 8.5, "wide"),
-        draft.number(-0.25, 0.25, "bend") * w,
-        draft.number(9, 15, "shift"),
-    )
+    wide, shift = draft.number(6.5, 8.5, "wide"), draft.number(9, 15, "shift")
+    bend = draft.number(-0.25, 0.25, "bend") * w
     low = draft.number(-0.3, 0.0, "low") * d
     high = low + shift
     lanes = [
@@ -82,16 +82,13 @@ def _spine(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
     ]
     areas = [Box(-w, -d, bend + wide, low), Box(bend + wide + 0.01, -d, w, high), Box(-w, low + wide, bend, d),
              Box(bend + 0.01, high + wide, w, d)]  # fmt: skip
-    blocks: list[Box] = []
-    for k, area in enumerate(areas):
-        more, ways = split(draft, area, (3.8, 4.8), (9.0, 17.0), k)
-        blocks += more
-        lanes += ways
+    blocks, ways = _split_all(draft, areas, (3.8, 4.8), (9.0, 17.0))
+    lanes += ways
     houses, squares = _squares(draft, blocks, 2)
     return houses, lanes, squares
 
 
-def _piazza(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
+def _piazza(draft: Draft, w: float, d: float) -> Layout:
     """A square in the middle that lanes come into at its corners."""
     half_x, half_y, lane = draft.number(9, 13, "x"), draft.number(8, 11, "y"), draft.number(5.0, 6.4, "lane")
     x, y = draft.number(-6, 6, "at_x"), draft.number(-5, 5, "at_y")
@@ -110,19 +107,16 @@ def _piazza(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
         Box(x0 + lane, -d, w, y0),
         Box(-w, -d, x0, y1 - lane),
     ]
-    houses: list[Box] = []
-    for k, area in enumerate(areas):
-        more, ways = split(draft, area, (4.0, 5.4), (10.0, 20.0), k)
-        houses += more
-        lanes += ways
+    houses, ways = _split_all(draft, areas, (4.0, 5.4), (10.0, 20.0))
+    lanes += ways
     houses, squares = _squares(draft, houses, 1)
     return houses, lanes, [piazza, *squares]
 
 
-def _street(draft: Draft, turn: Turn, w: float, d: float) -> Layout:
+def _street(draft: Draft, w: float, d: float) -> Layout:
     """A street along one side, houses at it, and yards behind them along a back alley."""
     y = -d + 6.0
-    half = street_along(draft, [turn.at(-w, y), turn.at(w, y)])
+    half = street_along(draft, [(-w, y), (w, y)])
     front, deep = y + half + 0.2, draft.number(13, 16, "deep")
     alley, lane = front + deep, draft.number(5.0, 6.5, "alley")
     row, lanes = split(draft, Box(-w, front, w, alley), (3.8, 4.8), (10.0, 19.0), "row")
@@ -131,7 +125,7 @@ def _street(draft: Draft, turn: Turn, w: float, d: float) -> Layout:
     return [*row, *houses], [*lanes, *ways, Box(-w, alley, w, alley + lane)], squares
 
 
-def _ring(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
+def _ring(draft: Draft, w: float, d: float) -> Layout:
     """A lane about a block with a yard in its middle, houses about it."""
     lane, deep = draft.number(5.5, 7.0, "lane"), draft.number(13, 16, "deep")
     outer = Box(-w + deep, -d + deep, w - deep, d - deep)
@@ -140,16 +134,13 @@ def _ring(draft: Draft, _turn: Turn, w: float, d: float) -> Layout:
              Box(outer.x0, core.y0, core.x0, core.y1), Box(core.x1, core.y0, outer.x1, core.y1)]  # fmt: skip
     areas = [Box(-w, -d, outer.x1 - 0.01, outer.y0), Box(outer.x1, -d, w, outer.y1), Box(outer.x0, outer.y1, w, d),
              Box(-w, outer.y0, outer.x0, d)]  # fmt: skip
-    houses: list[Box] = []
-    for k, area in enumerate(areas):
-        more, ways = split(draft, area, (4.2, 5.2), (10.0, 19.0), k)
-        houses += more
-        lanes += ways
+    houses, ways = _split_all(draft, areas, (4.2, 5.2), (10.0, 19.0))
+    lanes += ways
     inner, ways = split(draft, core, (4.4, 5.4), (9.0, 15.0), "core")
     inner, squares = _squares(draft, inner, 2)
     return [*houses, *inner], [*lanes, *ways], squares
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Turn, float, float], Layout]] = {
+_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
     "grid": _grid, "spine": _spine, "piazza": _piazza, "street": _street, "ring": _ring,
 }  # fmt: skip

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import SIDES, Turn, lane_streets, turned
+from aerialdojo_gen.scenes.worlds.blocks import SIDES, lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.places import Pose, beside, point
 from aerialdojo_gen.scenes.worlds.street_maps import pose_on
@@ -31,29 +31,27 @@ class _Estate(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Lay streets and bays, put up flats, then lead paths from their fronts through the garden, and fill slots."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     estate = _TOPOLOGIES[draft.topology](draft, w, d)
     draft.section("Streets and parking bays")
-    lanes = [turn.box(box) for box in estate.lanes]
-    lane_streets(draft, lanes)
-    for lane in lanes:
+    lane_streets(draft, estate.lanes)
+    for lane in estate.lanes:
         draft.take(lane.shape())
-    for (x, y), yaw, count in estate.bays:
-        _bays(draft, turn, (x, y), yaw, count)
+    for at, yaw, count in estate.bays:
+        _bays(draft, at, yaw, count)
     draft.section("The flats")
-    poses = [((*turn.at(*pose[:2]), round(turn.yaw(pose[2]), 1)), long) for pose, long in estate.flats]
-    fronts = [_flats(draft, pose, long, k) for k, (pose, long) in enumerate(poses)]
+    fronts = [_flats(draft, pose, long, k) for k, (pose, long) in enumerate(estate.flats)]
     if sum(front is not None for front in fronts) < 2:
         raise NoRoomError("room for few flats")
-    middle = turn.at(*estate.middle)
+    middle = estate.middle
+    draft.section("Landmarks")
+    draft.landmark([(*middle, draft.pick(SIDES, "landmark"))])
     draft.section("The garden")
     _paths(draft, [front for front in fronts if front is not None], middle)
     draft.section("Landmarks")
     site = Box(-draft.width_m / 2, -draft.depth_m / 2, draft.width_m / 2, draft.depth_m / 2)
     near = sorted(grid(site.grown(-6), 5.0), key=lambda p: math.dist(p, middle) + draft.number(0, 10, "near", *p))
-    draft.landmark([(*middle, 0.0), *((*p, draft.pick(SIDES, "landmark", *p)) for p in near)])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
+    draft.landmark((*p, draft.pick(SIDES, "landmark", *p)) for p in near)
     _courts(draft, middle)
     strewn(draft, "garden", 44, (3.8, 3.8), 3.0)
     draft.fill_slots()
@@ -63,17 +61,18 @@ def write(draft: Draft) -> None:
     draft.add({"pattern": pattern, "fit": "skip"})
 
 
-def _bays(draft: Draft, turn: Turn, at: Point, yaw: float, count: int) -> None:
+def _bays(draft: Draft, at: Point, yaw: float, count: int) -> None:
     """Pave a row of parking bays, with cars in some; nothing where the ground is taken."""
     half = count * 1.3
     row = ((0.0, -half), (0.0, half), (-5.2, half), (-5.2, -half))
-    corners = [turn.at(*beside((*at, yaw), u, v)) for u, v in row]
+    corners = [beside((*at, yaw), u, v) for u, v in row]
     area = shapely.Polygon(corners)
     if not draft.is_free(area.buffer(-0.1)):
         return
     draft.paint([round(v, 2) for v in area.bounds], draft.material("street"))
-    middle, out = turn.at(*at), round(turn.yaw(yaw)) % 360
-    draft.make("parking_rows", rows=[[*middle, float(out), count]], occupancy=draft.knob("occupancy"))
+    draft.make(
+        "parking_rows", rows=[[round(at[0], 2), round(at[1], 2), yaw, count]], occupancy=draft.knob("occupancy")
+    )
     draft.take(area)
 
 

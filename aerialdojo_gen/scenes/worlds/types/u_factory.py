@@ -7,7 +7,7 @@ from typing import Any
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import SIDES, Turn, inner_sides, split, turned
+from aerialdojo_gen.scenes.worlds.blocks import SIDES, inner_sides, split
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.streets import Box, block_building, front_slots, grid, street_along
 
@@ -19,17 +19,17 @@ _ROAD_M = 6.6
 
 def write(draft: Draft) -> None:
     """Wall the works in beside a street, lay roads and lots, and build on each lot what the topology has next."""
-    turn, w, d = turned(draft)
+    w, d = draft.width_m / 2, draft.depth_m / 2
     draft.section("The street, the roads of the works and the wall")
     street = -d + 5.4
-    half = street_along(draft, [turn.at(-w, street), turn.at(w, street)])
+    half = street_along(draft, [(-w, street), (w, street)])
     site = Box(-w + 2.0, street + half + 2.0, w - 2.0, d - 2.0)
     lots, roads = _TOPOLOGIES[draft.topology][0](draft, site)
     gate = min(roads, key=lambda r: r.y0 + (r.depth < r.width) * 100.0 + abs(r.middle[0]) * 0.1).middle[0]
-    _roads(draft, [turn.box(r) for r in [*roads, Box(gate - 3.3, street + 3.0, gate + 3.3, site.y0)]])
-    _wall(draft, turn, site, gate)
+    _roads(draft, [*roads, Box(gate - 3.3, street + 3.0, gate + 3.3, site.y0)])
+    _wall(draft, site, gate)
     uses = list(_TOPOLOGIES[draft.topology][1])
-    lots = sorted((turn.box(lot).grown(-1.2) for lot in lots), key=lambda b: -b.width * b.depth)
+    lots = sorted((lot.grown(-1.2) for lot in lots), key=lambda b: -b.width * b.depth)
     dealt = [_use(lot, uses[k % len(uses)]) for k, lot in enumerate(lots)]
     _landmarks(draft, [lot for lot, use in zip(lots, dealt, strict=True) if use in ("yard", "green", "office")])
     for k, (lot, use) in enumerate(zip(lots, dealt, strict=True)):
@@ -47,16 +47,16 @@ def _roads(draft: Draft, roads: list[Box]) -> None:
         draft.take(road.shape())
 
 
-def _wall(draft: Draft, turn: Turn, site: Box, gate: float) -> None:
+def _wall(draft: Draft, site: Box, gate: float) -> None:
     x0, y0, x1, y1 = site.grown(1.0)
     runs = [((x0, y0), (gate - 4.0, y0)), ((gate + 4.0, y0), (x1, y0)), ((x1, y0), (x1, y1)), ((x1, y1), (x0, y1)),
             ((x0, y1), (x0, y0))]  # fmt: skip
-    lines = [[list(turn.at(*p)) for p in run] for run in runs]
+    lines = [[[round(x, 2), round(y, 2)] for x, y in run] for run in runs]
     kind = draft.pick(["wall", "railing"], "fence")
     brick = {"material": draft.material("fence")} if kind == "wall" else {}
     draft.make("garden_fences", kind=kind, lines=lines, **brick)
     for side in (-1, 1):
-        draft.slot("gate", *turn.at(gate + side * 5.4, y0 - 1.2), turn.yaw(270.0), (3.2, 3.2))
+        draft.slot("gate", gate + side * 5.4, y0 - 1.2, 270.0, (3.2, 3.2))
 
 
 def _use(lot: Box, use: str) -> str:
@@ -73,8 +73,6 @@ def _landmarks(draft: Draft, lots: list[Box]) -> None:
         far = sorted(grid(lot.grown(-2.8), 3.0), key=lambda p: -abs(p[0] - x) - abs(p[1] - y))
         spots += [(*p, draft.pick(SIDES, "landmark", n)) for p in far[:12]]
     draft.landmark(spots)
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
 
 
 def _hall(draft: Draft, lot: Box, k: int) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import SIDES, dressed, split, strung
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.streets import Box, edge_slots, grid, street_along
 
 _BAY_M, _DEPTH_M, _AISLE_M = 2.6, 5.2, 6.4
@@ -44,8 +44,6 @@ def write(draft: Draft) -> None:
     spots = [p for court in mall.courts for p in grid(court.grown(-2.8), 3.4)]
     spots += [p for lot in mall.lots for p in grid(lot.grown(-2.6), 5.0)]
     draft.landmark([(*p, 270.0) for p in draft.shuffled(spots, "spots")])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     draft.section("Shops and stores")
     _shops(draft, mall)
     strung(draft, mall.lanes, [box for box, _ in mall.shops], 4.3)

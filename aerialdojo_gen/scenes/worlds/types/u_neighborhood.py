@@ -27,8 +27,6 @@ def write(draft: Draft) -> None:
     draft.section("Landmarks")
     corners = [(x * (w - 5.5), y * (d - 5.5), draft.number(0, 360, x, y)) for x in (-1, 1) for y in (-1, 1)]
     draft.landmark([*spots, *draft.shuffled(corners, "corners")])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     draft.section("The houses and their gardens")
     drives = _houses(draft, ways)
     kerb_slots(draft, ways, drives)

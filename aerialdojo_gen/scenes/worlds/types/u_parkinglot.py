@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
+from aerialdojo_gen.scenes.kit.parking import VEHICLES
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
 from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid, street_along
 
@@ -40,8 +42,6 @@ def write(draft: Draft) -> None:
     ]
     draft.section("Landmarks")
     draft.landmark(spots)
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     draft.fill_slots()
 
 
@@ -76,6 +76,12 @@ def _buildings(draft: Draft, lot: Box) -> Box:
     )
 
 
+def _parked(draft: Draft) -> dict[str, Any]:
+    """How many bays are taken, and by what: which vehicles are common differs by lot."""
+    weights = {what: round(1.0 / (k + 1), 2) for k, what in enumerate(draft.shuffled(VEHICLES, "vehicles"))}
+    return {"occupancy": draft.knob("occupancy"), "vehicles": weights, "differ": 0.06}
+
+
 def _rows(draft: Draft, lot: Box) -> None:
     """Double rows of bays along x, aisles between them, islands at both ends."""
     inner = lot.grown(-4.5)
@@ -97,7 +103,7 @@ def _rows(draft: Draft, lot: Box) -> None:
         y += 2 * _DEPTH_M + _AISLE_M
     if not rows:
         raise NoRoomError("no room for a row of bays")
-    draft.make("parking_rows", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
+    draft.make("parking_rows", rows=rows, **_parked(draft))
     for x, y, yaw, n in rows:
         for k in range(int(n)):
             draft.slot("bays", x + (k + 0.5 - n / 2) * _BAY_M, y - (2.5 if yaw > 0 else -2.5), yaw, (5.0, 2.5))
@@ -130,7 +136,7 @@ def _fishbone(draft: Draft, lot: Box) -> None:
         y += 17.6
     if not rows:
         raise NoRoomError("no room for a row of bays")
-    draft.make("slanted_bays", rows=rows, occupancy=draft.knob("occupancy"), differ=0.06)
+    draft.make("slanted_bays", rows=rows, **_parked(draft))
 
 
 def _deck(draft: Draft, lot: Box) -> None:
@@ -144,7 +150,7 @@ def _deck(draft: Draft, lot: Box) -> None:
     levels = draft.whole(2, 3, "levels")
     colour = draft.material("steel")
     draft.make("parking_deck", box=box, levels=levels, band=colour, tower=f"tiles:{colour}", **{"as": "deck_roof"})
-    draft.make("deck_cars", box=box, levels=levels, occupancy=draft.knob("occupancy"), differ=0.06)
+    draft.make("deck_cars", box=box, levels=levels, **_parked(draft))
     draft.take(Box(*box).grown(6.0).shape())
     for x, y in grid(Box(*box).grown(-4.0), 5.4):
         draft.slot("wheels", x, y, 0.0, (2.4, 1.4), on="deck_roof")

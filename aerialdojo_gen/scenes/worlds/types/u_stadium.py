@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import SIDES
-from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
+from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.streets import Box, block_building, edge_slots, grid, street_along
 
 _TREAD_M = 0.85
@@ -57,8 +57,6 @@ def write(draft: Draft) -> None:
     draft.take(ground.core().grown(2.0).shape())
     spots = [p for p in grid(site.grown(-3.2), 4.0) if draft.is_free(shapely.Point(p).buffer(2.6))]
     draft.landmark([(*p, 270.0 if p[1] > ground.y else 90.0) for p in draft.shuffled(spots, "spots")])
-    if not draft.landmarks:
-        raise NoRoomError("no room for a landmark")
     _courts(draft, site)
     edge_slots(draft, "tree", site.grown(-2.2), 6.0, (3.4, 3.4))
     for x, y in grid(site.grown(-2.6), 5.2):
