@@ -51,7 +51,9 @@ def write(draft: Draft) -> None:
     draft.section("Landmarks")
     site = Box(-draft.width_m / 2, -draft.depth_m / 2, draft.width_m / 2, draft.depth_m / 2)
     near = sorted(grid(site.grown(-6), 5.0), key=lambda p: math.dist(p, middle) + draft.number(0, 10, "near", *p))
-    draft.landmark((*p, draft.pick(SIDES, "landmark", *p)) for p in near)
+    spots = [(*p, draft.pick(SIDES, "landmark", *p)) for p in near]
+    for what in draft.shuffled(draft.kind.landmarks, "landmarks"):  # Else the narrowest would have all gaps
+        draft.landmark(spots, of=[what])
     _courts(draft, middle)
     strewn(draft, "garden", 44, (3.8, 3.8), 3.0)
     draft.fill_slots()

@@ -37,7 +37,7 @@ def write(draft: Draft) -> None:
     spots = [
         (x, y, 180.0)
         for x, y in draft.shuffled(
-            [*grid(lot.grown(-3), 9.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)], "landmarks"
+            [*grid(lot.grown(-2), 3.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)], "landmarks"
         )
     ]
     draft.section("Landmarks")
@@ -111,7 +111,7 @@ def _rows(draft: Draft, lot: Box) -> None:
 
 def _fishbone(draft: Draft, lot: Box) -> None:
     """Slanted bays on both sides of one-way aisles."""
-    inner = lot.grown(-3.0)
+    inner = Box(lot.x0 + 3.0, lot.y0 + 3.0, lot.x1 - 9.0, lot.y1 - 3.0)  # A strip at one end is left for landmarks
     count = int((inner.width - 8.0) // 3.1)
     y, rows = inner.y0, []
     while y + 16.0 <= inner.y1:
