@@ -25,7 +25,9 @@ def main() -> int:
 
     def some(mine: list[str]) -> dict[str, campaign.Outcome]:
         counts = {name: campaign.number_for(name, asked.n) for name in mine}
-        return campaign.run({name: range(asked.start, asked.start + n) for name, n in counts.items()}, asked.seed)
+        return campaign.run(
+            {name: range(asked.start, asked.start + n) for name, n in counts.items()}, seed=asked.seed
+        )
 
     # A process takes seconds to start: small campaigns have one a job, large ones one a target.
     groups = [[name] for name in names] if asked.n > 2000 else [names[k :: asked.jobs] for k in range(asked.jobs)]

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,25 +30,12 @@ _SAVED_EACH = 3
 
 @dataclass
 class Outcome:
-    """What became of a target's mutants.
+    """What became of a target's mutants and inputs."""
 
-    Attributes
-    ----------
-    ran : int
-        Mutants, the valid inputs included.
-    faults : list of dict
-        ``index``, ``kind``, ``message`` and ``where`` of each mutant that did not end in an `AerialDojoError` or
-        well.
-    seconds : float
-        On the clock.
-    peak_mib : int
-        Most resident memory of a process.
-    """
-
-    ran: int = 0
-    faults: list[dict] = field(default_factory=list)
-    seconds: float = 0.0
-    peak_mib: int = 0
+    ran: int = 0  # Valid inputs included
+    faults: list[dict] = field(default_factory=list)  # ``index``, ``kind``, ``message`` and ``where`` of each
+    seconds: float = 0.0  # On the clock
+    peak_mib: int = 0  # Most resident memory of a process
 
     @property
     def kinds(self) -> Counter[tuple[str, str]]:
@@ -56,33 +43,19 @@ class Outcome:
         return Counter((fault["kind"], fault["where"]) for fault in self.faults)
 
 
-Plan = dict[str, range]
-
-
-def run(plan: Plan, seed: int = 0) -> dict[str, Outcome]:
-    """Run mutants of targets, by their numbers."""
-    outcomes = {name: Outcome() for name in plan}
-    left = [[name, numbers.start, numbers.stop] for name, numbers in plan.items()]
-    while left:
-        last = _process({"seed": seed, "mutants": left, "inputs": []}, outcomes)
-        if last is None:
-            break
-        name, index = last
-        while left[0][0] != name:
-            left.pop(0)
-        left[0][1] = index + 1
-    return outcomes
-
-
-def replay(inputs: Sequence[tuple[str, Path]]) -> dict[str, Outcome]:
-    """Run inputs of targets, a folder each; the faults' ``index`` is the folder."""
-    outcomes = {name: Outcome() for name, _ in inputs}
-    left = [(name, str(path)) for name, path in inputs]
-    while left:
-        last = _process({"seed": 0, "mutants": [], "inputs": left}, outcomes)
-        if last is None:
-            break
-        left = left[left.index(last) + 1 :]
+def run(mutants: Mapping[str, range], inputs: Sequence[tuple[str, Path]] = (), seed: int = 0) -> dict[str, Outcome]:
+    """Run mutants of targets, by their numbers, and then inputs, a folder each, by which their faults are known."""
+    outcomes = {name: Outcome() for name in (*mutants, *(name for name, _ in inputs))}
+    numbers = [[name, some.start, some.stop] for name, some in mutants.items()]
+    folders = [[name, str(path)] for name, path in inputs]
+    while last := _process({"seed": seed, "mutants": numbers, "inputs": folders}, outcomes):
+        name, at = last
+        if [name, at] in folders:
+            numbers, folders = [], folders[folders.index([name, at]) + 1 :]
+        else:
+            while numbers[0][0] != name:
+                numbers.pop(0)
+            numbers[0][1] = at + 1
     return outcomes
 
 

@@ -15,27 +15,13 @@ Case = dict[str, bytes]
 
 @dataclass(frozen=True)
 class Target:
-    """A parser.
+    """A parser."""
 
-    Attributes
-    ----------
-    cases : callable
-        Makes its valid inputs: files by their path in a folder.
-    run : callable
-        Parses the folder and uses what it got as the program would.
-    mutable : str
-        Suffix of the path of files that are mutated; empty for all.
-    names_the_file : bool
-        Whether an error's message must name the folder or a file of it.
-    share : float
-        Share of a campaign's number that is run: less for those that take long.
-    """
-
-    cases: Callable[[], list[Case]]
-    run: Callable[[Path], None]
-    mutable: str = ""
-    names_the_file: bool = True
-    share: float = 1.0
+    cases: Callable[[], list[Case]]  # Makes its valid inputs
+    run: Callable[[Path], None]  # Parses the folder and uses what it got as the program would
+    mutable: str = ""  # Suffix of the path of files that are mutated; empty for all
+    names_the_file: bool = True  # Whether an error's message must name the folder or a file of it
+    share: float = 1.0  # Share of a campaign's number that is run: less for those that take long
 
 
 def case_of(folder: Path) -> Case:

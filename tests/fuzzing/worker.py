@@ -89,14 +89,18 @@ def main() -> None:
     warnings.simplefilter("ignore")
     bound()
     with tempfile.TemporaryDirectory(prefix="fuzz-", dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as own:
-        for name, start, stop in plan["mutants"]:
-            for index, case in mutants(name, plan["seed"], start, stop):
-                say.write(json.dumps({"target": name, "at": index}) + "\n")
-                _tried(name, index, case, Path(own) / "case", say)
-        for name, folder in plan["inputs"]:
-            say.write(json.dumps({"target": name, "at": folder}) + "\n")
-            _tried(name, folder, case_of(Path(folder)), Path(own) / "case", say)
+        for name, at, case in _planned(plan):
+            say.write(json.dumps({"target": name, "at": at}) + "\n")
+            _tried(name, at, case, Path(own) / "case", say)
     say.write(json.dumps({"done": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10}) + "\n")
+
+
+def _planned(plan: dict) -> Iterator[tuple[str, int | str, Case]]:
+    for name, start, stop in plan["mutants"]:
+        for index, case in mutants(name, plan["seed"], start, stop):
+            yield name, index, case
+    for name, folder in plan["inputs"]:
+        yield name, folder, case_of(Path(folder))
 
 
 def _tried(name: str, index: object, case: Case, folder: Path, say: TextIO) -> None:

@@ -59,7 +59,7 @@ SHAPES = [BALL, BUS, PYLON, ARCH, CONE]
 
 
 @pytest.mark.parametrize("thing", SHAPES, ids=[t.node for t in SHAPES])
-def test_anchors_in_the_open_are_where_they_must_be(thing, tmp_path):
+def test_anchors_in_the_open_are_where_they_must_be_on_sides_45_degrees_apart(thing, tmp_path):
     place = scene(thing)
     rows, rejected = find(place, thing.node, tmp_path)
     assert len(rows) == 3
@@ -85,11 +85,6 @@ def test_anchors_in_the_open_are_where_they_must_be(thing, tmp_path):
         assert (p >= place.bounds[0] + RADIUS).all()
         assert (p <= place.bounds[1] - RADIUS).all()
     assert sum(rejected.values()) + len(rows) >= 48
-
-
-@pytest.mark.parametrize("thing", SHAPES, ids=[t.node for t in SHAPES])
-def test_anchors_look_from_sides_45_degrees_apart(thing, tmp_path):
-    rows, _ = find(scene(thing), thing.node, tmp_path)
     angle = [math.atan2(*(xyz(r) - thing.centroid)[[1, 0]]) for r in rows]
     apart = [abs(float(wrap_angle_rad(a - b))) for k, a in enumerate(angle) for b in angle[:k]]
     assert min(apart) >= math.radians(44.99)
@@ -147,7 +142,7 @@ def clear_sight(mesh, origin, points):
     return nearest >= length - 5e-3
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
     rng = np.random.default_rng(seed)
     target = instance("target", box((-0.7, -0.4, 0.0), (0.6, 0.5, 1.7)), box((-0.2, -0.2, 1.7), (0.2, 0.2, 2.4)))

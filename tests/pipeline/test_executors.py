@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -20,6 +19,12 @@ RAY = pytest.param("ray", marks=pytest.mark.ray)
 
 
 @pytest.fixture(scope="module")
+def local_pool():
+    with make_executor("local", 2) as pool:
+        yield pool
+
+
+@pytest.fixture(scope="module")
 def ray_pool(tmp_path_factory):
     os.environ["AERIALDOJO_TRIED"] = "forwarded"
     data = tmp_path_factory.mktemp("ray-data")
@@ -31,15 +36,30 @@ def ray_pool(tmp_path_factory):
 
 @pytest.fixture(params=["local", RAY])
 def pool(request):
-    if request.param == "ray":
-        yield request.getfixturevalue("ray_pool")
-        return
-    with make_executor("local", 2) as pool:
-        yield pool
+    return request.getfixturevalue(f"{request.param}_pool")
 
 
 def tasks(folder, n=6, kinds=None, scenes=None):
     return [Chore(k, (scenes or [""])[k % len(scenes or [""])], folder, (kinds or {}).get(k, "")) for k in range(n)]
+
+
+def test_what_cannot_be_is_said_in_one_line(monkeypatch, tmp_path):
+    """The first of these tests: none of them has connected this process to a Ray cluster yet."""
+    with pytest.raises(UsageError, match="unknown executor 'slurm'; executors: local, ray"):
+        make_executor("slurm")
+    with pytest.raises(UsageError, match="--address needs --executor ray"):
+        make_executor("local", address="127.0.0.1:6379")
+    with pytest.raises(UsageError, match="--address nowhere: write HOST:PORT"):
+        make_executor("ray", address="nowhere")
+    with monkeypatch.context() as context:
+        context.setitem(sys.modules, "ray", None)
+        with pytest.raises(
+            MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"
+        ):
+            make_executor("ray")
+    refused = r"no Ray cluster answers at 127.0.0.1:1 \(.*refused\): start one"
+    with pytest.raises(AerialDojoError, match=refused), make_executor("ray", address="127.0.0.1:1") as pool:
+        list(pool.map(chores.square, tasks(tmp_path, 1)))
 
 
 def test_results_are_the_same_whoever_computes_them(pool, tmp_path):
@@ -202,19 +222,13 @@ def wait_for_both(process, folder):
     chores.until(lambda: len(list(folder.iterdir())) == 2 or process.poll() is not None, 120)
 
 
-@pytest.mark.parametrize(
-    ("executor", "stopped"),
-    [
-        ("local", False),
-        ("local", True),
-        pytest.param("ray", False, marks=[pytest.mark.ray, pytest.mark.nightly]),
-    ],
-)
+@pytest.mark.parametrize("executor", ["local", pytest.param("ray", marks=[pytest.mark.ray, pytest.mark.nightly])])
 @pytest.mark.kill
-def test_ctrl_c_ends_all_processes(executor, stopped, tmp_path):
+def test_ctrl_c_ends_all_processes(executor, tmp_path):
+    """Of this machine also one that is stopped; that of a command whose workers run is tried by test_resume."""
     process, folder = start(tmp_path, executor, "sleep")
     wait_for_both(process, folder)
-    if stopped:
+    if executor == "local":
         worker = int(next(folder.iterdir()).name)
         os.kill(worker, signal.SIGSTOP)
         chores.until(lambda: Path(f"/proc/{worker}/stat").read_text().rsplit(")", 1)[1].split()[0] == "T")
@@ -259,30 +273,3 @@ def test_processes_work_where_no_semaphore_can_be_made(tmp_path):
     process, _ = start(tmp_path, "local", "talk", env=without)
     _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "all done\n")
-
-
-def test_what_cannot_be_is_said_in_one_line(monkeypatch):
-    with pytest.raises(UsageError, match="unknown executor 'slurm'; executors: local, ray"):
-        make_executor("slurm")
-    with pytest.raises(UsageError, match="--address needs --executor ray"):
-        make_executor("local", address="127.0.0.1:6379")
-    with monkeypatch.context() as context:
-        context.setitem(sys.modules, "ray", None)
-        with pytest.raises(
-            MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"
-        ):
-            make_executor("ray")
-    # In a process of its own: this one may have a cluster.
-    program = (
-        "from pathlib import Path; from support import chores\n"
-        "from aerialdojo_gen.base.errors import AerialDojoError\n"
-        "from aerialdojo_gen.pipeline.executors import make_executor\n"
-        "try: list(make_executor('ray', address='127.0.0.1:1').map(chores.square, [chores.Chore(0, '', Path())]))\n"
-        "except AerialDojoError as error: print(error)\n"
-    )
-    path = os.pathsep.join([str(TESTS), str(TESTS.parent)])
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": path})
-    assert re.match(r"no Ray cluster answers at 127.0.0.1:1 \(.*refused\): start one", done.stdout)
-    with pytest.raises(UsageError, match="--address nowhere: write HOST:PORT"):
-        make_executor("ray", address="nowhere")

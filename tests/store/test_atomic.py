@@ -7,11 +7,10 @@ import os
 import signal
 import subprocess
 import sys
-import textwrap
 from pathlib import Path
 
 import pytest
-from support.preload import killing_environment, unshared
+from support.preload import killed_at, preloaded, unshared
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import staging
@@ -20,38 +19,74 @@ from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.staging import AREA, scratch_folder, sweep
 
 HOLDING = """
-    import sys, time
-    from pathlib import Path
-    from aerialdojo_gen.store.atomic import atomic_file
-    with atomic_file(Path(sys.argv[1]), "f.bin") as path:
-        path.write_text("x")
-        print(path, flush=True)
-        time.sleep(300)
+import sys, time
+from pathlib import Path
+from aerialdojo_gen.store.atomic import atomic_file
+with atomic_file(Path(sys.argv[1]), "f.bin") as path:
+    path.write_text("x")
+    print(path, flush=True)
+    time.sleep(300)
 """
 STAGING = """
-    import sys
-    from pathlib import Path
-    from aerialdojo_gen.store.staging import staged
-    root = Path(sys.argv[1])
-    for _ in range(int(sys.argv[2])):
-        with staged(root, root / "f"):
-            pass
+import sys
+from pathlib import Path
+from aerialdojo_gen.store.staging import staged
+root = Path(sys.argv[1])
+for _ in range(int(sys.argv[2])):
+    with staged(root, root / "f"):
+        pass
 """
 WRITING = """
-    import sys
-    from pathlib import Path
-    from aerialdojo_gen.store.atomic import atomic_file
-    with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
-        path.write_text("new")
+import sys
+from pathlib import Path
+from aerialdojo_gen.store.atomic import atomic_file
+with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
+    path.write_text("new")
 """
 REPLACING = """
-    import sys
-    from pathlib import Path
-    from aerialdojo_gen.store.atomic import atomic_folder
-    with atomic_folder(Path(sys.argv[1]) / "f") as path:
-        (path / "a").write_text("new")
-        (path / "b").write_text("new")
+import sys
+from pathlib import Path
+from aerialdojo_gen.store.atomic import atomic_folder
+with atomic_folder(Path(sys.argv[1]) / "f") as path:
+    (path / "a").write_text("new")
+    (path / "b").write_text("new")
 """
+
+
+LOCKED_AND_KILLED = """
+import os, signal, sys
+from aerialdojo_gen.store.root import open_root
+with open_root(sys.argv[1]).lock():
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+SCRATCH_AND_KILLED = """
+import os, signal
+from aerialdojo_gen.store.staging import scratch_folder
+with scratch_folder() as folder:
+    (folder / "0.obj").write_text("v")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+WRITING_TWICE = """
+import sys
+from pathlib import Path
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+root = Path(sys.argv[1])
+for text in ("one", "two"):
+    with atomic_folder(root / "media" / "f", root=root) as path:
+        (path / "a").write_text(text)
+    with atomic_file(root, "media/b") as path:
+        path.write_text(text)
+"""
+
+
+def started(code, *arguments, before=(), **options):
+    """Start a program."""
+    return subprocess.Popen([*before, sys.executable, "-c", code, *map(str, arguments)], **options)
+
+
+def ended(code, *arguments, **options):
+    """Run a program to its end; gives its exit status."""
+    return started(code, *arguments, **options).wait()
 
 
 def names(folder):
@@ -60,8 +95,7 @@ def names(folder):
 
 def holder(folder, *before):
     """Start a process that is in the middle of a file, and return it when it is."""
-    command = [*before, sys.executable, "-c", textwrap.dedent(HOLDING), str(folder)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = started(HOLDING, folder, before=before, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert Path(process.stdout.readline().strip()).is_file()
     return process
@@ -107,43 +141,39 @@ def test_a_number_that_is_taken_again_keeps_no_rubbish(tmp_path):
 @pytest.mark.kill
 @pytest.mark.parametrize("exchange", [True, False], ids=["exchange", "two renames"])
 def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exchange):
-    seen = set()
-    for n in range(1, 60):
-        root = tmp_path / str(n)
-        (root / "f").mkdir(parents=True)
-        for name in ("a", "c"):
-            (root / "f" / name).write_text("old")
-        environment = killing_environment(n, exchange=exchange)
-        command = [sys.executable, "-c", textwrap.dedent(REPLACING), str(root)]
-        code = subprocess.run(command, env=environment, check=False).returncode
-        if exchange:
-            # A reader that comes at any time finds one of the two.
-            assert (root / "f" / "a").is_file()
-        sweep(root)
-        found = names(root)
-        assert found in ({"f/a": "old", "f/c": "old"}, {"f/a": "new", "f/b": "new"})
-        seen.add(found["f/a"])
-        if code == 0:
-            assert found["f/a"] == "new"
-            break
-        assert code == -signal.SIGKILL
-    else:
-        raise AssertionError("there are more steps than that")
+    seen, code, n = set(), -signal.SIGKILL, 0
+    with killed_at(REPLACING, **({} if exchange else {"NO_EXCHANGE": "1"})) as run:
+        while code == -signal.SIGKILL:
+            n += 1
+            root = tmp_path / str(n)
+            (root / "f").mkdir(parents=True)
+            for name in ("a", "c"):
+                (root / "f" / name).write_text("old")
+            code = run(n, root)
+            if exchange:
+                # A reader that comes at any time finds one of the two.
+                assert (root / "f" / "a").is_file()
+            sweep(root)
+            found = names(root)
+            assert found in ({"f/a": "old", "f/c": "old"}, {"f/a": "new", "f/b": "new"})
+            seen.add(found["f/a"])
+    assert (code, found["f/a"]) == (0, "new")
     assert n > 8
     assert seen == {"old", "new"}
 
 
 @pytest.mark.kill
 def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
-    for n in range(1, 60):
-        root = tmp_path / str(n)
-        root.mkdir()
-        command = [sys.executable, "-c", textwrap.dedent(WRITING), str(root)]
-        ended = subprocess.run(command, env=killing_environment(n), check=False).returncode
-        sweep(root)
-        assert names(root) in ({}, {"deep/er/f.txt": "new"})
-        if ended == 0:
-            break
+    code, n = -signal.SIGKILL, 0
+    with killed_at(WRITING) as run:
+        while code == -signal.SIGKILL:
+            n += 1
+            root = tmp_path / str(n)
+            root.mkdir()
+            code = run(n, root)
+            sweep(root)
+            assert names(root) in ({}, {"deep/er/f.txt": "new"})
+    assert code == 0
     assert n > 8
     assert names(root) == {"deep/er/f.txt": "new"}
 
@@ -151,8 +181,7 @@ def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
 def calls_of(tmp_path, code, *arguments):
     """Run a program; gives its calls that sync, rename and make folders, in their order: kind, path, path before."""
     log = tmp_path / "log"
-    environment = killing_environment(0) | {"PRELOAD_LOG": str(log)}
-    subprocess.run([sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)], env=environment, check=True)
+    assert ended(code, *arguments, env=preloaded(LOG=str(log))) == 0
     return [tuple(line.split("\t")) for line in log.read_text().splitlines()]
 
 
@@ -186,16 +215,10 @@ def test_a_folder_is_on_the_disk_before_it_has_its_name_and_its_parent_after(tmp
 
 
 def test_a_folder_of_many_files_is_on_the_disk_before_it_has_its_name(tmp_path):
-    code = (
-        REPLACING
-        + """
-        for number in range(40):
-            (path / str(number)).write_text("new")
-    """
-    )
+    many = "    for number in range(40):\n        (path / str(number)).write_text('new')\n"
     root = tmp_path / "root"
     (root / "f").mkdir(parents=True)
-    calls = calls_of(tmp_path, code, root)
+    calls = calls_of(tmp_path, REPLACING + many, root)
     at = next(k for k, (kind, path, _) in enumerate(calls) if kind == "rename" and path == str(root / "f"))
     assert ("syncfs", calls[at][2], "") in calls[:at]
 
@@ -205,9 +228,7 @@ def test_where_there_are_no_locks_files_are_written_and_nobody_s_are_removed(tmp
     left = tmp_path / AREA / "unknown"
     left.mkdir(parents=True)
     (left / "lease").write_text("g.bin")
-    environment = killing_environment(0) | {"PRELOAD_FLOCK_ERRNO": "37"}
-    command = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path)]
-    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL)
+    assert ended(code, tmp_path, env=preloaded(FLOCK_ERRNO="37"), stdout=subprocess.DEVNULL) == 0
     assert (tmp_path / "f.bin").read_text() == "x"
     assert (left / "lease").is_file()
 
@@ -224,25 +245,16 @@ def test_a_lease_that_names_a_place_elsewhere_moves_nothing_there(tmp_path):
 
 
 def test_two_writers_of_one_folder_do_not_mix(tmp_path):
-    processes = [
-        subprocess.Popen([sys.executable, "-c", textwrap.dedent(REPLACING).replace('"new"', f'"{k}"'), str(tmp_path)])
-        for k in range(4)
-    ]
+    processes = [started(REPLACING.replace('"new"', f'"{k}"'), tmp_path) for k in range(4)]
     assert [p.wait() for p in processes] == [0] * 4
     found = names(tmp_path)
     assert found.keys() == {"f/a", "f/b"}
     assert len(set(found.values())) == 1
 
 
-def stagers(root, items, count=2):
-    """Start processes that stage so many items each."""
-    command = [sys.executable, "-c", textwrap.dedent(STAGING), str(root), str(items)]
-    return [subprocess.Popen(command) for _ in range(count)]
-
-
 def test_the_staging_folder_can_go_while_another_process_makes_it(tmp_path):
     area = tmp_path / AREA
-    processes = stagers(tmp_path, 300)
+    processes = [started(STAGING, tmp_path, 300) for _ in range(2)]
     while any(process.poll() is None for process in processes):
         for change in (os.mkdir, os.rmdir):
             with contextlib.suppress(OSError):
@@ -253,20 +265,14 @@ def test_the_staging_folder_can_go_while_another_process_makes_it(tmp_path):
 def test_the_staging_folder_stays_as_long_as_a_run(tmp_path):
     with LocalRoot(tmp_path).lock():
         before = (tmp_path / AREA).stat()
-        assert [process.wait() for process in stagers(tmp_path, 3)] == [0, 0]
+        assert ended(STAGING, tmp_path, 3) == 0
         assert os.path.samestat(before, (tmp_path / AREA).stat())
     assert [path.name for path in tmp_path.iterdir()] == [".lock"]
 
 
 @pytest.mark.kill
 def test_a_killed_run_s_staging_folder_is_gone_after_the_next(tmp_path):
-    code = """
-        import os, signal, sys
-        from aerialdojo_gen.store.root import open_root
-        with open_root(sys.argv[1]).lock():
-            os.kill(os.getpid(), signal.SIGKILL)
-    """
-    subprocess.run([sys.executable, "-c", textwrap.dedent(code), str(tmp_path)], check=False)
+    assert ended(LOCKED_AND_KILLED, tmp_path) == -signal.SIGKILL
     assert len(list((tmp_path / AREA).iterdir())) == 1
     with LocalRoot(tmp_path).lock():
         assert len(list((tmp_path / AREA).iterdir())) == 1
@@ -287,33 +293,15 @@ def test_another_disk_below_the_root_gets_what_it_is_to_have(tmp_path):
 def test_the_same_disk_mounted_twice(tmp_path):
     (tmp_path / "root" / "media").mkdir(parents=True)
     (tmp_path / "far").mkdir()
-    code = textwrap.dedent("""
-        import sys
-        from pathlib import Path
-        from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-        root = Path(sys.argv[1])
-        for text in ("one", "two"):
-            with atomic_folder(root / "media" / "f", root=root) as path:
-                (path / "a").write_text(text)
-            with atomic_file(root, "media/b") as path:
-                path.write_text(text)
-    """)
     script = f'mount --bind {tmp_path / "far"} {tmp_path / "root" / "media"} && exec "$@"'
-    command = [*unshared("--mount"), "sh", "-c", script, "sh", sys.executable, "-c", code, str(tmp_path / "root")]
-    subprocess.run(command, check=True)
+    mounting = [*unshared("--mount"), "sh", "-c", script, "sh"]
+    assert ended(WRITING_TWICE, tmp_path / "root", before=mounting) == 0
     assert names(tmp_path) == {"far/f/a": "two", "far/b": "two"}
 
 
 @pytest.mark.kill
 def test_scratch_folders_of_killed_runs_are_gone_at_the_next(tmp_path, monkeypatch):
-    code = textwrap.dedent("""
-        import os, signal
-        from aerialdojo_gen.store.staging import scratch_folder
-        with scratch_folder() as folder:
-            (folder / "0.obj").write_text("v")
-            os.kill(os.getpid(), signal.SIGKILL)
-    """)
-    subprocess.run([sys.executable, "-c", code], env=os.environ | {"TMPDIR": str(tmp_path)}, check=False)
+    assert ended(SCRATCH_AND_KILLED, env=os.environ | {"TMPDIR": str(tmp_path)}) == -signal.SIGKILL
     assert len(list(tmp_path.rglob("*.obj"))) == 1
     monkeypatch.setattr(staging.tempfile, "tempdir", str(tmp_path))
     with scratch_folder() as folder:

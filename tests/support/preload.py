@@ -6,11 +6,14 @@ reach the disk and go.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -148,17 +151,43 @@ def library() -> Path:
     return target
 
 
-def killing_environment(n: int, *, exchange: bool = True, group: bool = False) -> dict[str, str]:
-    """Environment in which a program is killed at its n-th call that changes a name or syncs; never for 0.
+def preloaded(**variables: str) -> dict[str, str]:
+    """Environment of a program with the library, and with variables ``PRELOAD_…`` that say what it does."""
+    return os.environ | {"LD_PRELOAD": str(library())} | {f"PRELOAD_{name}": v for name, v in variables.items()}
 
-    Without `exchange` two names cannot be exchanged; `group` kills the whole process group.
-    """
-    environment = os.environ | {"LD_PRELOAD": str(library()), "PRELOAD_KILL_AT": str(n)}
-    if not exchange:
-        environment["PRELOAD_NO_EXCHANGE"] = "1"
-    if group:
-        environment["PRELOAD_KILL_GROUP"] = "1"
-    return environment
+
+# A child for each line of the input, which says at which call it is killed; the imports are made once.
+_FORKING = """
+import os, sys
+import aerialdojo_gen.store.atomic
+for line in sys.stdin:
+    number, sys.argv[1] = line.rstrip("\\n").split(" ", 1)
+    child = os.fork()
+    if not child:
+        os.environ["PRELOAD_KILL_AT"] = number
+        exec(sys.argv[2], {})
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+@contextlib.contextmanager
+def killed_at(program: str, **variables: str) -> Iterator[Callable[[int, Path], int]]:
+    """Yield a function of n and a folder: run a program on it, killed at its n-th call; gives its exit status."""
+    with subprocess.Popen(
+        [sys.executable, "-c", _FORKING, "", program], env=preloaded(**variables), text=True,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        given, answers = process.stdin, process.stdout
+
+        def run(n: int, folder: Path) -> int:
+            print(n, folder, file=given, flush=True)
+            return int(answers.readline())
+
+        yield run
+        given.close()
 
 
 def unshared(*namespaces: str) -> list[str]:
