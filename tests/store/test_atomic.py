@@ -142,7 +142,7 @@ def test_a_number_that_is_taken_again_keeps_no_rubbish(tmp_path):
 @pytest.mark.parametrize("exchange", [True, False], ids=["exchange", "two renames"])
 def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exchange):
     seen, code, n = set(), -signal.SIGKILL, 0
-    with killed_at(REPLACING, **({} if exchange else {"NO_EXCHANGE": "1"})) as run:
+    with killed_at(REPLACING, WRITES="1", **({} if exchange else {"NO_EXCHANGE": "1"})) as run:
         while code == -signal.SIGKILL:
             n += 1
             root = tmp_path / str(n)
@@ -165,7 +165,7 @@ def test_a_folder_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path, exc
 @pytest.mark.kill
 def test_a_file_killed_at_any_step_is_the_old_one_or_the_new_one(tmp_path):
     code, n = -signal.SIGKILL, 0
-    with killed_at(WRITING) as run:
+    with killed_at(WRITING, WRITES="1") as run:
         while code == -signal.SIGKILL:
             n += 1
             root = tmp_path / str(n)

@@ -11,7 +11,6 @@ from pathlib import Path
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.pipeline.executors.base import TaskQueue
 from aerialdojo_gen.pipeline.executors.channels import at_end
-from aerialdojo_gen.pipeline.task import compute
 
 
 @dataclass(frozen=True)
@@ -165,6 +164,9 @@ def session_members(session):
 
 def compute_and_sign(task):
     """Compute a shard, and leave a note of the process that did."""
+    # Here alone: what it imports takes ten times as long as all else in a process that does chores.
+    from aerialdojo_gen.pipeline.task import compute
+
     done = compute(task)
     job = task.job
     note = job.roots.data.path.with_name("notes") / f"{job.scene} {job.stage} {job.part}"
