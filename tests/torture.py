@@ -29,6 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from support import chores
 from support.preload import library
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -43,17 +44,10 @@ renderer = "pybullet"
 
 @dataclass(frozen=True)
 class Kind:
-    """A command to kill.
+    """A command to kill."""
 
-    Attributes
-    ----------
-    arguments : callable
-        ``(data, workers) -> list of str``: the command.
-    prepare : callable
-        ``(data, random)``: brings a copy of the finished data to where the command has something to do.
-    """
-
-    arguments: Callable[[Path, int], list[str]]
+    arguments: Callable[[Path, int], list[str]]  # Of the data directory and a number of workers
+    # Brings a copy of the finished data to where the command has something to do.
     prepare: Callable[[Path, random.Random], None]
 
 
@@ -153,7 +147,7 @@ class Server:
                 os.killpg(session, signal.SIGKILL)
         print(file=self._process.stdin, flush=True)
         code = int(self._process.stdout.readline())
-        wait_until_empty(session)
+        chores.until_empty(session)
         return code
 
     def close(self) -> None:
@@ -292,22 +286,6 @@ def _aimed(counter: Path, at: int) -> dict[str, str]:
         "PRELOAD_COUNTER": str(counter), "PRELOAD_KILL_AT": str(at),
         "PRELOAD_KILL_GROUP": "1", "PRELOAD_WRITES": "1",
     }  # fmt: skip
-
-
-def wait_until_empty(session: int) -> None:
-    """Wait until no process of a session is alive."""
-    for _ in range(2000):
-        alive = 0
-        for stat in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                fields = stat.read_text().rsplit(")", 1)[1].split()
-            except OSError:
-                continue
-            alive += int(fields[3]) == session and fields[0] != "Z"
-        if not alive:
-            return
-        time.sleep(0.02)
-    raise AssertionError("processes outlived their parent")
 
 
 def files_of(data: Path) -> dict[str, bytes]:

@@ -1,11 +1,10 @@
-import hashlib
 import logging
 import math
 
 import numpy as np
 import pytest
 import trimesh
-from support.handmade import box, instance, mesh_of, scene
+from support.handmade import box, instance, mesh_of, scene, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
@@ -16,10 +15,8 @@ from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import anchor_sample
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import World, anchors_of
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
-from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.tables import check_table
 
 CONFIG = AnchorSampleConfig()
 RADIUS = Embodiment().radius_m
@@ -32,15 +29,14 @@ def job(tmp_path, seed=0):
 
 
 def item(thing, object_id=0):
-    x, y, z = thing.centroid.tolist()
-    return {"object_id": object_id, "name": thing.node, "mesh_node": thing.node, "x_m": x, "y_m": y, "z_m": z}
+    return {"object_id": object_id, "name": thing.node, "mesh_node": thing.node, **xyz(thing.centroid)}
 
 
 def find(place, node, tmp_path, config=CONFIG, seed=0):
     return anchors_of(item(place[node]), World.of(place, RADIUS, CONFIG.margin_m), job(tmp_path, seed), config)
 
 
-def xyz(row):
+def place_of(row):
     return np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
@@ -71,7 +67,7 @@ def test_anchors_in_the_open_are_where_they_must_be_on_sides_45_degrees_apart(th
     assert max(scores) <= 1.0
     whole = trimesh.util.concatenate([mesh_of(i) for i in place.instances])
     for r in rows:
-        p = xyz(r)
+        p = place_of(r)
         _, (own,), _ = trimesh.proximity.closest_point(mesh_of(thing), [p])
         _, (any_surface,), _ = trimesh.proximity.closest_point(whole, [p])
         assert own == pytest.approx(1.0, abs=1e-3)
@@ -85,7 +81,7 @@ def test_anchors_in_the_open_are_where_they_must_be_on_sides_45_degrees_apart(th
         assert (p >= place.bounds[0] + RADIUS).all()
         assert (p <= place.bounds[1] - RADIUS).all()
     assert sum(rejected.values()) + len(rows) >= 48
-    angle = [math.atan2(*(xyz(r) - thing.centroid)[[1, 0]]) for r in rows]
+    angle = [math.atan2(*(place_of(r) - thing.centroid)[[1, 0]]) for r in rows]
     apart = [abs(float(wrap_angle_rad(a - b))) for k, a in enumerate(angle) for b in angle[:k]]
     assert min(apart) >= math.radians(44.99)
 
@@ -102,7 +98,7 @@ def test_a_niche_is_seen_from_its_open_side_only(tmp_path):
     assert rejected["in_collision"] > 0
     for r in rows:
         assert r["clearance_m"] >= RADIUS + CONFIG.margin_m
-    best = xyz(rows[0])
+    best = place_of(rows[0])
     assert best[0] > 1.0
     assert abs(best[1]) < 1.0
 
@@ -159,7 +155,7 @@ def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
     assert min(r["visible_fraction"] for r in rows) < 0.9
     own, whole = mesh_of(target), trimesh.util.concatenate([mesh_of(i) for i in place.instances])
     for r in rows:
-        p = xyz(r)
+        p = place_of(r)
         _, (to_own, *_), _ = trimesh.proximity.closest_point(own, [p])
         _, (to_any, *_), _ = trimesh.proximity.closest_point(whole, [p])
         assert to_own == pytest.approx(1.0, abs=1e-3)
@@ -229,27 +225,9 @@ def test_shortlist_prefers_sides_apart_then_score():
 
 def whole_run(place, objects, data, seed=0, chosen=()):
     """The stage on real tables and a real mesh file."""
-    name = place.name
-    write_glb(place, data / "scene.glb")
-    bounds = {f"{e}_{a}_m": float(v) for e, row in zip(("min", "max"), place.bounds, strict=True)
-              for a, v in zip("xyz", row, strict=True)}  # fmt: skip
-    place_row = bounds | {
-        "scene": name, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "scene.glb",
-        "attribution": None,
-        "mesh_sha256": hashlib.sha256((data / "scene.glb").read_bytes()).hexdigest(), "ceiling_m": place.ceiling_m,
-        "n_triangles": place.n_triangles, "n_instances": len(place.instances), "n_categories": 2,
-    }  # fmt: skip
-    rows = [
-        item(o, k) | {
-            "scene": name, "category": "thing", "description": "A thing.", "landmark_id": 0, "direction": "east",
-            "claims": "[]", "shape": None, "shape_held_out": None,
-            **dict(zip(("size_x_m", "size_y_m", "size_z_m"), np.ptp(o.bounds, axis=0).tolist(), strict=True)),
-        }
-        for k, o in enumerate(objects)
-    ]  # fmt: skip
-    store.write_shard(data, "scenes", name, 0, from_rows(schemas.SCENES, [place_row]))
-    store.write_shard(data, "objects", name, 0, from_rows(schemas.OBJECTS, rows))
-    store.write_shard(data, "chosen_anchors", name, 0, from_rows(schemas.CHOSEN_ANCHORS, chosen))
+    write_scene(data, place)
+    write_rows(data, "objects", [item(thing, k) for k, thing in enumerate(objects)])
+    write_rows(data, "chosen_anchors", chosen)
     return anchor_sample.run(job(data, seed), CONFIG)
 
 
@@ -277,20 +255,19 @@ def test_an_object_of_another_scene_is_refused_in_one_line(tmp_path):
         whole_run(scene(BUS), [BALL], tmp_path)
 
 
-def choice(position, yaw_rad, object_id=0):
-    return {"scene": "U_Test_0", "object_id": object_id, "yaw_rad": yaw_rad,
-            **dict(zip(("x_m", "y_m", "z_m"), map(float, position), strict=True))}  # fmt: skip
+def choice(position, yaw_rad):
+    return {"object_id": 0, **xyz(position), "yaw_rad": yaw_rad}
 
 
 def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
     place = scene(BALL, BUS)
     auto = whole_run(place, [BALL, BUS], tmp_path).tables["anchors"].to_pylist()
     third = auto[2]
-    rounded = choice([round(v, 3) for v in xyz(third)], math.radians(round(math.degrees(third["yaw_rad"]), 2)))
+    rounded = choice([round(v, 3) for v in place_of(third)], math.radians(round(math.degrees(third["yaw_rad"]), 2)))
     out = whole_run(place, [BALL, BUS], tmp_path, chosen=[rounded])
     rows = out.tables["anchors"].to_pylist()
     assert [(r["object_id"], r["anchor_id"]) for r in rows] == [(o, k) for o in (0, 1) for k in range(3)]
-    assert [xyz(r).tolist() for r in rows[:3]] == [xyz(auto[k]).tolist() for k in (2, 0, 1)]
+    assert [place_of(r).tolist() for r in rows[:3]] == [place_of(auto[k]).tolist() for k in (2, 0, 1)]
     assert [(r["selected"], r["selected_by"]) for r in rows[:3]] == [
         (True, "annotation"),
         (False, "auto"),
@@ -301,11 +278,11 @@ def test_the_anchor_that_a_person_chose_comes_first_and_is_selected(tmp_path):
     by_hand = choice(BALL.centroid + np.array([0.0, 1.75, 0.0]), -math.pi / 2)
     out = whole_run(place, [BALL, BUS], tmp_path, chosen=[by_hand])
     placed, *others = out.tables["anchors"].to_pylist()[:3]
-    assert xyz(placed).tolist() == [by_hand[f"{a}_m"] for a in "xyz"]
+    assert place_of(placed).tolist() == [by_hand[f"{a}_m"] for a in "xyz"]
     assert (placed["selected"], placed["selected_by"]) == (True, "annotation")
     assert placed["surface_distance_m"] == pytest.approx(1.15, abs=0.02)
     assert placed["visible_fraction"] > 0.95
-    assert [xyz(r).tolist() for r in others] == [xyz(r).tolist() for r in auto[:2]]
+    assert [place_of(r).tolist() for r in others] == [place_of(r).tolist() for r in auto[:2]]
     # The shortlist's last gave way to the one placed by hand, which is a candidate more.
     again = whole_run(place, [BALL, BUS], tmp_path)
     assert out.counts["not_shortlisted"] == again.counts["not_shortlisted"] + 1

@@ -236,7 +236,7 @@ def test_ctrl_c_ends_all_processes(executor, tmp_path):
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "Traceback" not in err
-    chores.until(lambda: not chores.session_members(process.pid))
+    chores.until_empty(process.pid)
 
 
 @pytest.mark.kill
@@ -260,7 +260,7 @@ def test_a_termination_leaves_no_processes_and_no_semaphores(tmp_path):
     # What outlives the process, as Python's tracker of semaphores does, has the same standard error.
     _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (-signal.SIGTERM, "")
-    chores.until(lambda: not chores.session_members(process.pid))
+    chores.until_empty(process.pid)
 
 
 @pytest.mark.kill

@@ -4,16 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from support.walled import SCENE, VIEWPOINTS, filled, walled, write_walled
+from support.handmade import write_rows, write_scene
+from support.walled import SCENE, VIEWPOINTS, walled
 
 from aerialdojo_gen.base.config.sections import FilterConfig
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.filter import run
 from aerialdojo_gen.rendering.casters import all_in_sight, in_sight
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import APPROACH, STOP
-from aerialdojo_gen.store.tables import from_rows
 
 FORWARD_5 = 3
 GOAL = VIEWPOINTS[0]
@@ -23,11 +22,9 @@ ENDS = {"before": (2.0, 0.0, 0.5), "behind": (3.2, 0.0, 0.5), "above": (1.5, 0.0
 
 @pytest.fixture
 def data(tmp_path):
-    write_walled(tmp_path)
-    for table in ("scenes", "objects"):
-        rows = store.read_scene(tmp_path, f"release/{table}", SCENE).to_pylist()
-        spec = store.LAYOUT[table].spec
-        store.write_shard(tmp_path, table, SCENE, 0, from_rows(spec, [filled(spec, row) for row in rows]))
+    write_scene(tmp_path, walled())
+    nodes = ("crate", "wall")
+    write_rows(tmp_path, "objects", [{"object_id": k, "mesh_node": node} for k, node in enumerate(nodes)], SCENE)
     pairs, plans = [], []
     for name, end in {**ENDS, "unsolved": ()}.items():
         pairs.append({"scene": SCENE, "pair_id": name, "start_object_id": 1, "euclidean_m": 9.0})
@@ -46,10 +43,7 @@ def data(tmp_path):
                 "action": [FORWARD_5, *([APPROACH] if approach else []), STOP],
             })  # fmt: skip
     for table, rows in (("pairs", pairs), ("plans", plans)):
-        spec = store.LAYOUT[table].spec
-        store.write_shard(
-            tmp_path, table, SCENE, 0, from_rows(spec, [filled(spec, row) for row in rows]).sort_by("pair_id")
-        )
+        write_rows(tmp_path, table, rows, SCENE)
     return tmp_path
 
 

@@ -1,4 +1,3 @@
-import hashlib
 import math
 from pathlib import Path
 
@@ -7,17 +6,15 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.handmade import OPINIONS, box, instance, scene
+from support.handmade import box, instance, scene, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import PairObjectsConfig
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import pair_objects
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
-from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.tables import check_table
 
 SCENE = "U_Test_0"
 
@@ -25,55 +22,29 @@ SCENE = "U_Test_0"
 def anchor_rows(places, variants=3):
     """Anchors of objects at places: variant k stands k × 0.5 m north of the first, the middle one is selected."""
     return [
-        {
-            "scene": SCENE, "object_id": o, "anchor_id": a, "x_m": x, "y_m": y + 0.5 * a, "z_m": z, "yaw_rad": 0.0,
-            "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 1.0, "score": 1.0 - a / 10, **OPINIONS,
-            "selected": a == variants // 2, "selected_by": "annotation" if variants // 2 else "auto",
-        }
+        {"object_id": o, "anchor_id": a, **xyz((x, y + 0.5 * a, z)), "selected": a == variants // 2}
         for o, (x, y, z) in enumerate(places)
         for a in range(variants)
-    ]  # fmt: skip
+    ]
 
 
 def things(data: Path, rows, *others):
     """A scene with a ball 3 m south of each object's first anchor, and the tables that tell of it."""
     first = {row["object_id"]: row for row in reversed(rows)}
-    balls = {
-        k: instance(
+    balls = [
+        instance(
             f"ball_{k}",
             trimesh.creation.icosphere(2, radius=0.4).apply_translation([row["x_m"], row["y_m"] - 3.0, row["z_m"]]),
         )
         for k, row in first.items()
-    }
-    world = scene(*balls.values(), *others, half=120.0)
-    mesh = data / "meshes" / f"{SCENE}.glb"
-    mesh.parent.mkdir(parents=True, exist_ok=True)
-    write_glb(world, mesh)
-    low, high = world.bounds.tolist()
-    told = {
-        "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
-        "mesh_path": f"meshes/{SCENE}.glb",
-        "attribution": None, "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
-        "ceiling_m": high[2],
-        **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
-        "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 1,
-    }  # fmt: skip
-    objects = [
-        {
-            "scene": SCENE, "object_id": k, "name": f"ball {k}", "category": "ball", "description": "A ball.",
-            "mesh_node": f"ball_{k}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
-            "size_z_m": 1.0, "landmark_id": 0, "direction": "east", "claims": "[]",
-            "shape": None, "shape_held_out": None,
-        }
-        for k in balls
-    ]  # fmt: skip
-    store.write_shard(data, "scenes", SCENE, 0, from_rows(schemas.SCENES, [told]))
-    store.write_shard(data, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+    ]
+    write_scene(data, scene(*balls, *others, half=120.0))
+    write_rows(data, "objects", [{"object_id": k, "mesh_node": f"ball_{k}"} for k in first])
 
 
 def pair(data: Path, rows, config=None, others=()):
     config = config or PairObjectsConfig()
-    store.write_shard(data, "anchors", SCENE, 0, from_rows(schemas.ANCHORS, rows))
+    write_rows(data, "anchors", rows)
     things(data, rows, *others)
     job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
     out = pair_objects.run(job, config)
@@ -171,9 +142,8 @@ def test_what_shows_through_a_narrow_gap_is_seen(tmp_path):
 def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
     rows = anchor_rows([(0.0, 0.0, 2.0), (20.0, 0.0, 2.0)])
     pair(tmp_path, rows)
-    objects = store.read_scene(tmp_path, "objects", SCENE).to_pylist()
-    objects[1]["mesh_node"] = "gone"
-    store.write_shard(tmp_path, "objects", SCENE, 0, from_rows(schemas.OBJECTS, objects))
+    nodes = ("ball_0", "gone")
+    write_rows(tmp_path, "objects", [{"object_id": k, "mesh_node": node} for k, node in enumerate(nodes)])
     job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[tmp_path] * 4))
     with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run aerialdojo-gen annotate-import"):
         pair_objects.run(job, PairObjectsConfig())

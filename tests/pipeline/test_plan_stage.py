@@ -1,4 +1,3 @@
-import hashlib
 import math
 from pathlib import Path
 
@@ -6,7 +5,7 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 from support.flying import along, distances, solid, town
-from support.handmade import OPINIONS
+from support.handmade import write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import PairObjectsConfig, PlanConfig, QuotaConfig
 from aerialdojo_gen.base.config.shared import Embodiment
@@ -17,10 +16,9 @@ from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import candidate_policy, pair_objects, plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.context import release_scenes
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.tables import check_table
 
 SCENE = "U_Test_0"
 CONFIG = PlanConfig(targets_per_part=2)
@@ -31,30 +29,13 @@ def job(data: Path, stage: str, part: int = 0, parts: int = 1) -> Job:
     return Job(stage, SCENE, part, parts, 0, Embodiment(), ProjectPaths(data, data, data, data))
 
 
-def write(data: Path, name: str, spec: schemas.TableSpec, rows) -> None:
-    store.write_shard(data, name, SCENE, 0, from_rows(spec, rows))
-
-
 @pytest.fixture(scope="module")
 def data(tmp_path_factory) -> Path:
     """A store with the town, five objects of three anchors each, one of them inside a house, and their pairs."""
     root = tmp_path_factory.mktemp("data")
     world = town()
-    (root / "meshes").mkdir()
-    write_glb(world, root / "meshes" / f"{SCENE}.glb")
-    digest = hashlib.sha256((root / "meshes" / f"{SCENE}.glb").read_bytes()).hexdigest()
-    low, high = world.bounds.tolist()
-    write(root, "scenes", schemas.SCENES, [
-        {"scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID",
-         "mesh_path": f"meshes/{SCENE}.glb", "attribution": None, "mesh_sha256": digest, "ceiling_m": high[2],
-         **{f"{e}_{a}_m": v for e, c in (("min", low), ("max", high)) for a, v in zip("xyz", c, strict=True)},
-         "n_triangles": world.n_triangles, "n_instances": len(world.instances), "n_categories": 2}])  # fmt: skip
-    write(root, "objects", schemas.OBJECTS, [
-        {"scene": SCENE, "object_id": k, "name": f"thing {k}", "category": "thing", "description": "A thing.",
-         "mesh_node": f"thing_{k:02d}", "x_m": 0.0, "y_m": 0.0, "z_m": 1.0, "size_x_m": 1.0, "size_y_m": 1.0,
-         "size_z_m": 1.0, "landmark_id": 0, "direction": "east", "claims": "[]",
-         "shape": None, "shape_held_out": None}
-        for k in range(N_OBJECTS)])  # fmt: skip
+    write_scene(root, world)
+    write_rows(root, "objects", [{"object_id": k, "mesh_node": f"thing_{k:02d}"} for k in range(N_OBJECTS)])
     grid = ClearanceGrid.build(world)
     rng = np.random.default_rng(11)
     anchors = []
@@ -65,13 +46,9 @@ def data(tmp_path_factory) -> Path:
                 p = rng.uniform([-16, -16, 0.5], [16, 16, 6])
             if (k, a) == (4, 2):
                 p = world["thing_00"].centroid
-            anchors.append(
-                {"scene": SCENE, "object_id": k, "anchor_id": a, "x_m": p[0], "y_m": p[1], "z_m": p[2],
-                 "yaw_rad": rng.uniform(-math.pi, math.pi), "clearance_m": 1.0, "surface_distance_m": 1.0,
-                 "visible_fraction": 1.0, "score": 1.0 - a / 10, "selected": a == 1, "selected_by": "annotation",
-                 **OPINIONS}
-            )  # fmt: skip
-    write(root, "anchors", schemas.ANCHORS, anchors)
+            turn = rng.uniform(-math.pi, math.pi)
+            anchors.append({"object_id": k, "anchor_id": a, **xyz(p), "yaw_rad": turn, "selected": a == 1})
+    write_rows(root, "anchors", anchors)
     pairs = pair_objects.run(job(root, "pair-objects"), PairObjectsConfig()).tables["pairs"]
     store.write_shard(root, "pairs", SCENE, 0, pairs)
     return root

@@ -1,6 +1,6 @@
 """The release of a hand-made scene: counts, both instances together, and nothing about the target in `tasks`."""
 
-import hashlib
+import itertools
 import math
 import re
 import shutil
@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.handmade import OPINIONS, box, instance
+from support.handmade import box, instance, write_rows, write_scene, xyz
 from support.handmade import scene as handmade_scene
 
 from aerialdojo_gen.base.config.sections import FilterConfig, SplitConfig
@@ -22,66 +22,39 @@ from aerialdojo_gen.pipeline.stages.work import filter as filter_stage
 from aerialdojo_gen.pipeline.stages.work import split
 from aerialdojo_gen.pipeline.stages.work.quota import train_counts, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
 N_OBJECTS = 6
-VIEWPOINT = {
-    "scene": SCENE, "object_id": 0, "viewpoint_id": 0, "x_m": 1.0, "y_m": 2.0, "z_m": 3.0, "yaw_rad": 0.5
-}  # fmt: skip
 
 
 def position(i):
     return np.array([7.0 * i, 3.0 * (i % 3), 1.0 + i])
 
 
-def rows_of_objects():
-    for i in range(N_OBJECTS):
-        x, y, z = position(i)
-        yield {
-            "scene": SCENE, "object_id": i, "name": f"thing {i}", "category": "thing", "description": f"It is {i}.",
-            "mesh_node": f"thing_{i:03}", "x_m": x, "y_m": y, "z_m": z, "size_x_m": 1.0, "size_y_m": 1.0,
-            "size_z_m": 1.0, "landmark_id": 0, "direction": "north", "claims": "[]",
-            "shape": None, "shape_held_out": None,
-        }  # fmt: skip
-
-
-def rows_of_anchors():
-    for i in range(N_OBJECTS):
-        for a in range(3):
-            x, y, z = position(i) + np.array([1.5, 0.5 * a, 0])
-            yield {
-                "scene": SCENE, "object_id": i, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.1 * a,
-                "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - 0.1 * a,
-                "selected": a == 1, "selected_by": "auto", **OPINIONS,
-            }  # fmt: skip
+def anchor(i, a):
+    """Where an object's anchor is, and its yaw."""
+    return position(i) + np.array([1.5, 0.5 * a, 0]), 0.1 * a
 
 
 def rows_of_pairs_and_plans():
-    anchors = {(r["object_id"], r["anchor_id"]): r for r in rows_of_anchors()}
-    for i in range(N_OBJECTS):
-        for a in range(3):
-            for j in set(range(N_OBJECTS)) - {i}:
-                start, goal = anchors[i, a], anchors[j, 1]
-                p, q = (np.array([r["x_m"], r["y_m"], r["z_m"]]) for r in (start, goal))
-                key = {"scene": SCENE, "pair_id": f"{i}_{a}__{j}"}
-                ids = {"start_object_id": i, "start_anchor_id": a, "target_object_id": j}
-                xyz = np.stack([p, [q[0], p[1], p[2]], q])
-                length = float(np.linalg.norm(np.diff(xyz, axis=0), axis=1).sum())
-                share = (i + j) % 3 / 4
-                seen = {"target_visible_at_start": share, "visible_view_at_start": "down" if share else None}
-                pair = key | ids | seen | {"euclidean_m": float(np.linalg.norm(q - p))}
-                plan = key | {
-                    "outcome": "SOLVED", "predicted_length_m": length,
-                    "length_m": length, "n_actions": 3, "expansions": 9, "min_clearance_m": 0.4,
-                    "x_m": xyz[:, 0], "y_m": xyz[:, 1], "z_m": xyz[:, 2], "yaw_rad": [start["yaw_rad"] + math.pi] * 3,
-                    "action": [3, 16, 0], "free_length_m": length / 1.25, "plan_detour": 1.25,
-                    "straight_line_free": False, "climb_m": max(0.0, q[2] - p[2]), "agent_action": [3, 0],
-                }  # fmt: skip
-                yield pair, plan
+    for i, a, j in itertools.product(range(N_OBJECTS), range(3), range(N_OBJECTS)):
+        if i == j:
+            continue
+        (p, yaw), (q, _) = anchor(i, a), anchor(j, 1)
+        share, length = (i + j) % 3 / 4, float(abs(q[0] - p[0]) + np.linalg.norm((q - p)[1:]))
+        yield {
+            "pair_id": f"{i}_{a}__{j}", "start_object_id": i, "start_anchor_id": a, "target_object_id": j,
+            "euclidean_m": float(np.linalg.norm(q - p)),
+            "target_visible_at_start": share, "visible_view_at_start": "down" if share else None,
+        }, {
+            "pair_id": f"{i}_{a}__{j}", "outcome": "SOLVED", "length_m": length, "n_actions": 3,
+            "min_clearance_m": 0.4, "x_m": [p[0], q[0], q[0]], "y_m": [p[1], p[1], q[1]], "z_m": [p[2], p[2], q[2]],
+            "yaw_rad": [yaw + math.pi] * 3, "action": [3, 16, 0], "agent_action": [3, 0],
+            "free_length_m": length / 1.25, "plan_detour": 1.25, "straight_line_free": False,
+            "climb_m": max(0.0, q[2] - p[2]),
+        }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -89,50 +62,37 @@ def data(tmp_path_factory):
     """A data directory with everything upstream of split, and split's own output."""
     data = tmp_path_factory.mktemp("data")
     pairs, plans = zip(*rows_of_pairs_and_plans(), strict=True)
-    things = [
-        instance(f"thing_{i:03}", box(tuple(position(i) - 0.5), tuple(position(i) + 0.5))) for i in range(N_OBJECTS)
-    ]
-    write_glb(handmade_scene(*things, half=60.0, ceiling=20.0, name=SCENE), data / "x.glb")
-    digest = hashlib.sha256((data / "x.glb").read_bytes()).hexdigest()
-    scene = {
-        "scene": SCENE, "family": "Urban", "scene_type": "Test", "partition": "ID", "mesh_path": "x.glb",
-        "attribution": None,
-        "mesh_sha256": digest, "min_x_m": 0.0, "min_y_m": 0.0, "min_z_m": 0.0, "max_x_m": 50.0, "max_y_m": 50.0,
-        "max_z_m": 20.0, "ceiling_m": 20.0, "n_triangles": 12, "n_instances": 7, "n_categories": 2,
-    }  # fmt: skip
-    landmark = {
-        "scene": SCENE, "landmark_id": 0, "name": "tower", "mesh_node": "tower_000",
-        "x_m": 0.0, "y_m": 0.0, "z_m": 5.0,
-    }  # fmt: skip
-    references = [
-        {
-            "scene": SCENE, "object_id": i, "reference_image": b"png",
-            "box_u0_px": 1, "box_v0_px": 2, "box_u1_px": 30, "box_v1_px": 40, "image_fraction": 0.1,
-            "reference_x_m": 1.0, "reference_y_m": 2.0, "reference_z_m": 3.0, "reference_yaw_rad": 0.5,
-            "step_back_m": 0.0, "tells_shown": None, "tells_missing": None, "parts_shown": [],
-        }
-        for i in range(N_OBJECTS)
-    ]  # fmt: skip
-    descriptions = [
-        {
-            "scene": SCENE, "object_id": i, "paraphrase_id": k, "level": "normal", "text": f"It is {i}, text {k}.",
-            "claims": [0], "frame": f"it is {{np}}, text {k}", "held_out": k >= 3,
-        }
-        for i in range(N_OBJECTS) for k in range(5)
-    ]  # fmt: skip
+    nodes = [f"thing_{i:03}" for i in range(N_OBJECTS)]
+    things = [instance(node, box(tuple(position(i) - 0.5), tuple(position(i) + 0.5))) for i, node in enumerate(nodes)]
+    write_scene(data, handmade_scene(*things, half=60.0, ceiling=20.0, name=SCENE))
     for table, rows in {
-        "scenes": [scene], "landmarks": [landmark], "objects": list(rows_of_objects()),
-        "anchors": list(rows_of_anchors()), "viewpoints": [VIEWPOINT], "references": references,
-        "descriptions": descriptions, "pairs": pairs, "plans": plans,
+        "landmarks": [{"name": "tower"}],
+        "objects": [
+            {"object_id": i, "name": f"thing {i}", "description": f"It is {i}.", "mesh_node": node, "claims": "[]",
+             **xyz(position(i))}
+            for i, node in enumerate(nodes)
+        ],
+        "anchors": [
+            {"object_id": i, "anchor_id": a, **xyz(anchor(i, a)[0]), "yaw_rad": anchor(i, a)[1], "selected": a == 1}
+            for i in range(N_OBJECTS) for a in range(3)
+        ],
+        "viewpoints": [{}],
+        "references": [{"object_id": i, "reference_image": b"png", "step_back_m": 0.0} for i in range(N_OBJECTS)],
+        "descriptions": [
+            {"object_id": i, "paraphrase_id": k, "text": f"It is {i}, text {k}.", "held_out": k >= 3}
+            for i in range(N_OBJECTS) for k in range(5)
+        ],
+        "pairs": pairs, "plans": plans,
     }.items():  # fmt: skip
-        spec = store.LAYOUT[table].spec
-        store.write_shard(data, table, SCENE, 0, from_rows(spec, rows))
-    roots = ProjectPaths(data, data, data, data)
+        write_rows(data, table, rows)
     for name, run, config in (("filter", filter_stage.run, FilterConfig()), ("split", split.run, SplitConfig())):
-        output = run(Job(name, SCENE, 0, 1, 0, Embodiment(), roots), config)
-        for table, rows in output.tables.items():
+        for table, rows in run(job(name, data), config).tables.items():
             store.write_shard(data, table, SCENE, 0, rows)
     return data
+
+
+def job(stage, data):
+    return Job(stage, SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
 
 
 def load(data, table):
@@ -166,9 +126,9 @@ def test_train_share_and_both_instances_on_one_side(data):
 def test_of_a_scene_that_is_out_of_distribution_a_fifth_trains(data, tmp_path):
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
     scene = store.read_scene(data, "scenes", SCENE).to_pylist()[0] | {"partition": "OOD"}
-    store.write_shard(tmp_path / "data", "scenes", SCENE, 0, from_rows(schemas.SCENES, [scene]))
-    job = Job("split", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[tmp_path / "data"] * 4))
-    tables = {name: table.to_pandas() for name, table in split.run(job, SplitConfig()).tables.items()}
+    write_rows(tmp_path / "data", "scenes", [scene])
+    output = split.run(job("split", tmp_path / "data"), SplitConfig())
+    tables = {name: table.to_pandas() for name, table in output.tables.items()}
     n = load(data, "routes").groupby("setting").size()
     for table, instances in (("tasks", 2), ("routes", 1)):
         trains = tables[f"{table}/train"].groupby("setting").size() // instances
@@ -191,9 +151,8 @@ def test_tasks_tell_the_start_and_nothing_of_the_goal(data):
 
 
 def test_what_training_has_seen_is_told_by_the_tables_alone(data):
-    job = Job("split", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[data] * 4))
     # So few training tasks that some pairs have none.
-    tables = split.run(job, SplitConfig(id_train_fraction=0.2)).tables
+    tables = split.run(job("split", data), SplitConfig(id_train_fraction=0.2)).tables
     tasks, routes = (
         pd.concat([tables[f"{name}/{side}"].to_pandas() for side in ("train", "test")])
         for name in ("tasks", "routes")
@@ -247,17 +206,17 @@ def test_verdicts_are_judged_by_each_candidates_own_figures(data):
     )
     assert not set(verdicts) & (set(pairs) | set(plans)) - {"scene"}
     figures = pairs[["euclidean_m", "target_visible_at_start"]].join(plans[["length_m", "plan_detour"]])
-    paper, roots = figures.loc[verdicts.index[verdicts["keep"]]], ProjectPaths(data, data, data, data)
+    paper = figures.loc[verdicts.index[verdicts["keep"]]]
     assert (paper["length_m"] / paper["euclidean_m"]).min() >= 1.05
     routes = load(data, "routes")
     assert np.allclose(routes["detour_ratio"], routes["length_m"] / routes["euclidean_m"], atol=1e-12)
-    job = Job("filter", SCENE, 0, 1, 0, Embodiment(), roots)
     for rule, kept in (
         ({"max_visible_at_start": 0.25}, paper["target_visible_at_start"] <= 0.25),
         ({"min_plan_detour": 1.25}, paper["plan_detour"] >= 1.25),
         ({"min_plan_detour": 1.26}, paper["plan_detour"] >= 1.26),
     ):
-        rows = filter_stage.run(job, FilterConfig(**rule)).tables["verdicts"].to_pandas().set_index("pair_id")
+        output = filter_stage.run(job("filter", data), FilterConfig(**rule))
+        rows = output.tables["verdicts"].to_pandas().set_index("pair_id")
         assert set(rows.index[rows["keep"]]) == set(paper.index[kept])
     assert 0 < (paper["target_visible_at_start"] <= 0.25).sum() < len(paper)
 
@@ -304,8 +263,8 @@ def test_ids_hang_on_the_salt_and_tell_no_pair():
 def test_another_salt_renames_the_same_tasks(data, tmp_path):
     """Which candidates are released, and on which side, hangs on the pairs alone; the salt stands nowhere."""
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
-    roots, salt = ProjectPaths(*[tmp_path / "data"] * 4), "nobody is to know this"
-    output = split.run(Job("split", SCENE, 0, 1, 0, Embodiment(), roots), SplitConfig(salt=salt))
+    salt = "nobody is to know this"
+    output = split.run(job("split", tmp_path / "data"), SplitConfig(salt=salt))
     pair = ["start_object_id", "start_anchor_id", "target_object_id"]
     for subset in ("train", "test"):
         ours = pd.read_parquet(data / "release" / "routes" / f"id_{subset}").sort_values(pair, ignore_index=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import urllib.request
 import uuid
 from collections.abc import Iterator
@@ -20,20 +21,53 @@ def server() -> Iterator[str]:
         yield url
 
 
+def new_bucket(server: str) -> str:
+    """Make an empty bucket; gives ``s3://bucket/prefix``."""
+    name = f"b-{uuid.uuid4().hex[:12]}"
+    urllib.request.urlopen(urllib.request.Request(f"{server}/{name}", method="PUT")).close()
+    return f"s3://{name}/data"
+
+
+def reach(server: str, cache: Path, patch: pytest.MonkeyPatch) -> None:
+    """Set the environment to reach the server with, and a cache of its own."""
+    for key in [key for key in os.environ if key.startswith("AWS_")]:
+        patch.delenv(key)
+    for key, value in CREDENTIALS.items():
+        patch.setenv(key, value)
+    patch.setenv("AWS_ENDPOINT_URL", server)
+    patch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    patch.setenv("AERIALDOJO_CACHE", str(cache))
+    forget_clients()
+
+
 @pytest.fixture
 def cloud(server: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     """An empty bucket, the environment to reach it with, and a cache of its own; yields ``s3://bucket/prefix``."""
-    name = f"b-{uuid.uuid4().hex[:12]}"
-    for key in [key for key in os.environ if key.startswith("AWS_")]:
-        monkeypatch.delenv(key)
-    for key, value in CREDENTIALS.items():
-        monkeypatch.setenv(key, value)
-    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
-    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
-    urllib.request.urlopen(urllib.request.Request(f"{server}/{name}", method="PUT")).close()
+    reach(server, tmp_path / "cache", monkeypatch)
+    yield new_bucket(server)
     forget_clients()
-    yield f"s3://{name}/data"
+
+
+@pytest.fixture(scope="session")
+def smoke_bucket(server: str, smoke: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The smoke run's release and meshes, and what filter kept, in a bucket."""
+    cloud = new_bucket(server)
+    with pytest.MonkeyPatch.context() as patch:
+        reach(server, tmp_path_factory.mktemp("cache"), patch)
+        root = open_root(cloud)
+        for folder in ("release", "meshes", "plans", "verdicts"):
+            for path in sorted((smoke / folder).rglob("*")):
+                if path.is_file():
+                    with root.commit(path.relative_to(smoke).as_posix()) as copy:
+                        shutil.copyfile(path, copy)
+    return cloud
+
+
+@pytest.fixture
+def uploaded(server: str, smoke_bucket: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """`smoke_bucket`, and the environment to reach it with: what a test writes there it removes, or calls its own."""
+    reach(server, tmp_path / "cache", monkeypatch)
+    yield smoke_bucket
     forget_clients()
 
 

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from support.command_line import called
 
 from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.store import shards as store
@@ -21,10 +22,10 @@ BOTH = ["U_Courtyard_0", "U_Courtyard_1"]
 def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
     cloud: str, smoke: Path, project: Path, scenes: list[str]
 ) -> None:
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "run", "pipelines/smoke.toml", *scenes, "--data", cloud]
-    environment = os.environ | {"AERIALDOJO_LEASE_S": "3"}
+    arguments, lease = ["run", "pipelines/smoke.toml", *scenes, "--data", cloud], {"AERIALDOJO_LEASE_S": "3"}
     root, local = open_root(cloud), open_root(smoke)
-    killed = subprocess.Popen([*command, "--workers", "2"], cwd=project, env=environment, stderr=subprocess.DEVNULL)
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", *arguments, "--workers", "2"]
+    killed = subprocess.Popen(command, cwd=project, env=os.environ | lease, stderr=subprocess.DEVNULL)
     try:
         while not root.list("anchors", "*/*"):
             assert killed.poll() is None, "it ended by itself"
@@ -33,7 +34,7 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
     finally:
         killed.kill()
         killed.wait()
-    done = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    done = called(*arguments, "--workers", "1", cwd=project, **lease)
     assert done.returncode == 0, done.stderr
     root.refresh()
     assert scenes_there(root) == scenes
@@ -44,6 +45,6 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
         assert root.digest(f"meshes/{scene}.glb", reread=True) == local.digest(f"meshes/{scene}.glb")
         for row in store.read_scene(root, "recordings", scene, ["path", "bytes", "sha256"]).to_pylist():
             assert root.is_whole(row["path"], row["bytes"], row["sha256"], reread=True)
-    again = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    again = called(*arguments, "--workers", "1", cwd=project, **lease)
     assert again.returncode == 0, again.stderr
     assert "nothing to do: all 10 stages are up to date" in again.stderr, again.stderr

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+from support import command_line
 from support.task_files import uav_on, write
 
 from aerialdojo_gen.base.errors import StoreError
@@ -19,35 +20,16 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.store.root import open_root
 
 _BLIND = Sensors(views=())
 
 
-@pytest.fixture
-def uploaded(cloud: str, smoke: Path) -> str:
-    """The smoke run's release and meshes, and what filter kept, in a bucket."""
-    root = open_root(cloud)
-    for folder in ("release", "meshes", "plans", "verdicts"):
-        for path in sorted((smoke / folder).rglob("*")):
-            if path.is_file():
-                with root.commit(path.relative_to(smoke).as_posix()) as copy:
-                    shutil.copyfile(path, copy)
-    return cloud
-
-
 def said(capsys, *arguments) -> tuple[int, str]:
     """What a command prints, and its exit code."""
-    before, sys.argv = sys.argv, ["aerialdojo-gen", *map(str, arguments)]
-    try:
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-    finally:
-        sys.argv = before
-    told = capsys.readouterr()
-    return ended.value.code or 0, told.out + told.err
+    code, out, err = command_line.said(capsys, *arguments)
+    return code, out + err
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -79,15 +61,16 @@ def test_statistics_are_the_same(capsys, smoke, uploaded, tmp_path):
 @pytest.mark.parametrize("release", ["", "/release"])
 def test_validate_finds_the_same(capsys, smoke, uploaded, tmp_path, release):
     arguments = ["validate", "--sample", 2, "--pictures", 1, "--scene", "U_Courtyard_0", "--workers", 1]
-    with open_root(uploaded).commit("release/stray.txt") as path:
+    root, found = open_root(uploaded), {}
+    with root.commit("release/stray.txt") as path:
         path.write_text("no part of a release")
-    found = {}
     for kind, data in (("directory", shutil.copytree(smoke, tmp_path / "data")), ("bucket", uploaded)):
         if kind == "directory":
             (data / "release/stray.txt").write_text("no part of a release")
         report = tmp_path / f"{kind}.csv"
         code, text = said(capsys, *arguments, "--report", report, "--quiet", "--data", f"{data}{release}")
         found[kind] = code, text, report.read_bytes()
+    root.delete("release/stray.txt")
     assert found["bucket"] == found["directory"]
     assert found["bucket"][0] == 1
     assert b"foreign_file" in found["bucket"][2]

@@ -164,7 +164,7 @@ def test_where_data_may_lie(tmp_path, monkeypatch):
 
 
 def test_a_large_file_goes_up_in_parts(cloud):
-    root, data = open_root(cloud), os.urandom(20 << 20)
+    root, data = open_root(cloud), os.urandom(17 << 20)
     write(root, "meshes/a.glb", data)
     assert root.version("meshes/a.glb").rstrip('"').endswith("-3")
     assert hashlib.sha256(data).hexdigest() == root.digest("meshes/a.glb", reread=True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerialdojo_gen.base.errors import AssetError, StoreError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.executors.base import TaskQueue
 from aerialdojo_gen.pipeline.executors.channels import at_end
 
@@ -137,29 +138,26 @@ def keep_until_the_end(chore):
     return chore.number
 
 
-def refuse(chore):
-    raise StoreError(f"{chore.label} is refused")
-
-
 def until(true, seconds=60.0):
     end = time.monotonic() + seconds
     while not true():
         if time.monotonic() > end:
-            raise TimeoutError("it did not come to it")
+            raise AssertionError("it did not come to it")
         time.sleep(0.02)
 
 
-def session_members(session):
-    """Processes of a session that are alive (not zombies)."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[3]) == session and fields[0] != "Z":
-            found.append(int(stat.parent.name))
-    return found
+def until_empty(session):
+    """Wait until no process of a session is alive (zombies are not)."""
+
+    def is_empty():
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError):
+                fields = stat.read_text().rsplit(")", 1)[1].split()
+                if int(fields[3]) == session and fields[0] != "Z":
+                    return False
+        return True
+
+    until(is_empty)
 
 
 def compute_and_sign(task):

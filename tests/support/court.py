@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 
-import numpy as np
-from support.handmade import OPINIONS, UNTOLD
+from support.handmade import write_rows, write_scene, xyz
 from support.rendered import courtyard
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -18,10 +16,9 @@ from aerialdojo_gen.pipeline.registry import BY_NAME
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import render
 from aerialdojo_gen.rendering.sample import n_parts
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import check_table, from_rows
+from aerialdojo_gen.store.tables import check_table
 
 SCENE = "U_Court_0"
 CONFIG = RenderConfig(width=64, height=64, limit=1, trajectories_per_part=1, renderer="pybullet")
@@ -38,52 +35,25 @@ BAD = ROUTE | {"x_m": [-5.0, -2.0, -2.0, -2.0, -2.0, 1.0], "y_m": [-5.0] * 6, "z
 
 
 def route_row(nav_id, setting, lists):
-    p = np.stack([lists["x_m"], lists["y_m"], lists["z_m"]], axis=1)
-    return {
-        "nav_id": nav_id, "scene": SCENE, "setting": setting, "start_object_id": 0, "start_anchor_id": 0,
-        "target_object_id": 1, **dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), p[-1].tolist(), strict=True)),
-        "goal_yaw_rad": 0.0, "euclidean_m": 4.0, "length_m": 5.0, "detour_ratio": 1.25, "n_actions": 6,
-        "min_clearance_m": 1.0, **UNTOLD, **lists,
-    }  # fmt: skip
+    goal = [lists[name][-1] for name in ("x_m", "y_m", "z_m")]
+    return {"nav_id": nav_id, "setting": setting, "target_object_id": 1, **xyz(goal, "goal_{}_m"), **lists}
 
 
 def write_inputs(data, bad=BAD):
     """Write the tables that recording reads; the route nav_b is `bad`."""
     scene = courtyard()
-    mesh = data / "meshes" / f"{SCENE}.glb"
-    mesh.parent.mkdir(parents=True)
-    write_glb(scene, mesh)
-    low, high = scene.bounds.tolist()
+    write_scene(data, scene)
+    anchors = (
+        (0, 0, 4.0, 1.5, 1.5, True), (0, 1, 4.0, 1.0, 1.5, False),
+        (1, 0, 0.0, -5.0, 1.0, True),  # looks away from its object
+    )  # fmt: skip
     rows = {
-        "scenes": [
-            {
-                "scene": SCENE, "family": "Urban", "scene_type": "Court", "partition": "ID",
-                "mesh_path": f"meshes/{SCENE}.glb",
-                "attribution": None, "mesh_sha256": hashlib.sha256(mesh.read_bytes()).hexdigest(),
-                **{f"{e}_{a}_m": v for e, p in (("min", low), ("max", high)) for a, v in zip("xyz", p, strict=True)},
-                "ceiling_m": high[2], "n_triangles": scene.n_triangles, "n_instances": len(scene.instances),
-                "n_categories": 1,
-            }
-        ],
         "objects": [
-            {
-                "scene": SCENE, "object_id": k, "name": node, "category": "thing", "description": "A cube.",
-                "mesh_node": node, **dict(zip(("x_m", "y_m", "z_m"), scene[node].centroid.tolist(), strict=True)),
-                "size_x_m": 1.0, "size_y_m": 1.0, "size_z_m": 1.0, "landmark_id": 0, "direction": "north",
-                "claims": "[]", "shape": None, "shape_held_out": None,
-            }
+            {"object_id": k, "mesh_node": node, **xyz(scene[node].centroid)}
             for k, node in enumerate(("red_cube", "blue_cube", "west"))
         ],
         "anchors": [
-            {
-                "scene": SCENE, "object_id": k, "anchor_id": a, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": yaw,
-                "clearance_m": 1.0, "surface_distance_m": 1.0, "visible_fraction": 0.5, "score": 1.0 - a, **OPINIONS,
-                "selected": selected, "selected_by": "auto",
-            }
-            for k, a, x, y, z, yaw, selected in (
-                (0, 0, 4.0, 1.5, 1.5, 0.0, True), (0, 1, 4.0, 1.0, 1.5, 0.0, False),
-                (1, 0, 0.0, -5.0, 1.0, 0.0, True),  # looks away from its object
-            )
+            {"object_id": k, "anchor_id": a, **xyz(place), "selected": selected} for k, a, *place, selected in anchors
         ],
         "routes/train": [
             route_row("nav_a", "base", ROUTE), route_row("nav_b", "standard", bad),
@@ -92,8 +62,7 @@ def write_inputs(data, bad=BAD):
         "routes/test": [],
     }  # fmt: skip
     for table, content in rows.items():
-        spec = store.LAYOUT[table].spec
-        store.write_shard(data, table, SCENE, 0, from_rows(spec, content))
+        write_rows(data, table, content, SCENE)
 
 
 def run_all(data, config, stage=render, name="render"):

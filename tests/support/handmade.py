@@ -1,24 +1,24 @@
-"""Small scenes made by hand from trimesh's primitives, for tests that need to know where everything is."""
+"""Small scenes made by hand from trimesh's primitives, whose places tests know, and tables that tell of them."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import pyarrow as pa
 import trimesh
 
-from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
+from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
+from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS
+from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.schemas import SPLIT_COLUMNS, TableSpec
+from aerialdojo_gen.store.tables import from_rows
 
-# Columns of anchors that do not matter to what reads them.
-OPINIONS = {
-    "score_geometric": 0.5, "score_clip": None, "score_vlm": None,
-    **{f"part_{name}": 0.5 for name in (*WEIGHTS, *FACTORS)},
-    "part_tells": None, "part_front": None, "off_front_rad": None, "no_front_reason": None, "step_back_m": 0.0,
-    "thumbnail": b"",
-}  # fmt: skip
-# What a table tells of difficulty, of the start's view and of splits, where that does not matter.
-UNTOLD = dict.fromkeys(DIFFICULTY_COLUMNS)
-UNSEEN = {"target_visible_at_start": None, "visible_view_at_start": None}
+# What a table tells of splits, where that does not matter.
 UNSPLIT = dict.fromkeys(SPLIT_COLUMNS)
 
 
@@ -54,3 +54,36 @@ def scene(*instances: Instance, half: float = 15.0, ceiling: float = 15.0, name:
 
 def mesh_of(item: Instance) -> trimesh.Trimesh:
     return trimesh.Trimesh(item.vertices, item.faces, process=False)
+
+
+def filled(spec: TableSpec, row: dict[str, Any]) -> dict[str, Any]:
+    """A row with null, or a plain value, in every column that it does not name."""
+    assert row.keys() <= set(spec.schema.names), (spec.name, row.keys())
+    made = {}
+    for field in spec.schema:
+        kind = field.type
+        plain: Any = [] if pa.types.is_list(kind) else "none" if pa.types.is_string(kind) else 0
+        plain = False if pa.types.is_boolean(kind) else b"" if pa.types.is_binary(kind) else plain
+        made[field.name] = row.get(field.name, None if field.nullable else plain)
+    return made
+
+
+def write_rows(data: Path, table: str, rows: Iterable[dict[str, Any]], scene: str = "U_Test_0") -> None:
+    """Write a scene's shard of a table, of rows that name the columns that matter."""
+    spec = store.LAYOUT[table].spec
+    table_rows = from_rows(spec, [filled(spec, {"scene": scene} | row) for row in rows])
+    store.write_shard(data, table, scene, 0, table_rows)
+
+
+def write_scene(data: Path, place: Scene, table: str = "scenes") -> None:
+    """Write a scene's mesh and its row."""
+    mesh = data / "meshes" / f"{place.name}.glb"
+    mesh.parent.mkdir(parents=True, exist_ok=True)
+    write_glb(place, mesh)
+    digest = hashlib.sha256(mesh.read_bytes()).hexdigest()
+    write_rows(data, table, [scene_row(place, f"meshes/{mesh.name}", digest)], place.name)
+
+
+def xyz(values: Iterable[float], name: str = "{}_m") -> dict[str, float]:
+    """The columns of a position."""
+    return {name.format(axis): float(value) for axis, value in zip("xyz", values, strict=True)}

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from pathlib import Path
-from typing import Any
 
-import pyarrow as pa
 from support.extended import write_viewpoints
-from support.handmade import box, instance, scene
+from support.handmade import box, instance, scene, write_rows, write_scene
 
-from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.schemas import TableSpec
-from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Walled_0"
 # 1 m from the crate's sides; the first is the goal.
@@ -31,24 +24,9 @@ def walled() -> Scene:
     return scene(crate, wall, roof, half=12.0, ceiling=8.0, name=SCENE)
 
 
-def filled(spec: TableSpec, row: dict[str, Any]) -> dict[str, Any]:
-    """A row with null, or a plain value, in every column that it does not name."""
-    made = {}
-    for field in spec.schema:
-        kind = field.type
-        plain: Any = [] if pa.types.is_list(kind) else "none" if pa.types.is_string(kind) else 0
-        plain = False if pa.types.is_boolean(kind) else b"" if pa.types.is_binary(kind) else plain
-        made[field.name] = row.get(field.name, None if field.nullable else plain)
-    return made
-
-
 def write_walled(data: Path, *, viewpoints: bool = True) -> Path:
     """Write the release, with its viewpoints or as an older version did."""
-    built = walled()
-    mesh = data / "meshes" / f"{SCENE}.glb"
-    mesh.parent.mkdir(parents=True)
-    write_glb(built, mesh)
-    digest = hashlib.sha256(mesh.read_bytes()).hexdigest()
+    write_scene(data, walled(), "release/scenes")
     x, y, z = VIEWPOINTS[0]
     goal = {"goal_x_m": x, "goal_y_m": y, "goal_z_m": z, "goal_yaw_rad": math.pi}
     routes, tasks = [], []
@@ -63,7 +41,6 @@ def write_walled(data: Path, *, viewpoints: bool = True) -> Path:
         tasks.append({**own, **named, **known, **placed, "start_yaw_rad": math.pi, "direction": "west",
                       "description": "A crate.", "action_budget": 90})  # fmt: skip
     rows = {
-        "release/scenes": [{"scene": SCENE, "mesh_path": f"meshes/{SCENE}.glb", "mesh_sha256": digest}],
         "release/objects": [
             {"scene": SCENE, "object_id": k, "mesh_node": node} for k, node in enumerate(("crate", "wall"))
         ],
@@ -71,8 +48,7 @@ def write_walled(data: Path, *, viewpoints: bool = True) -> Path:
         "routes/train": [], "tasks/train": [], "routes/test": routes, "tasks/test": tasks,
     }  # fmt: skip
     for table, content in rows.items():
-        spec = store.LAYOUT[table].spec
-        store.write_shard(data, table, SCENE, 0, from_rows(spec, [filled(spec, row) for row in content]))
+        write_rows(data, table, content, SCENE)
     if viewpoints:
         write_viewpoints(data, SCENE, [
             {"object_id": 0, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": math.atan2(-y, -x)} for x, y, z in VIEWPOINTS
