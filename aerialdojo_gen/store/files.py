@@ -40,14 +40,6 @@ def sha256_of(path: Path) -> str:
     return digest.hexdigest()
 
 
-def is_whole(path: Path, size: int, sha256: str | None = None) -> bool:
-    """Whether a file or folder is there, of a size, and of a digest where one is given."""
-    try:
-        return size_of(path) == size and (sha256 is None or sha256_of(path) == sha256)
-    except OSError:
-        return False
-
-
 def file_digest(path: Path) -> str:
     """SHA-256 of a file's bytes, hexadecimal; OSError where it cannot be read.
 

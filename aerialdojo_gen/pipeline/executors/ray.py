@@ -13,6 +13,7 @@ import re
 import secrets
 import shutil
 import socket
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -169,7 +170,7 @@ class RayExecutor(Executor):
         if self._address is None:
             own = {"num_cpus": self._requested or own_cores(), "include_dashboard": False, "_temp_dir": str(scratch)}
             # Workers import this package in place, with its compiled kernels.
-            python_path = os.pathsep.join(path for path in sys_path() if path)
+            python_path = os.pathsep.join(map(os.path.abspath, sys.path))
             options = common | own | {"runtime_env": {"env_vars": {"PYTHONPATH": python_path}}}
         else:
             _check_answers(self._address)
@@ -318,13 +319,6 @@ def _short_folder() -> Iterator[Path]:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def sys_path() -> list[str]:
-    """Return this process's import path, absolute."""
-    import sys
-
-    return [os.path.abspath(path) for path in sys.path]
 
 
 def _required() -> set[str]:

@@ -68,7 +68,7 @@ def run(job: Job, config: FilterConfig) -> Output:
     n = len(outcome)
     table = pa.table(
         {
-            "scene": pa.array([job.scene] * n, pa.string()),
+            "scene": pa.repeat(job.scene, n),
             "pair_id": pairs.column("pair_id"),
             "keep": reason == KEPT,
             "reason": pa.array(reason.tolist(), pa.string()),

@@ -55,7 +55,7 @@ def run(job: Job, config: PairObjectsConfig) -> Output:
     share, view = _seen_at_start(job, config, object_id[t], starts_at[s])
     table = pa.table(
         {
-            "scene": pa.array([job.scene] * len(order), pa.string()),
+            "scene": pa.repeat(job.scene, len(order)),
             "pair_id": pa.array([ids[k] for k in order], pa.string()),
             "start_object_id": object_id[s],
             "start_anchor_id": anchor_id[s],

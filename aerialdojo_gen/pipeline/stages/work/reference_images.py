@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -19,6 +18,7 @@ from aerialdojo_gen.pipeline.scoring.views import box_px, boxed, part_shares
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.rendering.raycast import pixel_rays
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.store.schemas import REFERENCES
 from aerialdojo_gen.store.tables import from_rows
@@ -98,7 +98,7 @@ def _parts_shown(
     seen = _seen_faces(alone, len(thing.faces), camera, pose, mask & some)
     if not np.allclose(pose, at_anchor):
         pixels = np.flatnonzero(boxed(camera, at_anchor, thing.vertices) & some)
-        directions = product(_local_rays(camera).reshape(-1, 3)[pixels], at_anchor[:3, :3].T)
+        directions = product(pixel_rays(camera)[0][pixels], at_anchor[:3, :3].T)
         own = np.zeros_like(mask)
         own.flat[pixels] = rays.first_hit(at_anchor[:3, 3], directions)[1] == k
         seen = np.stack([seen, _seen_faces(alone, len(thing.faces), camera, at_anchor, own)])
@@ -111,7 +111,7 @@ def _seen_faces(
     alone: TriangleRayCaster, faces: int, camera: Camera, pose: NDArray[np.float64], pixels: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """How many of some pixels (H, W) that show an instance show each of its faces, (faces,) int64."""
-    hit = alone.first_hit(pose[:3, 3], product(_local_rays(camera)[pixels], pose[:3, :3].T))[1]
+    hit = alone.first_hit(pose[:3, 3], product(pixel_rays(camera)[0][pixels.ravel()], pose[:3, :3].T))[1]
     return np.bincount(hit[hit >= 0], minlength=faces)
 
 
@@ -144,7 +144,7 @@ def instance_mask(
         if drawn is None:
             mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
         else:
-            directions = product(_local_rays(camera)[v0:v1, u0:u1], world_from_camera[:3, :3].T)
+            directions = product(_rays_of(camera, u0, v0, u1, v1), world_from_camera[:3, :3].T)
             mask[v0:v1, u0:u1] = _mended(rays, instance, drawn[v0:v1, u0:u1], world_from_camera[:3, 3], directions)
     return mask
 
@@ -173,14 +173,13 @@ def _mended(
 def _window(
     rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64], u0: int, v0: int, u1: int, v1: int
 ) -> NDArray[np.int32]:
-    local = _local_rays(camera)[v0:v1, u0:u1]
+    local = _rays_of(camera, u0, v0, u1, v1)
     directions = product(local.reshape(-1, 3), world_from_camera[:3, :3].T)
     return rays.first_hit(world_from_camera[:3, 3], directions)[1].reshape(local.shape[:2])
 
 
-@lru_cache(maxsize=2)
-def _local_rays(camera: Camera) -> NDArray[np.float64]:
-    return camera.rays()
+def _rays_of(camera: Camera, u0: int, v0: int, u1: int, v1: int) -> NDArray[np.float64]:
+    return pixel_rays(camera)[0].reshape(camera.height, camera.width, 3)[v0:v1, u0:u1]
 
 
 def box_of(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:

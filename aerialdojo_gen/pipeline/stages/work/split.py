@@ -30,14 +30,6 @@ def _train_fraction(scene: str, out_of_distribution: bool, config: SplitConfig) 
     return config.ood_train_fraction if out_of_distribution else config.id_train_fraction
 
 
-def _constant(value: str, n: int) -> pa.Array:
-    return pa.array([value] * n, pa.string())
-
-
-def _first(lists: pa.ChunkedArray) -> pa.ChunkedArray:
-    return pc.list_element(lists, 0)
-
-
 def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
     """Rows of `table` whose `key` is `ids`, in the order of `ids`."""
     return table.take(pc.index_in(ids, value_set=table.column(key).combine_chunks()))
@@ -53,7 +45,7 @@ def routes_table(
     pair_ids = kept.column("pair_id").to_pylist()
     columns: dict[str, Any] = {
         "nav_id": pa.array([nav_id(scene, p, key) for p in pair_ids], pa.string()),
-        "scene": _constant(scene, kept.num_rows),
+        "scene": pa.repeat(scene, kept.num_rows),
         "setting": kept.column("setting"),
         **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
         **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
@@ -105,12 +97,12 @@ def tasks_table(
             "task_id": pc.binary_join_element_wise(routes.column("nav_id"), modality[0], "-"),
             "nav_id": routes.column("nav_id"),
             "scene": routes.column("scene"),
-            **{name: _constant(scene[name], n) for name in ("family", "scene_type", "partition")},
+            **{name: pa.repeat(scene[name], n) for name in ("family", "scene_type", "partition")},
             "subset": pc.if_else(pa.array(train), "train", "test"),
             "setting": routes.column("setting"),
-            "modality": _constant(modality, n),
+            "modality": pa.repeat(modality, n),
             "action_budget": routes.column("action_budget"),
-            **{f"start_{name}": _first(routes.column(name)) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
+            **{f"start_{name}": pc.list_element(routes.column(name), 0) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
             "target_name": target.column("name"),
             "landmark": target.column("landmark"),
             "direction": target.column("direction"),
