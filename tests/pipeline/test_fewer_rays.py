@@ -39,7 +39,7 @@ def kiosk() -> Instance:
     return Instance(plain.node, "thing", "", {}, plain.parts, anatomy)
 
 
-@pytest.fixture(scope="module", params=range(3))
+@pytest.fixture(scope="module", params=range(2))
 def world(request):
     """The kiosk among rails, boards and posts."""
     rng = np.random.default_rng(request.param)
