@@ -1,6 +1,5 @@
 """Shards are whole, checked, the same bytes every time, and never outside their folder."""
 
-import resource
 import subprocess
 import sys
 import textwrap
@@ -222,29 +221,32 @@ def test_an_error_while_writing_leaves_the_old_file_and_no_temporary(tmp_path):
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"f.bin": "old"}
 
 
+# A process that may not write files beyond 4 kB stands for a full disk: the write fails half-way for real.
+NO_ROOM = """
+import resource, signal, sys
+import pyarrow.parquet as pq
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.store.shards import write_shard
+table = pq.read_table(sys.argv[1])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+try:
+    write_shard(sys.argv[2], "pairs", "U_Test_0", 0, table)
+except StoreError as error:
+    print(error)
+"""
+
+
 def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
-    # A process that may not write files beyond 4 kB stands for a full disk: the write fails half-way for real.
-    code = f"""
-        import resource, signal
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
-        import sys; sys.path[:0] = {sys.path!r}
-        from pathlib import Path
-        from {__name__} import pair, write
-        from aerialdojo_gen.base.errors import StoreError
-        try:
-            write(Path({str(tmp_path)!r}), [pair(i) for i in range(5000)])
-        except StoreError as error:
-            print(error)
-    """
-    assert resource.RLIMIT_FSIZE is not None
+    rows, data = tmp_path / "rows.parquet", tmp_path / "data"
+    pq.write_table(from_rows(schemas.PAIRS, [pair(i) for i in range(5000)]), rows)
     out = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", NO_ROOM, rows, data], capture_output=True, text=True, check=True
     ).stdout
     assert out.count("\n") == 1
     assert "cannot write" in out
     assert "would exceed the allowed size" in out
-    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+    assert not [p for p in data.rglob("*") if p.is_file()]
 
 
 def test_a_folder_is_replaced_when_the_new_one_is_whole_and_not_before(tmp_path):
