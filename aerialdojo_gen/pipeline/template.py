@@ -71,19 +71,10 @@ def init_config(path: str | Path, pipeline: str | Path | Pipeline | None = None,
 
 
 def pipeline_text(pipeline: Pipeline, folder: Path | None = None) -> str:
-    """Write a pipeline as a commented TOML file.
+    """Write a pipeline as a commented TOML file, from which `load_pipeline` reads an equal one.
 
-    Parameters
-    ----------
-    pipeline : Pipeline
-        What differs from the defaults is set; every other key is a comment that shows its default.
-    folder : Path, optional
-        Where the file will lie: paths are written relative to it. Absolute where absent.
-
-    Returns
-    -------
-    str
-        `load_pipeline` reads an equal pipeline from it, and so it does where the ``#`` before a key is taken away.
+    What differs from the defaults is set; every other key is a comment that shows its default, and may lose its #.
+    Paths are written relative to `folder`, where the file will lie; absolute where it is not given.
     """
     meanings = section_meanings()
     out = [_HEAD.rstrip("\n")]
@@ -148,13 +139,9 @@ def _key_text(key: str) -> str:
 
 
 def key_lines(keys: list[Key], width: int | None = None) -> list[str]:
-    """Write keys for a terminal: a line each, what it means below it; a star where the default is another.
+    """Write keys for a terminal of so many columns, or in lines of any length.
 
-    Parameters
-    ----------
-    keys : list of Key
-    width : int, optional
-        Columns of the terminal; lines of any length where absent.
+    Each key has a line, and what it means below it; a star where it has another value than the default.
     """
     meanings = section_meanings()
     lines: list[str] = []

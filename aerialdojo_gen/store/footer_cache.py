@@ -57,7 +57,7 @@ class FooterCache:
         )
 
     def record(self, root: DataRoot, name: str, version: str, read_ns: int, info: ShardInfo) -> None:
-        """Keep what the footer of a shard says; `asked_ns` is when its version was read."""
+        """Keep what the footer of a shard says; `read_ns` is when its version was read."""
         if root == self._root and read_ns - changed_ns(version) > _TIME_RESOLUTION_NS:
             self._used.add(name)
             self._entries[name] = {"version": version, "facts": asdict(info)}

@@ -51,7 +51,7 @@ class State:
             self._listings.clear()
 
     def listing(self, group: str, *, reread: bool = False) -> dict[str, Entry]:
-        """Return the objects under a prefix by key, as they were listed before unless `anew`; not to be changed."""
+        """Return the objects under a prefix by key, as they were listed before unless `reread`; not to be changed."""
         with self._lock:
             kept = self._listings.get(group)
             old = kept is not None and not self._epoch and time.monotonic() - kept.made > _LISTING_TTL_S

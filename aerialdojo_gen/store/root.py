@@ -26,10 +26,7 @@ from aerialdojo_gen.store.staging import remove, staged, sweep, sweep_unstaged
 class DataRoot(ABC):
     """A place for tables and files; picklable, cheap to make, without an open connection until it is used.
 
-    Attributes
-    ----------
-    url : str
-        The place as it is said in messages and to other processes: an absolute path, or ``s3://bucket/prefix``.
+    `url` is the place as it is said in messages and to other processes: an absolute path, or ``s3://bucket/prefix``.
     """
 
     url: str
@@ -41,12 +38,7 @@ class DataRoot(ABC):
     def local_copy(self, relative: str) -> Path:
         """Return a file, or a folder with all that is in it, on this machine; its bytes must not be changed.
 
-        Raises
-        ------
-        FileNotFoundError
-            There is none of that name.
-        StoreError
-            The store does not answer, or refuses.
+        FileNotFoundError where there is none; StoreError where the store does not answer, or refuses.
         """
 
     @abstractmethod
@@ -57,17 +49,7 @@ class DataRoot(ABC):
     def digest(self, relative: str, *, reread: bool = False) -> str:
         """SHA-256 of a file's bytes, or of a folder's files one after the other by name; hexadecimal.
 
-        Parameters
-        ----------
-        relative : str
-            The file or folder.
-        anew : bool
-            Read the bytes also where their digest is known.
-
-        Raises
-        ------
-        FileNotFoundError
-            There is none of that name.
+        `reread` reads the bytes also where their digest is known; FileNotFoundError where there are none.
         """
 
     def prefetch_digests(self, names: Iterable[str]) -> None:  # noqa: B027 - what would cost requests is not asked twice
@@ -100,10 +82,7 @@ class DataRoot(ABC):
     def commit(self, relative: str) -> AbstractContextManager[Path]:
         """Yield an empty local path to write a file to; at the end it is there whole, on an error not at all.
 
-        Raises
-        ------
-        StoreError
-            The path leads out of the root, or the store is full, read-only or does not answer.
+        StoreError where the path leads out of the root, or the store is full, read-only or does not answer.
         """
 
     @abstractmethod
@@ -142,15 +121,9 @@ class DataRoot(ABC):
 
 @dataclass(frozen=True)
 class LocalRoot(DataRoot):
-    """A directory of this machine, or of a file system that several machines mount.
+    """A directory of this machine, or of a file system that several machines mount."""
 
-    Attributes
-    ----------
-    path : Path
-        Absolute.
-    """
-
-    path: Path
+    path: Path  # Absolute
 
     @property
     def url(self) -> str:  # type: ignore[override]
