@@ -11,7 +11,7 @@ import resource
 import sys
 from collections.abc import Iterator, Sequence
 
-from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError, ConfigError, UsageError
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
 _LEAST_FILES = 64
@@ -123,3 +123,15 @@ def _causes(error: BaseException) -> Iterator[BaseException]:
         seen.add(id(cause))
         yield cause
         cause = cause.__cause__ or cause.__context__
+
+
+def number_of(variable: str, default: float, low: float, high: float, hint: str) -> float:
+    """Return the number that an environment variable has; ConfigError with the hint where it is out of bounds."""
+    value = os.environ.get(variable, str(default))
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not low <= number <= high:
+        raise ConfigError(f"{variable}={value!r}: {hint}")
+    return number

@@ -19,7 +19,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from aerialdojo_gen.base.errors import ConfigError, MissingPackage, StoreError, lacks
+from aerialdojo_gen.base.environment_errors import number_of
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, lacks
 from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
@@ -229,14 +230,7 @@ def _age_s(answer: Mapping[str, Any]) -> float:
 
 def timeout_s() -> float:
     """Seconds without a byte after which a request is tried again: ``$AERIALDOJO_TIMEOUT_S``, or 15."""
-    value = os.environ.get("AERIALDOJO_TIMEOUT_S", str(_SILENT_S))
-    try:
-        seconds = float(value)
-    except ValueError:
-        seconds = 0.0
-    if not 0.1 <= seconds <= 3600.0:
-        raise ConfigError(f"AERIALDOJO_TIMEOUT_S={value!r}: write a number of seconds from 0.1 to 3600")
-    return seconds
+    return number_of("AERIALDOJO_TIMEOUT_S", _SILENT_S, 0.1, 3600.0, "write a number of seconds from 0.1 to 3600")
 
 
 _making = threading.Lock()

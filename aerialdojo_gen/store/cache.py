@@ -16,7 +16,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from aerialdojo_gen.base.errors import ConfigError, disk_error
+from aerialdojo_gen.base.environment_errors import number_of
+from aerialdojo_gen.base.errors import disk_error
 from aerialdojo_gen.store.staging import remove, staged
 
 _DEFAULT_GB = 20.0
@@ -143,14 +144,7 @@ def cache_folder() -> Path:
 
 
 def _bound_bytes() -> int:
-    value = os.environ.get("AERIALDOJO_CACHE_GB", str(_DEFAULT_GB))
-    try:
-        bound = float(value)
-    except ValueError:
-        bound = -1.0
-    if not 0.0 <= bound < 1e9:
-        raise ConfigError(f"AERIALDOJO_CACHE_GB={value!r}: write a number of gigabytes, e.g. 20")
-    return int(bound * 1e9)
+    return int(1e9 * number_of("AERIALDOJO_CACHE_GB", _DEFAULT_GB, 0.0, 1e9, "write a number of gigabytes, e.g. 20"))
 
 
 def _size(folder: Path) -> int:

@@ -23,7 +23,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from aerialdojo_gen.base.errors import ConfigError, Malformed, StoreError
+from aerialdojo_gen.base.environment_errors import number_of
+from aerialdojo_gen.base.errors import Malformed, StoreError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.store.bucket import Bucket, Content
 from aerialdojo_gen.store.cloud_errors import Changed
@@ -44,14 +45,7 @@ class _LeaseRecord:
 
 def lease_s() -> float:
     """Seconds that a lock is held without being renewed: ``$AERIALDOJO_LEASE_S``, or a minute."""
-    value = os.environ.get("AERIALDOJO_LEASE_S", str(_DEFAULT_S))
-    try:
-        seconds = float(value)
-    except ValueError:
-        seconds = 0.0
-    if not 1.0 <= seconds <= 86400.0:
-        raise ConfigError(f"AERIALDOJO_LEASE_S={value!r}: write a number of seconds, 1 or more")
-    return seconds
+    return number_of("AERIALDOJO_LEASE_S", _DEFAULT_S, 1.0, 86400.0, "write a number of seconds, 1 or more")
 
 
 class Lease:
