@@ -5,21 +5,18 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.benchmark.agents import InvalidAnswer, agent_class, load_agent
+from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
 from aerialdojo_gen.benchmark.tasks import read_tasks, select
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.benchmark.runner import Evaluation
 
 # An address without a service: the agent is made for its prompt alone.
 _NOBODY = "http://127.0.0.1:9/v1"

@@ -22,13 +22,7 @@ def check_paraphrase(choice: str) -> str:
 
 @lru_cache(maxsize=100)
 def texts_of_tasks(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[str, ...]]:
-    """Read the texts that tasks of a subset may have, by navigation task: of test tasks those that are held out.
-
-    Raises
-    ------
-    StoreError
-        The release has no paraphrases, or withholds the routes of the subset.
-    """
+    """Read the texts that tasks of a subset may have, by navigation task: of test tasks those that are held out."""
     objects = store.read_stored(root, "release/objects", scene, ("object_id", "paraphrases"))
     if "paraphrases" not in objects.column_names:
         raise StoreError(f"the objects of {scene} in {root}/release have no paraphrases: an older version made them")

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -36,10 +36,6 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.benchmark.evaluation import Limits
-
 
 __all__ = ["Evaluation", "Outcome", "evaluate"]
 

@@ -44,31 +44,18 @@ _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m
 
 @dataclass(frozen=True)
 class Selection:
-    """Which tasks.
+    """Which tasks; an empty field chooses all.
 
-    Attributes
-    ----------
-    splits : tuple of str
-        Of `aerialdojo_gen.store.schemas.SUBSETS`; empty for all, as everywhere here. ``train`` and ``test`` stand for
-        those of both partitions, ``all`` for all, and become their names.
-    settings, modalities : tuple of str
-    scenes : tuple of str
-        Names or globs.
-    limit : int or None
-        Draw so many tasks, spread over the scenes as evenly as they go; a larger limit only adds to them.
-    seed : int
-        Of the draw.
-    protocol : str
-        ``paper`` for the tasks of the paper's sample (`aerialdojo_gen.dataset.protocol`) alone; empty for all.
+    ``train`` and ``test`` stand for the splits of both partitions, ``all`` for all, and become their names.
     """
 
-    splits: tuple[str, ...] = ()
+    splits: tuple[str, ...] = ()  # Of `aerialdojo_gen.store.schemas.SUBSETS`
     settings: tuple[str, ...] = ()
     modalities: tuple[str, ...] = ()
-    scenes: tuple[str, ...] = ()
-    limit: int | None = None
-    seed: int = 0
-    protocol: str = ""
+    scenes: tuple[str, ...] = ()  # Names or globs
+    limit: int | None = None  # How many are drawn, evenly over the scenes; a larger limit only adds to them
+    seed: int = 0  # Of the draw
+    protocol: str = ""  # ``paper``: the tasks of the paper's sample (`aerialdojo_gen.dataset.protocol`) alone
 
     def __post_init__(self) -> None:
         """Refuse what does not exist, with what there is; give splits their names."""
@@ -89,25 +76,13 @@ class Selection:
 
 @dataclass(frozen=True)
 class Task:
-    """A task instance with its goal: the evaluator's, never an agent's.
+    """A task instance with its goal: the evaluator's, never an agent's."""
 
-    Attributes
-    ----------
-    row : dict
-        Its row of `tasks`, with ``split``.
-    goal : tuple of float
-        Position of the goal anchor, metres, world frame.
-    euclidean_m, length_m : float
-        Straight distance from start to goal, and length of the reference trajectory.
-    target_id : int
-        ``object_id`` of the target; `NO_TARGET` where the release withholds the goals.
-    """
-
-    row: dict[str, Any]
-    goal: Point
-    euclidean_m: float
-    length_m: float
-    target_id: int
+    row: dict[str, Any]  # Its row of `tasks`, with ``split``
+    goal: Point  # Position of the goal anchor, metres, world frame
+    euclidean_m: float  # Straight distance from start to goal
+    length_m: float  # Of the reference trajectory
+    target_id: int  # ``object_id`` of the target; `NO_TARGET` where the release withholds the goals
 
     @property
     def start(self) -> tuple[float, float, float, float]:
@@ -117,27 +92,7 @@ class Task:
 
 
 def select(data: Where, selection: Selection) -> pa.Table:
-    """Find the tasks of a selection.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root, with a release.
-    selection : Selection
-
-    Returns
-    -------
-    pyarrow.Table
-        Rows of `tasks`, the columns that an episode needs, with a column ``split``, sorted by scene, navigation task
-        and modality.
-
-    Raises
-    ------
-    UsageError
-        No such scene, or no task fits.
-    StoreError
-        There is no release, or a part of it is damaged.
-    """
+    """Find the tasks of a selection: `_COLUMNS` and ``split``, sorted by scene, navigation task and modality."""
     root = open_root(data)
     sample = read_sample(root) if selection.protocol else None
     tables = []
@@ -181,27 +136,7 @@ def goals_withheld(root: DataRoot, scene: str, subset: str) -> bool:
 
 
 def read_tasks(data: Where, rows: pa.Table, *, withheld: bool = False) -> list[Task]:
-    """Join tasks with their goals.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    rows : pyarrow.Table
-        Of `select`.
-    withheld : bool
-        Give tasks without goals, all NaN, where the release has no routes.
-
-    Returns
-    -------
-    list of Task
-        In the order of the rows.
-
-    Raises
-    ------
-    StoreError
-        A task has no route: the two tables do not belong together.
-    """
+    """Join rows of `select` with their goals; `withheld` gives goals of NaN where the release has no routes."""
     root = open_root(data)
     tasks = []
     for row in rows.to_pylist():
@@ -229,19 +164,7 @@ def reference_actions(
 ) -> dict[str, list[int]]:
     """Read the reference trajectories' actions, by navigation task: for the oracle alone.
 
-    Parameters
-    ----------
-    root : DataRoot
-    scene : str
-    subsets : sequence of str
-        train, test.
-    column : str
-        Of `routes`: ``action``, or ``agent_action``, which an older release lacks.
-
-    Raises
-    ------
-    StoreError
-        The routes have no such column.
+    `column` is one of `routes`: ``action``, or ``agent_action``, which an older release lacks.
     """
     found: dict[str, list[int]] = {}
     for subset in subsets:
@@ -284,13 +207,7 @@ def image_shape(root: DataRoot, rows: pa.Table) -> tuple[int, ...] | None:
 
 @lru_cache(maxsize=256)
 def reference_image(root: DataRoot, scene: str, image_id: str) -> NDArray[np.uint8]:
-    """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only.
-
-    Raises
-    ------
-    StoreError
-        It is not in the release, or is no picture.
-    """
+    """Read a goal's picture: (H, W, 3) uint8, sRGB, read-only."""
     picture = decode_rgb(_pictures(root, scene).get(image_id))
     if picture is None:
         raise StoreError(
@@ -309,15 +226,7 @@ def _pictures(root: DataRoot, scene: str) -> dict[str, bytes]:
 
 @lru_cache(maxsize=64)
 def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
-    """Find a scene's mesh: its path and SHA-256.
-
-    Raises
-    ------
-    StoreError
-        The scene is not in the release, or its mesh is not there.
-    AssetError
-        The release names a mesh outside of the data root.
-    """
+    """Find a scene's mesh: its path and SHA-256; AssetError where the release names one outside of the data root."""
     row = store.read_scene(root, "release/scenes", scene, ("mesh_path", "mesh_sha256")).to_pylist()[0]
     try:
         return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]

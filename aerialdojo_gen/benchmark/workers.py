@@ -7,21 +7,19 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import load_agent
 from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.worker import Finished, Worker, WorkUnit
 from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
 from aerialdojo_gen.pipeline.executors.channels import WorkerChannel, at_end
 from aerialdojo_gen.store.root import DataRoot
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.benchmark.runner import Evaluation
 
 
 class RateLimiter:

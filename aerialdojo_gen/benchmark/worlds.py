@@ -23,25 +23,7 @@ from aerialdojo_gen.store.cache import Cache
 class WorldMaker:
     """Makes releases of worlds, each once: a folder of the cache that `aerialdojo_gen.store.cache` bounds.
 
-    Parameters
-    ----------
-    types : str or sequence of str
-        Names of scene types, or globs: ``"U_*"``.
-    start_seed, num_worlds : int
-        The first seed, and how many seeds of every type.
-    knobs : mapping, optional
-        What the seeds would draw otherwise.
-    held_out : bool
-        Make worlds of what no other world has.
-    n_objects : int
-        Most annotated objects of a world.
-    folder : Path, optional
-        In place of the user's cache.
-
-    Raises
-    ------
-    UsageError
-        No such type, or seeds out of range.
+    `WorldsEnv` documents the parameters; `folder` is its `cache`.
     """
 
     def __init__(
@@ -67,13 +49,7 @@ class WorldMaker:
         self._closed = False
 
     def root(self, world: World) -> Path:
-        """Return the data directory of a world; it is made where it is not there.
-
-        Raises
-        ------
-        AerialDojoError
-            It could not be made.
-        """
+        """Return the data directory of a world; it is made where it is not there."""
         self.prepare(world)
         return self._coming.pop(world.name).result()
 

@@ -14,81 +14,49 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2
 # Directions of the level views in the body's frame, radians, counter-clockwise.
 _BEARINGS = {"front": 0.0, "left": math.pi / 2, "right": -math.pi / 2}
+_CELL_M = 0.5
+_MIDDLE = round(100.0 / _CELL_M)  # The map reaches 100 m to every side
+_REACH_M = 15.0  # Depth beyond this is not believed
+_BAND_M = 0.8  # What is so far above or below the body is in its way
+_MARGIN_M = 0.75  # Kept between the body's centre and what is in the way
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+_MARGIN = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * math.ceil(_MARGIN_M / _CELL_M) + 1,) * 2)
 
 
 class DepthMap:
-    """What is free and what is not at the height that the body flies at.
+    """What is free and what is not at the height that the body flies at, from level views with depth."""
 
-    Parameters
-    ----------
-    sensors : Sensors
-        Level views with depth.
-    cell_m : float
-        Edge of a cell.
-    reach_m : float
-        Depth beyond this is not believed.
-    half_m : float
-        Half the map's edge.
-    band_m : float
-        What is so far above or below the body is in its way.
-    margin_m : float
-        Kept between the body's centre and what is in the way.
-    """
-
-    def __init__(
-        self,
-        sensors: Sensors,
-        cell_m: float = 0.5,
-        reach_m: float = 15.0,
-        half_m: float = 100.0,
-        band_m: float = 0.8,
-        margin_m: float = 0.75,
-    ) -> None:
-        self._cell_m, self._reach_m, self._band_m = cell_m, reach_m, band_m
-        self._middle = round(half_m / cell_m)
+    def __init__(self, sensors: Sensors) -> None:
         rays = sensors.camera.rays()
         self._slope_left, self._slope_down = -rays[0, :, 0], rays[:, 0, 1]
-        grow = 2 * math.ceil(margin_m / cell_m) + 1
-        self._grow = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (grow, grow))
         self.clear()
 
     def clear(self) -> None:
         """Forget everything: another height has another map."""
-        n = 2 * self._middle + 1
+        n = 2 * _MIDDLE + 1
         self._cells = np.zeros((n, n), np.uint8)
         # Told by experience, not by depth: stays when the map is drawn over.
         self._barred = np.zeros((n, n), np.uint8)
 
     def cell(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Cell of a point, kept inside the map."""
-        i, j = (min(max(round(v / self._cell_m) + self._middle, 0), 2 * self._middle) for v in (x_m, y_m))
+        i, j = (min(max(round(v / _CELL_M) + _MIDDLE, 0), 2 * _MIDDLE) for v in (x_m, y_m))
         return i, j
 
     def point(self, cell: tuple[int, int]) -> tuple[float, float]:
         """Centre of a cell, metres."""
-        return (cell[0] - self._middle) * self._cell_m, (cell[1] - self._middle) * self._cell_m
+        return (cell[0] - _MIDDLE) * _CELL_M, (cell[1] - _MIDDLE) * _CELL_M
 
     def add(self, view: str, depth_m: NDArray[np.float32], x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Draw in what a view shows from a pose.
-
-        Parameters
-        ----------
-        view : str
-            front, left or right.
-        depth_m : (H, W) float32
-            Planar depth, 0 where there is nothing within range.
-        x_m, y_m, yaw_rad : float
-            The body's pose in the map's frame.
-        """
+        """Draw in the planar depth that a level view shows from a pose in the map; 0 for nothing within range."""
         depth = np.where(depth_m > 0.0, depth_m, np.inf)
-        in_way = np.abs(self._slope_down)[:, None] * depth <= self._band_m
+        in_way = np.abs(self._slope_down)[:, None] * depth <= _BAND_M
         nearest = np.where(in_way, depth, np.inf).min(axis=0)
         heading = yaw_rad + _BEARINGS[view]
-        ahead = np.arange(0.0, self._reach_m, 0.5 * self._cell_m)
-        seen = ahead[:, None] < np.minimum(nearest, self._reach_m)[None] - 0.5 * self._cell_m
+        ahead = np.arange(0.0, _REACH_M, 0.5 * _CELL_M)
+        seen = ahead[:, None] < np.minimum(nearest, _REACH_M)[None] - 0.5 * _CELL_M
         self._mark(ahead[:, None] * np.ones_like(nearest), seen, heading, x_m, y_m, _FREE)
-        self._mark(nearest[None], (nearest < self._reach_m)[None], heading, x_m, y_m, _OCCUPIED)
+        self._mark(nearest[None], (nearest < _REACH_M)[None], heading, x_m, y_m, _OCCUPIED)
 
     def _mark(
         self, ahead: NDArray[np.float64], where: NDArray[np.bool_], heading: float, x_m: float, y_m: float, what: int
@@ -96,9 +64,9 @@ class DepthMap:
         ahead, left = ahead[where], (np.where(where, ahead, 0.0) * self._slope_left)[where]
         x = x_m + math.cos(heading) * ahead - math.sin(heading) * left
         y = y_m + math.sin(heading) * ahead + math.cos(heading) * left
-        n = 2 * self._middle
-        i = np.clip(np.rint(x / self._cell_m).astype(np.int64) + self._middle, 0, n)
-        j = np.clip(np.rint(y / self._cell_m).astype(np.int64) + self._middle, 0, n)
+        n = 2 * _MIDDLE
+        i = np.clip(np.rint(x / _CELL_M).astype(np.int64) + _MIDDLE, 0, n)
+        j = np.clip(np.rint(y / _CELL_M).astype(np.int64) + _MIDDLE, 0, n)
         if what == _FREE:
             kept = self._cells[i, j] != _OCCUPIED
             i, j = i[kept], j[kept]
@@ -110,21 +78,11 @@ class DepthMap:
         self._barred[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = 1
 
     def way_to_frontier(self, x_m: float, y_m: float, least_m: float = 3.0) -> list[tuple[float, float]]:
-        """Find the way to the nearest place where the known free space ends.
+        """Find the way to the nearest place, at least `least_m` off, where the known free space ends.
 
-        Parameters
-        ----------
-        x_m, y_m : float
-            Where the body is.
-        least_m : float
-            Nearer places are not worth going to.
-
-        Returns
-        -------
-        list of (float, float)
-            Points of the map's frame, from the body's cell on; empty where there is no such place within reach.
+        Points of the map's frame, from the body's cell on; none where there is no such place within reach.
         """
-        near = cv2.dilate((self._cells == _OCCUPIED).astype(np.uint8), self._grow)
+        near = cv2.dilate((self._cells == _OCCUPIED).astype(np.uint8), _MARGIN)
         open_ = ((self._cells == _FREE) & (near == 0) & (self._barred == 0)).astype(np.uint8)
         start = self.cell(x_m, y_m)
         unknown = cv2.dilate((self._cells == _UNKNOWN).astype(np.uint8), _CROSS)
@@ -135,7 +93,7 @@ class DepthMap:
         wave[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = 1
         steps[wave > 0] = 1
         wave[start], steps[start] = 1, 0
-        least, k = least_m / self._cell_m, 1
+        least, k = least_m / _CELL_M, 1
         while True:
             grown = cv2.dilate(wave, _CROSS) & (open_ | wave)
             fresh = (grown > wave) & (steps < 0)

@@ -50,20 +50,7 @@ _EXTRAS = {"openai": "llm", "anthropic": "llm", "policy": "train"}
 
 
 def agent_class(name: str) -> Callable[..., Any]:
-    """Find an agent's class; nothing is made of it.
-
-    Parameters
-    ----------
-    name : str
-        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own, installed or in the working directory.
-
-    Raises
-    ------
-    UsageError
-        There is no such agent, or its module raises.
-    MissingPackage
-        One of `BUILT_IN` lacks a package.
-    """
+    """Find an agent's class: of `BUILT_IN`, or ``package.module:Class``, installed or in the working directory."""
     where = BUILT_IN.get(name, name)
     module_name, colon, class_name = where.partition(":")
     if not colon or not module_name or not class_name:
@@ -90,24 +77,7 @@ def agent_class(name: str) -> Callable[..., Any]:
 
 
 def load_agent(name: str, **options: Any) -> Agent:
-    """Make an agent.
-
-    Parameters
-    ----------
-    name : str
-        One of `BUILT_IN`, or ``package.module:Class`` for one of one's own.
-    **options
-        Keyword arguments of the class.
-
-    Returns
-    -------
-    Agent
-
-    Raises
-    ------
-    UsageError
-        There is no such agent, it has no such option, or it lacks ``reset`` or ``act``.
-    """
+    """Make an agent by its name, as `agent_class` finds it, with keyword arguments of its class."""
     cls = agent_class(name)
     try:
         inspect.signature(cls).bind(**options)
@@ -128,13 +98,7 @@ def load_agent(name: str, **options: Any) -> Agent:
 
 
 def read_options(name: str, given: Mapping[str, str]) -> dict[str, Any]:
-    """Convert an agent's options from text to the types of their defaults.
-
-    Raises
-    ------
-    UsageError
-        There is no such agent, or a text cannot be converted.
-    """
+    """Convert an agent's options from text to the types of their defaults."""
     parameters = inspect.signature(agent_class(name)).parameters
     defaults = {key: parameters[key].default for key in given if key in parameters}
     return {key: _converted(name, key, text, defaults.get(key)) for key, text in given.items()}

@@ -27,16 +27,6 @@ class OracleAgent(AgentBase):
     actions : str
         Which list of `routes` it flies: ``action``, the Approach left out, or ``agent_action``, which has the 16
         actions alone and ends where the target is seen.
-
-    Attributes
-    ----------
-    column : str
-        The same.
-
-    Raises
-    ------
-    ValueError
-        There is no such list.
     """
 
     sensors = BLIND
@@ -113,11 +103,6 @@ class ConstantAgent(AgentBase):
     actions : str or sequence of str or int
         Names or numbers of actions, in a string separated by commas. Where they end it stops. The default is the
         best blind flight that is known.
-
-    Raises
-    ------
-    ValueError
-        There is no such action.
     """
 
     sensors = BLIND
