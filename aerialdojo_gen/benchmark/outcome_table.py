@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import (
     Bools,
     Floats,
@@ -60,6 +61,7 @@ class OutcomeTable:
         self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
         self._values: dict[tuple[Profile, bool], Floats] = {}
         self._summaries: dict[Cut, Summary] = {}
+        self._intervals: dict[Cut, Sequence[tuple[float, float]]] = {}
 
     def judged(self, profile: Profile, along_way: bool = False) -> Floats:
         """Return the `METRICS` of every episode, (n, 6), by a profile."""
@@ -93,6 +95,12 @@ class OutcomeTable:
             scene, family = (self.columns[name][mask] for name in ("scene", "family"))
             self._summaries[cut] = summarize_values(values, scene, family)
         return self._summaries[cut]
+
+    def intervals(self, cut: Cut) -> Sequence[tuple[float, float]]:
+        """Return the 95 % intervals of a cut's overall metrics, in the order of `METRICS`."""
+        if cut not in self._intervals:
+            self._intervals[cut] = score_intervals(self.summary(cut))
+        return self._intervals[cut]
 
     def score(self, cut: Cut) -> Score:
         """Average a cut to one score."""

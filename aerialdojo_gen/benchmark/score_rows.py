@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import METRICS
 from aerialdojo_gen.benchmark.outcome_table import Cut
 from aerialdojo_gen.benchmark.registry import MODALITIES
@@ -66,7 +65,7 @@ def _scores(request: ReportRequest, whole: Cut) -> Iterator[list[Any]]:
 
     def known(scope: str, name: str, cut: Cut) -> list[Any]:
         own = data.summary(cut)
-        ends = [end for pair in score_intervals(own) for end in pair]
+        ends = [end for pair in data.intervals(cut) for end in pair]
         return [scope, name, *own.overall, *own.deviation[1:], *ends]
 
     yield known("overall", "overall", whole)

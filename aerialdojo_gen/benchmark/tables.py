@@ -13,7 +13,6 @@ from functools import cached_property
 from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
 from aerialdojo_gen.benchmark.difficulty import Breakdowns, find_breakdowns
-from aerialdojo_gen.benchmark.intervals import score_intervals
 from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views
 from aerialdojo_gen.benchmark.outcome_table import Cut, OutcomeTable
 from aerialdojo_gen.benchmark.runs import Run
@@ -157,10 +156,9 @@ def _value(data: OutcomeTable, base: Cut, row: Row, column: Cell, spread: bool) 
 
 def _interval_line(data: OutcomeTable, cut: Cut, columns: Sequence[Cell]) -> list[tuple[str, tuple[str, ...]]]:
     """Write the row of intervals below a row; none where no interval is known."""
-    ends = {part: score_intervals(data.summary(cut | part)) for part in {column.cut for column in columns}}
     shown = []
     for column in columns:
-        low, high = ends[column.cut][METRICS.index(column.measure)]
+        low, high = data.intervals(cut | column.cut)[METRICS.index(column.measure)]
         shown.append(NONE if math.isnan(low) else f"{text(column.measure, low)}–{text(column.measure, high)}")
     return [("", tuple(shown))] if set(shown) != {NONE} else []
 

@@ -1,14 +1,18 @@
-"""Logs of made-up runs over all 42 scenes, written as the runner writes them."""
+"""Logs of made-up runs over all 42 scenes, in memory or written as the runner writes them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.paper_figures import inventory
+from aerialdojo_gen.benchmark.metrics import episodes_of
+from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows
@@ -50,27 +54,28 @@ def episode(run: str, agent: str, scene: str, k: int, draws: np.random.Generator
     }  # fmt: skip
 
 
-def write_run(
-    data: Path, run: str, agent: str, per_scene: int = 6, scenes: list[str] | None = None, failed: int = 0
-) -> None:
+def episodes_in(scene: str, run: str, agent: str, per_scene: int) -> pa.Table:
+    """Make a scene's rows of `episodes`."""
+    draws = rng.generator(0, "made-up-run", agent, scene)
+    return from_rows(schemas.EPISODES, [episode(run, agent, scene, k, draws) for k in range(per_scene)])
+
+
+def made_run(agent: str, per_scene: int = 6, scenes: Sequence[str] = ()) -> Run:
+    """Make a run as it is read from a log, without its steps."""
+    table = pa.concat_tables([episodes_in(scene, agent, agent, per_scene) for scene in scenes or sorted(inventory())])
+    return Run(agent, agent, agent, "{}", table, episodes_of(table))
+
+
+def write_run(data: Path, run: str, agent: str, scenes: Sequence[str], per_scene: int = 6, failed: int = 0) -> None:
     """Write the episodes of a made-up run, and so many failures a scene."""
-    for scene in scenes or sorted(inventory()):
-        draws = rng.generator(0, "made-up-run", agent, scene)
-        rows = [episode(run, agent, scene, k, draws) for k in range(per_scene)]
-        store.write_shard(data, "episodes", scene, 0, from_rows(schemas.EPISODES, rows), run=run)
+    for scene in scenes:
+        store.write_shard(data, "episodes", scene, 0, episodes_in(scene, run, agent, per_scene), run=run)
         lost = [
             {
-                "run_id": run,
-                "task_id": f"{scene}_{per_scene + k:04d}s",
-                "scene": scene,
-                "attempts": 5,
-                "kind": "server error",
-                "reason": "HTTP 503",
-                "n_requests": 5,
-                "input_tokens": None,
-                "output_tokens": None,
-                "cost_usd": 0.0,
+                "run_id": run, "task_id": f"{scene}_{per_scene + k:04d}s", "scene": scene, "attempts": 5,
+                "kind": "server error", "reason": "HTTP 503", "n_requests": 5, "input_tokens": None,
+                "output_tokens": None, "cost_usd": 0.0,
             }
             for k in range(failed)
-        ]
+        ]  # fmt: skip
         store.write_shard(data, "failures", scene, 0, from_rows(schemas.FAILURES, lost), run=run)
