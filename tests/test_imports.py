@@ -115,13 +115,14 @@ def test_what_is_a_dependency_is_imported():
     assert not unused
 
 
-def test_pybullet_is_loaded_by_who_draws_with_it():
+def test_pybullet_and_language_models_packages_are_loaded_by_who_asks_for_them():
     code = (
         "import sys\n"
         "from aerialdojo_gen.rendering import backend, casters, checks, gl, picture, raycast\n"
         "from aerialdojo_gen.pipeline.stages.work import anchor_sample, reference_images, render\n"
         "from aerialdojo_gen.benchmark import observations\n"
-        "assert 'pybullet' not in sys.modules\n"
+        "from aerialdojo_gen.benchmark.llm import anthropic_agent, openai_agent\n"
+        "assert not {'pybullet', 'openai', 'anthropic'} & set(sys.modules)\n"
         "from aerialdojo_gen.rendering import world\n"
         "assert 'pybullet' in sys.modules\n"
     )

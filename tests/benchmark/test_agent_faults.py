@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support.command_line import called
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer, load_agent
@@ -131,10 +130,8 @@ def test_what_is_tolerated_is_logged(smoke: Path, tmp_path: Path) -> None:
     assert "'map'" in outcome.failure_message()
     assert not outcome.all_failed
     outcome = evaluate(smoke, job("none", 2, tolerate=True), out=tmp_path / "b")
-    assert (
-        read_run(tmp_path / "b", "r")["n_invalid"].to_pylist()
-        == read_run(tmp_path / "b", "r")["action_budget"].to_pylist()
-    )
+    rows = read_run(tmp_path / "b", "r")
+    assert rows["n_invalid"].to_pylist() == rows["action_budget"].to_pylist()
     outcome = evaluate(smoke, job("act", 6, tolerate=True), out=tmp_path / "c", limits=Limits(failures_in_row=2))
     assert (outcome.finished, outcome.failed) == (0, 2)
     assert "stopped after 2 failures in a row of one kind (agent error)" in outcome.failure_message()
@@ -181,10 +178,8 @@ def test_a_renderer_that_fails_is_opened_anew_or_logged(smoke: Path, tmp_path: P
 
 
 def test_the_command_tells_a_faulty_agent_in_one_line(smoke: Path, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(tmp_path)]
-    command += ["--agent", f"{HERE}:Faulty", "--option", "how=reset", "--limit", "4", "--workers", "2"]
-    env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=env)
+    agent = ("--agent", f"{HERE}:Faulty", "--option", "how=reset", "--limit", "4", "--workers", "1")
+    done = called("evaluate", "--data", smoke, "--out", tmp_path, *agent)
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     last = done.stderr.splitlines()[-1]
@@ -213,30 +208,22 @@ class Agent:
 """
 
 
-@pytest.mark.parametrize(("how", "line", "workers"), [("act", 17, 1), ("act", 17, 2), ("init", 8, 2)])
+@pytest.mark.parametrize(("how", "line", "workers"), [("act", 17, 1), ("act", 17, 2), ("init", 8, 1)])
 def test_an_agents_own_file_is_named_and_its_traceback_shown_on_demand(
-    smoke: Path, tmp_path: Path, how: str, line: int, workers: int
+    smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, line: int, workers: int
 ) -> None:
     (tmp_path / "own_agent.py").write_text(OWN_CODE)
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(tmp_path)]
-    command += ["--agent", "own_agent:Agent", "--option", f"how={how}", "--limit", "2", "--workers", str(workers)]
-    env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    brief, full = (
-        subprocess.run([*command, *more], capture_output=True, text=True, check=False, env=env, cwd=tmp_path)
-        for more in ([], ["--traceback"])
-    )
-    assert (brief.returncode, full.returncode) == ((1, 1) if how == "act" else (2, 2))
-    for done in (brief, full):
-        last = done.stderr.splitlines()[-1]
-        # The library's line helps nobody: the place is in the agent's file.
-        if how == "act":
-            assert f"JSONDecodeError at own_agent.py:{line}: Expecting value" in last
-        else:
-            assert "Expecting value" in last
-    assert "Traceback" not in brief.stderr
-    trace = full.stderr[full.stderr.index("Traceback") :].splitlines()[:-1]
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_agent", raising=False)
+    agent = ("--agent", "own_agent:Agent", "--option", f"how={how}", "--limit", "2", "--workers", workers)
+    done = called("evaluate", "--data", smoke, "--out", tmp_path, *agent, "--traceback")
+    assert done.returncode == (1 if how == "act" else 2)
+    # The library's line helps nobody: the place is in the agent's file.
+    said = f"JSONDecodeError at own_agent.py:{line}: Expecting value" if how == "act" else "Expecting value"
+    assert said in done.stderr.splitlines()[-1]
+    trace = done.stderr[done.stderr.index("Traceback") :].splitlines()[:-1]
     files = [one.split('"')[1] for one in trace if one.startswith("  File ")]
     assert files[0].endswith("own_agent.py"), "it begins with the agent"
-    assert f'own_agent.py", line {line}, in ' in full.stderr
+    assert f'own_agent.py", line {line}, in ' in done.stderr
     assert trace[-1].startswith("json.decoder.JSONDecodeError: ")
-    assert len(full.stderr.split("Traceback")) == 2
+    assert len(done.stderr.split("Traceback")) == 2

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 import pytest
 from support.command_line import called
 
-from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark import journal
 from aerialdojo_gen.benchmark.agents import AgentBase, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import BLIND
@@ -56,16 +56,6 @@ class Flaky(AgentBase):
 
     def answer(self):
         return f"call {self._calls}"
-
-
-class Broken(AgentBase):
-    sensors = BLIND
-
-    def reset(self, goal):
-        self._nothing = {}
-
-    def act(self, observation):
-        return self._nothing["map"]
 
 
 def job(agent="random", limit=12, run="r", tolerate=True, **kw):
@@ -122,6 +112,9 @@ def test_the_log_tells_what_happened(whole):
         assert row.min_horizontal_distance_m <= row.min_distance_m
         assert row.success == (row.stop_called and not row.collision and row.final_distance_m <= 3.0)
     assert rows[["n_requests", "input_tokens", "cost_usd"]].isna().all(axis=None)
+    counts = {table: read_run(whole, "r", table).num_rows for table in TABLES}
+    expected = {"episodes": len(rows), "steps": rows.n_actions.sum(), "timings": len(rows), "failures": 0}
+    assert counts == expected
 
 
 def test_several_workers_give_the_same_bytes(smoke, whole, tmp_path):
@@ -140,16 +133,21 @@ class Slow(RandomAgent):
 """
 
 
+def slow_run(project, smoke, folder, out, *more, sleep="0.01"):
+    """The words of a command, and how a process runs it."""
+    (folder / "slowagent.py").write_text(SLOW.replace("0.01", sleep))
+    command = ["evaluate", "--data", smoke, "--out", out, "--run", "r", "--agent", "slowagent:Slow"]
+    command += ["--pipeline", project / "pipelines" / "smoke.toml", *more]
+    env = os.environ | {"PYTHONPATH": f"{folder}{os.pathsep}{project}"}
+    process = [sys.executable, "-m", "aerialdojo_gen.cli", *command]
+    how = {"cwd": folder, "env": env, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    return command, lambda: subprocess.Popen(process, **how)
+
+
 @pytest.mark.kill
-def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path):
-    (tmp_path / "slowagent.py").write_text(SLOW)
-    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
-    out = tmp_path / "out"
-    command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
-        "--agent", "slowagent:Slow", "--limit", "60", "--pipeline", str(project / "pipelines" / "smoke.toml"),
-        "--workers", "1",
-    ]  # fmt: skip
+def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_path, monkeypatch):
+    out, fresh = tmp_path / "out", tmp_path / "fresh"
+    command, begin = slow_run(project, smoke, tmp_path, out, "--limit", "60", "--workers", "1")
 
     def finished():
         ids = set(read_run(out, "r")["task_id"].to_pylist()) if runs(out) else set()
@@ -160,26 +158,23 @@ def test_killed_again_and_again_ends_with_the_same_bytes(project, smoke, tmp_pat
 
     kept = set()
     for _ in range(2):
-        process = subprocess.Popen(command, cwd=tmp_path, env=env, stderr=subprocess.DEVNULL, start_new_session=True)
+        process = begin()
         while process.poll() is None and len(finished()) < len(kept) + 8:
             time.sleep(0.005)
         assert process.poll() is None, "killed in the middle"
         os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        process.communicate()
         assert finished() > kept, "what was finished stays"
         kept = finished()
     # What a kill in the middle of a line leaves.
     with max((out / "runs" / "r" / "journal").glob("*.jsonl")).open("a") as file:
         file.write('{"task_id":"U_')
-    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    done = called(*command, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     flown = int(done.stderr.split(" flown now")[0].rsplit(" ", 1)[1])
     assert flown == 60 - len(kept), "no finished episode is flown again"
-    fresh = tmp_path / "fresh"
-    again = subprocess.run(
-        [fresh if c == str(out) else c for c in command], cwd=tmp_path, env=env, capture_output=True, check=False
-    )
-    assert again.returncode == 0
+    assert called(*(fresh if word == out else word for word in command), cwd=tmp_path).returncode == 0
     assert snapshot(out) == snapshot(fresh)
     assert not list(out.rglob("*.jsonl"))
     assert not list(out.rglob(".aerialdojo-staging"))
@@ -212,6 +207,8 @@ def test_train_and_test_are_those_of_both_partitions(smoke):
 
 
 def test_other_settings_do_not_mix_with_a_run(smoke, tmp_path):
+    with pytest.raises(StoreError, match=r"there is no run 'r': there is none"):
+        read_run(tmp_path, "r")
     evaluate(smoke, job(limit=2), out=tmp_path)
     before = snapshot(tmp_path)
     with pytest.raises(
@@ -290,14 +287,6 @@ def test_no_more_than_the_maximal_cost(smoke, tmp_path):
     assert evaluate(smoke, flaky, out=tmp_path, limits=Limits(cost_usd=1.0)).finished == 6
 
 
-def test_a_defect_of_the_agents_is_one_line_with_its_place(smoke, tmp_path):
-    with pytest.raises(
-        AerialDojoError, match=rf"agent {HERE}:Broken failed at task .*KeyError at {FILE}\.py:\d+: 'map'"
-    ):
-        evaluate(smoke, job(f"{HERE}:Broken", limit=2, tolerate=False), out=tmp_path)
-    assert not runs(tmp_path)
-
-
 def test_the_command_in_one_line(project, smoke, tmp_path):
     def call(*args):
         return called("evaluate", "--data", smoke, "--out", tmp_path, *args, cwd=project)
@@ -333,32 +322,10 @@ def test_the_last_line_has_the_success_rate_and_the_command_for_the_scores(smoke
     assert "rate" not in str(Outcome(10, 0, 0, 0, 0, 0.0, 0, 1.0)), "no episode, no rate"
 
 
-def test_no_run_of_that_name(tmp_path):
-    with pytest.raises(StoreError, match=r"there is no run 'x': there is none"):
-        read_run(tmp_path, "x")
-
-
-def test_every_table_has_its_rows(whole):
-    episodes = read_run(whole, "r")
-    for table in TABLES:
-        rows = read_run(whole, "r", table)
-        assert rows.num_rows == {"steps": pc.sum(episodes["n_actions"]).as_py(), "failures": 0}.get(
-            table, episodes.num_rows
-        )
-
-
 @pytest.mark.kill
 def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, smoke, tmp_path):
-    (tmp_path / "slowagent.py").write_text(SLOW.replace("0.01", "0.1"))
     out = tmp_path / "out"
-    command = [
-        sys.executable, "-m", "aerialdojo_gen.cli", "evaluate", "--data", str(smoke), "--out", str(out), "--run", "r",
-        "--agent", "slowagent:Slow", "--pipeline", str(project / "pipelines" / "smoke.toml"), "--workers", "2",
-    ]  # fmt: skip
-    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
-    process = subprocess.Popen(
-        command, cwd=tmp_path, env=env, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    process = slow_run(project, smoke, tmp_path, out, "--workers", "2", sleep="0.1")[1]()
     journals = out / "runs" / "r" / "journal"
     while process.poll() is None and sum(p.read_bytes().count(b"\n") for p in journals.glob("*.jsonl")) < 4:
         time.sleep(0.01)

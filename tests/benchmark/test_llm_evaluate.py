@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -37,21 +38,14 @@ def command_of(smoke: Path, out: Path, agent: str, url: str, *more: str) -> list
     return [*command, *more]
 
 
-def fly(smoke: Path, out: Path, agent: str, url: str, *more: str) -> subprocess.CompletedProcess[str]:
-    """In a process of its own, which logs all that the packages log."""
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", *command_of(smoke, out, agent, url, *more)]
-    environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "ANTHROPIC_LOG": "debug"}
-    environment[f"{agent.upper()}_API_KEY"] = KEY
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+def fly(smoke: Path, out: Path, url: str, *more: str, agent: str = "openai") -> subprocess.CompletedProcess[str]:
+    return called(*command_of(smoke, out, agent, url, *more), **{f"{agent.upper()}_API_KEY": KEY})
 
 
-def fly_here(smoke: Path, out: Path, url: str, *more: str) -> subprocess.CompletedProcess[str]:
-    return called(*command_of(smoke, out, "openai", url, *more), OPENAI_API_KEY=KEY)
-
-
-def paste(line: str, out: Path) -> subprocess.CompletedProcess[str]:
-    """Do as a person does with a command that a message gives."""
-    environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_API_KEY": KEY}
+def shell(line: str, out: Path) -> subprocess.CompletedProcess[str]:
+    """Do as a person does: in a process of its own, which logs all that the packages log."""
+    environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "OPENAI_API_KEY": KEY}
+    environment["PYTHONPYCACHEPREFIX"] = os.environ["PYTHONPYCACHEPREFIX"]
     return subprocess.run(line, shell=True, capture_output=True, text=True, check=False, env=environment)
 
 
@@ -73,7 +67,7 @@ def scripted() -> Callable[[dict[str, Any]], str]:
 def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path: Path, agent: str) -> None:
     with serving() as service:
         service.policy = scripted()
-        done = fly(smoke, tmp_path, agent, service.url)
+        done = fly(smoke, tmp_path, service.url, agent=agent)
         assert done.returncode == 0, done.stderr
         assert len(service.requests) == 8
     key_is_nowhere(tmp_path, done)
@@ -91,12 +85,8 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
     assert conduct_cells(run, PROFILES["aerialdojo"])[5:7] == ("2", "8")
     # Defaults too: how many pictures were sent is in the log.
     used = json.loads(episodes["agent_options"][0].as_py())
-    assert (used["history_images"], used["actions"], used["image_size_px"], used["answer"]) == (
-        1,
-        "sixteen",
-        32,
-        "text",
-    )
+    expected = {"history_images": 1, "actions": "sixteen", "image_size_px": 32, "answer": "text"}
+    assert {name: used[name] for name in expected} == expected
     timings = read_run(tmp_path, agent, "timings").to_pylist()
     assert all(0 < row["longest_request_s"] <= row["request_s"] <= row["agent_s"] for row in timings)
     # What went out: nothing that the runner alone may know.
@@ -108,13 +98,13 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
 
 
 def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: Path, tmp_path: Path) -> None:
-    broken: list[Act] = [Status(503, "overloaded\x1b[2J", {"retry-after": "0"})]
-    with serving(*broken) as service:
-        done = fly(smoke, tmp_path, "openai", service.url, "--attempts", "2", "--limit", "1")
+    more = ("--attempts", "2", "--limit", "1")
+    with serving(Status(503, "overloaded\x1b[2J", {"retry-after": "0"})) as service:
+        words = command_of(smoke, tmp_path, "openai", service.url, *more)
+        done = shell(shlex.join([sys.executable, "-m", "aerialdojo_gen.cli", *words]), tmp_path)
         assert len(service.requests) == 2
         key_is_nowhere(tmp_path, done)
-        failures = read_run(tmp_path, "openai", "failures") if (tmp_path / "failures").exists() else None
-        assert failures is not None
+        failures = read_run(tmp_path, "openai", "failures")
         assert failures["attempts"].to_pylist() == [2]
         assert "HTTP 503: overloaded" in failures["reason"][0].as_py()
         assert (failures["kind"].to_pylist(), failures["n_requests"].to_pylist()) == (["server error"], [2])
@@ -126,13 +116,13 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
         assert shlex.split(pasted)[:4] == [sys.executable, "-m", "aerialdojo_gen.cli", "evaluate"]
         for given in (f"--data {smoke}", f"--out {tmp_path}", "--attempts 2", "--option 'model=\"m\"'"):
             assert given in pasted
-        again = paste(pasted, tmp_path)
+        again = fly(smoke, tmp_path, service.url, *more, "--rerun-failed")
         assert again.returncode == 1, "none finished this time either"
         with pytest.raises(StoreError, match=r"no finished episode, and 1 that failed: .* --rerun-failed"):
             load_runs(tmp_path, ["openai"])
-        assert not list((tmp_path / "episodes").rglob("*.parquet")) or read_run(tmp_path, "openai").num_rows == 0
+        assert read_run(tmp_path, "openai").num_rows == 0
         service.script[:] = [Say(STOP)]
-        done = paste(pasted, tmp_path)
+        done = shell(pasted, tmp_path)
         assert done.returncode == 0, done.stderr
     episodes = read_run(tmp_path, "openai")
     assert episodes["n_actions"].to_pylist() == [1]
@@ -142,7 +132,7 @@ def test_a_failing_service_is_logged_apart_and_its_episodes_flown_again(smoke: P
 def test_a_refusal_ends_the_run_with_one_line(smoke: Path, tmp_path: Path) -> None:
     with serving() as service:
         service.refuses = lambda _: Status(401, "wrong key\x1b]0;owned\x07\x1b[2J\x9b\u202e")
-        done = fly(smoke, tmp_path, "openai", service.url, "--quiet")
+        done = fly(smoke, tmp_path, service.url, "--quiet")
         assert (len(service.checks), len(service.requests)) == (1, 0)
     assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
@@ -199,7 +189,7 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
     more = ("--limit", "30", "--attempts", "1", "--option", "timeout_s=4.0")
     with serving() as service:
         service.policy = striking(set(STRUCK))
-        done = fly_here(smoke, tmp_path, service.url, *more)
+        done = fly(smoke, tmp_path, service.url, *more)
         assert done.returncode == 0, done.stderr
         assert "Traceback" not in done.stderr
         key_is_nowhere(tmp_path, done)
@@ -217,11 +207,11 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
         assert f"{30 - len(STRUCK)} of 30 episodes finished, {len(STRUCK)} failed" in lines[-2]
 
         before = len(service.requests)
-        again = fly_here(smoke, tmp_path, service.url, *more)
+        again = fly(smoke, tmp_path, service.url, *more)
         assert again.returncode == 0
         assert len(service.requests) == before, "not without being asked"
         service.policy = striking(set())
-        again = fly_here(smoke, tmp_path, service.url, *more, "--rerun-failed")
+        again = fly(smoke, tmp_path, service.url, *more, "--rerun-failed")
         assert again.returncode == 0, again.stderr
         assert f"{len(STRUCK)} flown now" in again.stderr.splitlines()[-1], "exactly those that failed"
     assert (read_run(tmp_path, "openai").num_rows, read_run(tmp_path, "openai", "failures").num_rows) == (30, 0)
@@ -230,7 +220,7 @@ def test_whatever_a_service_does_a_run_of_thirty_ends_with_thirty_rows(smoke: Pa
 def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) -> None:
     with serving(Status(400, "no pictures here")) as service:
         more = ("--limit", "20", "--failures-in-row", "3", "--attempts", "4", "--quiet")
-        done = fly_here(smoke, tmp_path, service.url, *more)
+        done = fly(smoke, tmp_path, service.url, *more)
         assert done.returncode == 1
         assert len(service.requests) == 3, "what is refused for good is not tried again"
         (line,) = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
@@ -239,11 +229,11 @@ def test_failures_of_one_kind_in_a_row_end_the_run(smoke: Path, tmp_path: Path) 
         # The service goes away in the middle: one line, and what was flown stays.
         service.script[:] = [Say(STOP)]
         more = ("--limit", "20", "--max-tokens", "2100", "--option", "request_retries=1")
-        done = fly_here(smoke, tmp_path, service.url, *more, "--restart")
+        done = fly(smoke, tmp_path, service.url, *more, "--restart")
         assert done.returncode == 0
         assert read_run(tmp_path, "openai").num_rows == 3, "3 x 1,020 tokens are enough"
         assert "stopped at --max-tokens 2100" in done.stderr
-    done = fly_here(smoke, tmp_path, service.url, "--limit", "20", "--option", "request_retries=1")
+    done = fly(smoke, tmp_path, service.url, "--limit", "20", "--option", "request_retries=1")
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
     assert last.startswith("error: checked before the run, nothing flown: ")
@@ -259,7 +249,7 @@ def test_keys_in_options_and_addresses_stay_out_of_the_log(smoke: Path, tmp_path
     body = json.dumps({"api_key": inner, "nested": [{"x-auth-token": "tok-7712ab91f0"}], "metadata": {"k": KEY}})
     echo = json.dumps({"thought": f"your key is {inner}", "action": "Stop"})
     with serving(Say(echo)) as service:
-        done = fly(smoke, tmp_path, "openai", service.url, "--option", f"extra_body={body}")
+        done = fly(smoke, tmp_path, service.url, "--option", f"extra_body={body}")
         assert done.returncode == 0, done.stderr
         assert service.requests[0]["body"]["api_key"] == inner, "the service gets it all the same"
     for path in [path for path in tmp_path.rglob("*") if path.is_file()]:
@@ -283,10 +273,10 @@ def test_requests_keep_their_pace_over_several_workers(smoke: Path, tmp_path: Pa
     with serving() as service:
         service.policy = stop
         more = ("--limit", "6", "--workers", "2", "--requests-per-minute", "240")
-        done = fly_here(smoke, tmp_path, service.url, *more)
+        done = fly(smoke, tmp_path, service.url, *more)
         assert done.returncode == 0, done.stderr
     # Sent 0.25 s apart at least; a slow machine only makes it longer.
     assert len(times) == 6
     assert times[-1] - times[0] > 4 * 0.25
     more = ("--agent", "random", "--requests-per-minute", "60", "--run", "r")
-    assert fly_here(smoke, tmp_path, service.url, *more).returncode == 2
+    assert fly(smoke, tmp_path, service.url, *more).returncode == 2
