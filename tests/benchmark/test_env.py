@@ -262,6 +262,10 @@ def test_vectorised(smoke, mode):
         ({"width": 0}, "no camera has 0"),
         ({"limit": 0}, "a limit is at least 1"),
         ({"render_mode": "human"}, "no render mode 'human'"),
+        ({"views": "fron"}, "no view 'fron': did you mean 'front'"),
+        ({"scenes_in_memory": 0}, "at least 1, not 0"),
+        ({"episodes_per_scene": 0}, "at least 1, not 0"),
+        ({"paraphrase": "all"}, "no choice of paraphrase 'all'"),
     ],
 )
 def test_what_does_not_exist_is_named(smoke, keywords, message):

@@ -2,7 +2,6 @@
 
 import pytest
 
-from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.env import AerialDojoEnv
 from aerialdojo_gen.benchmark.paraphrases import texts_of_tasks
 from aerialdojo_gen.learning.trajectories import Trajectories
@@ -47,8 +46,3 @@ def test_trajectories_draw_by_their_seed(smoke):
     how = {"views": (), "rgb": False, "depth": False, "scene": SCENE, "paraphrase": "random"}
     texts = [Trajectories(smoke, "train", seed=seed, **how).index.told["description"] for seed in (1, 1, 2)]
     assert texts[0] == texts[1] != texts[2]
-
-
-def test_other_choices_are_refused(smoke):
-    with pytest.raises(UsageError, match="paraphrase"):
-        AerialDojoEnv(smoke, paraphrase="all", **CHOICE)

@@ -160,19 +160,6 @@ def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run])
         assert (cells[-1] == "–") == (run.agent != "explorer")
 
 
-def test_the_terminal_has_aligned_columns(made_tables: list[TextTable]) -> None:
-    for table in made_tables:
-        plain = dataclasses.replace(table, marks={}, sections={})
-        lines = table_formats.as_text(plain).splitlines()
-        rule = next(k for k, line in enumerate(lines) if set(line) == {"-"})
-        body = lines[rule - 1 : rule + 1 + len(table.rows)]
-        del body[1]
-        assert len({len(line) for line in body}) == 1, table.title
-        assert len(lines[rule]) == max(map(len, lines[1:rule]))
-        for (label, cells), line in zip(table.rows, body[1:], strict=True):
-            assert re.split(r" {2,}", line.strip()) == [cell for cell in (label, *cells) if cell]
-
-
 @pytest.mark.parametrize("width", [80, 120])
 def test_a_terminal_of_any_width_has_every_cell_once(made_tables: list[TextTable], width: int) -> None:
     for table in made_tables:

@@ -181,17 +181,3 @@ def test_a_copy_is_refused_with_what_to_do(smoke, how):
         if how is copy.deepcopy or one is env:
             with pytest.raises(TypeError, match="make_env, make_vec"):
                 how(one)
-
-
-def test_one_view_may_be_a_word(smoke):
-    env = make_env(smoke, views="down", width=32, height=24)
-    assert list(env.reset(seed=0)[0]["rgb"]) == ["down"]
-    env.close()
-    with pytest.raises(UsageError, match="no view 'fron': did you mean 'front'"):
-        make_env(smoke, views="fron")
-
-
-@pytest.mark.parametrize("wrong", [{"scenes_in_memory": 0}, {"episodes_per_scene": 0}])
-def test_there_is_at_least_one(smoke, wrong):
-    with pytest.raises(UsageError, match="at least 1, not 0"):
-        make_env(smoke, **wrong)

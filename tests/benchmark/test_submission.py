@@ -164,7 +164,6 @@ def another_turn(actions):
     ("change", "message"),
     [
         (edit("actions", 0, another_turn), "of 24 episodes do not replay; task "),
-        (edit("actions", 11, another_turn), "of 24 episodes do not replay; task "),
         (edit("actions", -1, another_turn), "1 of 24 episodes do not replay; task "),
         (edit("actions", 3, lambda a: a + "0"), "it ends by "),
         (edit("actions", 3, lambda a: a[:-1]), "actions do not end it"),
@@ -282,24 +281,6 @@ def test_an_unfinished_run_is_not_written(smoke, tmp_path, capsys):
     assert not (tmp_path / "f").exists()
 
 
-def test_a_submission_on_another_release_is_refused(smoke, mine, tmp_path, capsys, project):
-    """The same scenes and routes under another salt."""
-    shutil.copytree(smoke, tmp_path / "data")
-    recipe = (project / "pipelines/smoke.toml").read_text().replace("no secret", "a secret")
-    recipe = recipe.replace('"../', f'"{project}/')
-    (tmp_path / "smoke.toml").write_text(recipe)
-    code, _, err = said(
-        capsys, "split", "--pipeline", tmp_path / "smoke.toml", "--data", tmp_path / "data", "--replace", "-q"
-    )
-    assert code == 0, err
-    with pytest.raises(
-        SubmissionRefused,
-        match=r"it has 24 tasks of another selection or release beside the 24 tasks",
-    ):
-        score(tmp_path / "data", mine, tmp_path / "scored", selection=CHOSEN)
-    assert not (tmp_path / "scored").exists()
-
-
 def test_a_submission_on_another_mesh_is_refused(mine, planted, tmp_path):
     (row,) = planted.rows("release/scenes")
     mesh = planted.data / row["mesh_path"]
@@ -316,16 +297,8 @@ def test_a_run_without_goals_is_scored_by_who_has_them(smoke, log, mine, scored,
     """A published copy has neither routes nor viewpoints; only `score` knows how well the agent does."""
     for folder in ("routes/id_test", "routes/ood_test", "anchors", "viewpoints"):
         shutil.rmtree(planted.release / folder)
-    flown = (
-        "evaluate",
-        "--agent",
-        f"{__name__}:Wavering",
-        "--run",
-        "wavering",
-        "--data",
-        planted.data,
-        *OPTIONS[:-1],
-    )
+    agent = ("--agent", f"{__name__}:Wavering", "--run", "wavering")
+    flown = ("evaluate", *agent, "--data", planted.data, *OPTIONS[:-1])
     code, _, err = said(capsys, *flown)
     assert code == 1
     assert "error: routes/test of U_Courtyard_0 is missing" in err
@@ -376,10 +349,7 @@ def test_the_page_sorts_in_a_browser_and_asks_for_nothing(scored, tmp_path):
         assert len(names()) == 3 + 9
         assert "Claude Opus 5" in names()
         assert column(2) == sorted(column(2), reverse=True)
-        assert (
-            board.find_elements("css selector", "small")[1].text.startswith("</script><img")
-            or "onerror" in board.text
-        )
+        assert "</script><img src=x onerror" in board.text
 
         buttons = board.find_elements("css selector", "thead button")
         dts = heads.index("DTS ↓")
@@ -400,12 +370,8 @@ def test_the_page_sorts_in_a_browser_and_asks_for_nothing(scored, tmp_path):
         groups = [th.text for th in board.find_elements("css selector", "[scope=colgroup]")]
         assert groups == ["all scenes, 3 m", "5 m", "ID", "OOD", "OOD, adapted"]
         oracle = next(row for row in board.find_elements("css selector", "tbody tr") if row.text.startswith("oracle"))
-        assert [cell.text.split("\n")[0] for cell in oracle.find_elements("css selector", "td")[-4:]] == [
-            "–",
-            "–",
-            "100.00",
-            "100.00",
-        ]
+        last = [cell.text.split("\n")[0] for cell in oracle.find_elements("css selector", "td")[-4:]]
+        assert last == ["–", "–", "100.00", "100.00"]
 
 
 def test_a_folder_without_scored_runs_has_no_page(tmp_path, capsys):

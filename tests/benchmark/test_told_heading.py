@@ -77,11 +77,15 @@ def test_a_model_is_told_what_turns_do_to_the_heading() -> None:
 def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path) -> None:
     Listener.heard.clear()
     evaluate(court, Evaluation("plain", ME), out=tmp_path)
-    assert [goal.heading for goal in Listener.heard] == [None] * 3
-    Listener.heard.clear()
     evaluate(court, Evaluation("told", ME, tell=("heading",)), out=tmp_path)
     # The tasks look west.
-    assert [goal.heading for goal in Listener.heard] == [Heading("west", 270)] * 3
+    assert [goal.heading for goal in Listener.heard] == [None] * 3 + [Heading("west", 270)] * 3
+    plain, told = Listener.heard[0], Listener.heard[3]
+    assert "faces west: a compass would show 270°" in goal_text(told)
+    assert goal_text(told).endswith("Description: A crate.")
+    assert "compass" not in goal_text(plain)
+    assert "no compass. Find" in system_prompt(plain, Sight())
+    assert "no compass, but you are told which way the drone faces at the start. Find" in system_prompt(told, Sight())
     assert read_run(tmp_path, "plain")["told"].to_pylist() == [""] * 3
     assert read_run(tmp_path, "told")["told"].to_pylist() == ["heading"] * 3
     runs = load_runs(tmp_path, ["plain", "told"])
@@ -89,8 +93,8 @@ def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path
     request = ReportRequest(open_root(court), runs, [PROFILES["aerialdojo"]])
     (overall,) = report_tables(request, ["overall"])
     assert [(label, row[1]) for label, row in overall.rows] == [(ME, "none"), (f"{ME} + heading", "heading")]
-    told = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(request).splitlines()}
-    assert told == {"run": "told", "plain": "", "told": "heading"}
+    last = {line.split(",")[0]: line.split(",")[-1] for line in as_csv(request).splitlines()}
+    assert last == {"run": "told", "plain": "", "told": "heading"}
 
 
 def test_a_run_with_it_never_mixes_with_one_without(court: Path, tmp_path: Path) -> None:
@@ -102,18 +106,6 @@ def test_a_run_with_it_never_mixes_with_one_without(court: Path, tmp_path: Path)
         evaluate(court, Evaluation("r", "stop"), out=tmp_path)
     with pytest.raises(UsageError, match="nothing to tell called 'headings': did you mean 'heading'"):
         Evaluation("r", "stop", tell=("headings",))
-
-
-def test_a_language_model_reads_it_in_its_goal(court: Path, tmp_path: Path) -> None:
-    Listener.heard.clear()
-    evaluate(court, Evaluation("plain", ME), out=tmp_path)
-    evaluate(court, Evaluation("told", ME, tell=("heading",)), out=tmp_path)
-    plain, told = Listener.heard[0], Listener.heard[3]
-    assert "faces west: a compass would show 270°" in goal_text(told)
-    assert goal_text(told).endswith("Description: A crate.")
-    assert "compass" not in goal_text(plain)
-    assert "no compass. Find" in system_prompt(plain, Sight())
-    assert "no compass, but you are told which way the drone faces at the start. Find" in system_prompt(told, Sight())
 
 
 def test_the_environment_observes_it(court: Path) -> None:
