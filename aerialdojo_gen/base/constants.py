@@ -18,6 +18,7 @@ OUTCOMES = (
     "SOLVED", "START_IN_COLLISION", "GOAL_IN_COLLISION", "NO_PATH", "NEAR_STRAIGHT", "BUDGET_EXHAUSTED", "NOT_NEEDED",
 )  # fmt: skip
 SETTINGS = ("base", "standard", "long_horizon")
+MODALITIES = ("semantic", "image")
 SUBSETS = ("id_train", "id_test", "ood_train", "ood_test")
 DIRECTIONS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 VIEWS = ("front", "left", "right", "down")

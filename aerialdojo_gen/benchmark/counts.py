@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import pyarrow as pa
-
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.benchmark.metrics import Profile, outcomes
 from aerialdojo_gen.benchmark.runs import Run
@@ -59,11 +57,6 @@ def visit_cells(run: Run, profile: Profile) -> tuple[str, ...]:
     return (*(f"{count:,}" for count in counts), *shares)
 
 
-def total(table: pa.Table, name: str) -> float | None:
-    """Sum a column of all episodes; None where any of them does not know it."""
-    return None if table[name].null_count else math.fsum(table[name].to_pylist())
-
-
 def conduct_cells(run: Run, _: Profile) -> tuple[str, ...]:
     """Say how episodes ended, and what a language-model service used."""
     ends = run.table["termination"].to_pylist()
@@ -73,6 +66,7 @@ def conduct_cells(run: Run, _: Profile) -> tuple[str, ...]:
         ("n_refused", ",.0f"), ("n_invalid", ",.0f"), ("n_requests", ",.0f"), ("input_tokens", ",.0f"),
         ("output_tokens", ",.0f"), ("cost_usd", ",.2f"),
     ):  # fmt: skip
-        count = total(run.table, name)
-        cells.append(NONE if count is None else f"{count:{form}}")
+        column = run.table[name]
+        # A sum is not known where any episode does not know its part.
+        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):{form}}")
     return tuple(cells)

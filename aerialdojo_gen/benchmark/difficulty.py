@@ -64,21 +64,15 @@ _SPECS = (
     ),
     _BreakdownSpec(DIFFICULTY, ("climb_m",), "Climb of the route, m", _bins(0.0, 1.0, 3.0, 6.0)),
     _BreakdownSpec(DIFFICULTY, ("detour_ratio",), "Detour of the route (κ)", _bins(1.0, 1.1, 1.25, 1.5)),
-    _BreakdownSpec(
-        SEEN, ("target_seen_in_train",), "Targets that training shows",
-        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
-    ),
-    _BreakdownSpec(
-        SEEN, ("start_seen_in_train",), "Start poses that training shows",
-        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
-    ),
-    _BreakdownSpec(
-        SEEN, ("pair_seen_in_train",), "Pairs of start object and target that training shows",
-        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
-    ),
-    _BreakdownSpec(
-        SEEN, ("shape_seen_in_train",), "Shapes of targets that training shows",
-        {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
+    *(
+        _BreakdownSpec(
+            SEEN, (f"{what}_seen_in_train",), f"{title} that training shows",
+            {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
+        )
+        for what, title in (
+            ("target", "Targets"), ("start", "Start poses"), ("pair", "Pairs of start object and target"),
+            ("shape", "Shapes of targets"),
+        )
     ),
     _BreakdownSpec(
         SEEN, ("target_split",), "The split by target",

@@ -14,7 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.shared import Embodiment
-from aerialdojo_gen.base.constants import SUCCESS_RADIUS_M
+from aerialdojo_gen.base.constants import MODALITIES, SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
@@ -22,7 +22,6 @@ from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.observations import GoalText, mosaic, observed_goal, render_views
 from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
 from aerialdojo_gen.benchmark.tasks import (
-    MODALITIES,
     Selection,
     Task,
     TaskSampler,
@@ -168,13 +167,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         return sorted(pc.unique(self._rows["scene"]).to_pylist())
 
     def draw_from(self, scenes: Sequence[str]) -> None:
-        """Draw episodes from some scenes alone; the spaces stay those of all tasks.
-
-        Raises
-        ------
-        UsageError
-            No task of the selection is in them.
-        """
+        """Draw episodes from some scenes alone; the spaces stay those of all tasks."""
         self._draw.restrict(scenes)
 
     def told(self) -> list[tuple[str, str, str, str | None]]:
@@ -292,23 +285,18 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
 
     @property
     def episode(self) -> Episode:
-        """The episode under way, with the pose and the distances: the evaluator's, not for agents.
-
-        Raises
-        ------
-        RuntimeError
-            None was begun.
-        """
-        if not self._begun:
-            raise RuntimeError("no episode is under way: call reset first")
-        return self._flight.episode
+        """The episode under way, with the pose and the distances: the evaluator's, not for agents."""
+        return self._under_way().episode
 
     @property
     def task(self) -> Task:
-        """The task under way with its goal: the evaluator's, not for agents; RuntimeError where none was begun."""
+        """The task under way with its goal: the evaluator's, not for agents."""
+        return self._under_way().task
+
+    def _under_way(self) -> Flight:
         if not self._begun:
             raise RuntimeError("no episode is under way: call reset first")
-        return self._flight.task
+        return self._flight
 
     @property
     def radius_m(self) -> float:

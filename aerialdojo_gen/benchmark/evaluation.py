@@ -131,33 +131,26 @@ class BudgetTracker:
 
     def __init__(self, limits: Limits, cost_usd: float, tokens: int) -> None:
         self._limits = limits
-        self.cost_usd, self.tokens = cost_usd, tokens
-        self.episodes = self.actions = self.finished = 0
-        self.streak: tuple[Failed, ...] = ()
+        self.total = Finished(cost_usd=cost_usd, tokens=tokens)
 
     def add(self, finished: Finished) -> None:
         """Add finished episodes."""
-        self.cost_usd += finished.cost_usd
-        self.tokens += finished.tokens
-        self.episodes += finished.episodes
-        self.finished += finished.flown
-        self.actions += finished.actions
-        self.streak = finished.streak if finished.flown else self.streak + finished.streak
+        self.total += finished
 
     @property
     def failing(self) -> Failed | None:
         """The failure that has occurred too often in a row; None if there is none."""
         n = self._limits.failures_in_row
-        last = self.streak[-n:]
+        last = self.total.streak[-n:]
         return last[-1] if len(last) == n and len({failed.kind for failed in last}) == 1 else None
 
     @property
     def spent(self) -> str:
         """The limit that is reached, as its option; empty if none is."""
         limits = self._limits
-        if limits.cost_usd is not None and self.cost_usd >= limits.cost_usd:
+        if limits.cost_usd is not None and self.total.cost_usd >= limits.cost_usd:
             return f"--max-cost {limits.cost_usd:g}"
-        if limits.tokens is not None and self.tokens >= limits.tokens:
+        if limits.tokens is not None and self.total.tokens >= limits.tokens:
             return f"--max-tokens {limits.tokens}"
         return ""
 

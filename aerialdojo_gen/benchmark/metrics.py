@@ -7,7 +7,7 @@ families (paper, section on evaluation); ± is the standard deviation over scene
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -124,17 +124,10 @@ _KINDS: dict[str, Any] = {
 }
 
 
-_DERIVED = ("view_distance_m",)
-
-
 def episodes_of(table: pa.Table) -> Episodes:
     """Take the metrics' columns out of a table of episodes, and check them."""
-    columns = {}
-    for field in fields(Episodes):
-        if field.name in _DERIVED:
-            continue
-        kind = _KINDS.get(field.name, np.float64)
-        columns[field.name] = np.asarray(table.column(field.name).to_pylist(), dtype=kind)
+    names = [field.name for field in fields(Episodes) if field.name != "view_distance_m"]
+    columns = {name: np.asarray(table[name].to_pylist(), dtype=_KINDS.get(name, np.float64)) for name in names}
     episodes = Episodes(**columns, view_distance_m=_view_distance_m(table))
     if np.isnan(episodes.euclidean_m).any():
         raise StoreError(
@@ -238,7 +231,7 @@ class Measure:
 
     name: str  # Field of `Score`
     head: str  # Heading of its column
-    of: Callable[[Outcomes], NDArray[Any]]  # Its value of every episode
+    of: str  # Field of `Outcomes`
     direction: int = 1  # 1 if higher is better, -1 if lower is
     metres: bool = False  # Else a share
 
@@ -246,12 +239,12 @@ class Measure:
 MEASURES = {
     measure.name: measure
     for measure in (
-        Measure("sr", "SR ↑", lambda judged: judged.success),
-        Measure("sr_view", "SR-view ↑", lambda judged: judged.success_view),
-        Measure("osr", "OSR ↑", lambda judged: judged.oracle_success),
-        Measure("spl", "SPL ↑", lambda judged: judged.spl),
-        Measure("dts_m", "DTS ↓", lambda judged: judged.distance_m, -1, metres=True),
-        Measure("cr", "CR ↓", lambda judged: judged.collision, -1),
+        Measure("sr", "SR ↑", "success"),
+        Measure("sr_view", "SR-view ↑", "success_view"),
+        Measure("osr", "OSR ↑", "oracle_success"),
+        Measure("spl", "SPL ↑", "spl"),
+        Measure("dts_m", "DTS ↓", "distance_m", -1, metres=True),
+        Measure("cr", "CR ↓", "collision", -1),
     )
 }
 METRICS = tuple(MEASURES)
@@ -261,7 +254,7 @@ PAPER_METRICS = tuple(metric for metric in METRICS if metric != "sr_view")
 
 def values_of(judged: Outcomes) -> Floats:
     """Return the `METRICS` of every episode, (n, 6) float64."""
-    return np.stack([np.asarray(measure.of(judged), np.float64) for measure in MEASURES.values()], axis=1)
+    return np.stack([np.asarray(getattr(judged, measure.of), np.float64) for measure in MEASURES.values()], axis=1)
 
 
 def score(values: Floats) -> Score:

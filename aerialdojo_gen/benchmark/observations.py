@@ -11,9 +11,9 @@ from gymnasium.spaces import Text
 from gymnasium.vector.utils import read_from_shared_memory
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Sensors
-from aerialdojo_gen.benchmark.tasks import MODALITIES
 from aerialdojo_gen.planning.flight_space import Point
 from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, scene_renderer
 from aerialdojo_gen.rendering.bodies import draw_bodies

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.text_table import TextTable
@@ -21,7 +22,6 @@ from aerialdojo_gen.benchmark.tables import Cell, ReportRequest, Row, TableSpec,
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 PARTITIONS = ("ID", "OOD", ADAPTED)
-MODALITIES = ("semantic", "image")
 NAMES_OF = {
     "base": "Base", "standard": "Standard", "long_horizon": "Long-Horizon", "semantic": "Semantic", "image": "Image",
 }  # fmt: skip

@@ -105,10 +105,10 @@ def evaluate(
     why = ""
     if budget.failing is not None:
         why = f"stopped after {limits.failures_in_row} failures in a row of one kind ({budget.failing.kind})."
-    flown, seconds = budget.episodes, time.monotonic() - started
+    now, seconds = budget.total, time.monotonic() - started
     return Outcome(
-        rows.num_rows, finished, failed, flown, budget.actions, budget.cost_usd, budget.tokens, seconds, why,
-        run.failures(), budget.finished, successes if run.goals_known else None,
+        rows.num_rows, finished, failed, now.episodes, now.actions, now.cost_usd, now.tokens, seconds, why,
+        run.failures(), now.flown, successes if run.goals_known else None,
     )  # fmt: skip
 
 
@@ -141,7 +141,7 @@ class RunLog:
 
     def check_settings(self) -> None:
         """Write the run's settings; UsageError if it was begun with others."""
-        begun = self._begun()
+        begun = episodes.run_scenes(self._out, self._name) or self._journals
         advice = "give another --run, or --restart"
         # A run without finished episodes may change: an agent's options may have been wrong.
         if begun and self._folder.exists(_SETTINGS):
@@ -163,9 +163,6 @@ class RunLog:
     def journal_folder(self) -> Path:
         """Folder that workers write finished episodes to."""
         return self._journals.folder
-
-    def _begun(self) -> bool:
-        return bool(episodes.run_scenes(self._out, self._name) or self._journals)
 
     def drop(self) -> None:
         """Remove the run."""
@@ -209,12 +206,12 @@ class RunLog:
 
     def counts(self) -> tuple[int, int, int]:
         """Episodes in the tables: finished, failed, successful."""
-        flown = [row["success"] for s in self._scenes_written() for row in self._read("episodes", s, ["success"])]
+        flown = [row["success"] for row in self._read("episodes", "success")]
         return len(flown), len(self._ids("failures")), sum(flown)
 
     def failures(self) -> tuple[str, ...]:
         """Describe the failures, the most frequent kind first, with the reason of its first."""
-        rows = [row for scene in self._scenes_written() for row in self._read("failures", scene, ["kind", "reason"])]
+        rows = self._read("failures", "kind", "reason")
         first: dict[str, str] = {}
         for row in rows:
             first.setdefault(row["kind"], row["reason"])
@@ -223,29 +220,19 @@ class RunLog:
 
     def spent(self) -> tuple[float, int]:
         """US dollars and tokens spent so far."""
-        columns = ["cost_usd", "input_tokens", "output_tokens"]
-        rows = [
-            row
-            for scene in self._scenes_written()
-            for table in ("episodes", "failures")
-            for row in self._read(table, scene, columns)
-        ]
+        columns = ("cost_usd", "input_tokens", "output_tokens")
+        rows = self._read("episodes", *columns) + self._read("failures", *columns)
         tokens = sum((row["input_tokens"] or 0) + (row["output_tokens"] or 0) for row in rows)
         return sum(row["cost_usd"] or 0.0 for row in rows), tokens
 
-    def _scenes_written(self) -> list[str]:
-        return episodes.run_scenes(self._out, self._name)
-
-    def _read(self, table: str, scene: str, columns: list[str]) -> list[dict[str, Any]]:
-        rows: list[dict[str, Any]] = store.read_scene(self._out, table, scene, columns, self._name).to_pylist()
-        return rows
+    def _read(self, table: str, *columns: str) -> list[dict[str, Any]]:
+        """Read columns of a table of the run, all scenes that are written."""
+        scenes = episodes.run_scenes(self._out, self._name)
+        tables = (store.read_scene(self._out, table, scene, columns, self._name) for scene in scenes)
+        return [row for rows in tables for row in rows.to_pylist()]
 
     def _ids(self, table: str) -> list[str]:
-        return [
-            task_id
-            for scene in self._scenes_written()
-            for task_id in store.read_scene(self._out, table, scene, ["task_id"], self._name)["task_id"].to_pylist()
-        ]
+        return [row["task_id"] for row in self._read(table, "task_id")]
 
     def units(self, todo: pa.Table, workers: int) -> list[WorkUnit]:
         """Split the work: by whole scenes where there are many, as opening a scene takes seconds."""

@@ -15,7 +15,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.benchmark.episodes import has_table, read_run, runs
+from aerialdojo_gen.benchmark.episodes import has_table, read_run
 from aerialdojo_gen.benchmark.episodes import runs as run_names
 from aerialdojo_gen.benchmark.metrics import Bools, Episodes, Floats, episodes_of
 from aerialdojo_gen.dataset.protocol import Sample
@@ -102,7 +102,7 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
         rows = read_run(root, name, table)
         return rows if sample is None else rows.filter(pc.is_in(rows["task_id"], pa.array(sample.ids(), pa.string())))
 
-    tables = {name: read(name) for name in (names or runs(root))}
+    tables = {name: read(name) for name in (names or run_names(root))}
     if not names:
         tables = {name: table for name, table in tables.items() if table.num_rows}
     if not tables:

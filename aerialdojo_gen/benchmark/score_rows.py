@@ -9,9 +9,9 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.benchmark.metrics import METRICS
 from aerialdojo_gen.benchmark.outcome_table import Cut
-from aerialdojo_gen.benchmark.registry import MODALITIES
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store.schemas import SETTINGS
 

@@ -10,10 +10,10 @@ import hashlib
 import json
 import math
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import pyarrow as pa
 from pydantic import Field, ValidationError
@@ -53,7 +53,7 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS
 
 SCORE = "score.json"
-_AGENT = "aerialdojo_gen.benchmark.agents.submitted:SubmittedAgent"
+_AGENT = "aerialdojo_gen.benchmark.agents.simple:SubmittedAgent"
 # Of poses, path lengths and metrics: sines differ in their last digits between machines.
 _TOLERANCE = 1e-5
 
@@ -259,17 +259,13 @@ def _score_rows(table: pa.Table) -> Iterator[ScoreRow]:
                 continue
             for profile in map(PROFILES.__getitem__, DEFAULT_PROFILES):
                 summary = summarize(episodes.where(chosen), profile)
-                ends: list[dict[str, Any]] = [
-                    {
-                        m: None if math.isnan(pair[end]) else pair[end]
-                        for m, pair in zip(METRICS, intervals, strict=True)
-                    }
-                    for intervals in [score_intervals(summary)]
-                    for end in (0, 1)
-                ]
-                overall = summary.overall._asdict()
-                means = {m: None if math.isnan(overall[m]) else overall[m] for m in METRICS}
+                low, high = zip(*score_intervals(summary), strict=True)
                 yield ScoreRow(
                     setting=setting, partition=partition, radius_m=profile.radius_m, episodes=int(chosen.sum()),
-                    mean=means, low=ends[0], high=ends[1],
+                    mean=_known(summary.overall[1:]), low=_known(low), high=_known(high),
                 )  # fmt: skip
+
+
+def _known(values: Sequence[float]) -> dict[str, float | None]:
+    """Name the values of all metrics; None for NaN."""
+    return {m: None if math.isnan(value) else value for m, value in zip(METRICS, values, strict=True)}

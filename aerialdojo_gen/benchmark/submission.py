@@ -25,7 +25,7 @@ from aerialdojo_gen.base.errors import AerialDojoError, Malformed, UsageError, b
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.safe_parse import MAX_JSON_BYTES, loads_json, read_json
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.benchmark.agents.submitted import SYMBOLS
+from aerialdojo_gen.benchmark.agents.simple import SYMBOLS
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import METRICS, PROFILES, episodes_of, summarize
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, select

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
@@ -29,7 +30,6 @@ from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS, TASKS
 
-MODALITIES = ("semantic", "image")
 # What an episode needs of a task. Releases of other versions have these, whatever else stands in their tables; only
 # the last may be missing there.
 _COLUMNS = (

@@ -16,8 +16,7 @@ from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, Usage
 from aerialdojo_gen.benchmark.agents.goal import Observation
 from aerialdojo_gen.benchmark.agents.load import error_location
-from aerialdojo_gen.benchmark.agents.simple import OracleAgent
-from aerialdojo_gen.benchmark.agents.submitted import SubmittedAgent
+from aerialdojo_gen.benchmark.agents.simple import OracleAgent, SubmittedAgent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.guarded_agent import AgentError, GuardedAgent
 from aerialdojo_gen.benchmark.journal import Journal
@@ -41,31 +40,14 @@ def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
 
 def _usage_columns(used: Usage | None) -> dict[str, Any]:
     """Usage columns of `episodes` and `failures`."""
-    if used is None:
-        return dict.fromkeys(("n_requests", "input_tokens", "output_tokens", "cost_usd"))
-    return {
-        "n_requests": used.requests,
-        "input_tokens": used.input_tokens,
-        "output_tokens": used.output_tokens,
-        "cost_usd": used.cost_usd,
-    }
+    columns = {name: getattr(used, name, None) for name in ("input_tokens", "output_tokens", "cost_usd")}
+    return {"n_requests": getattr(used, "requests", None)} | columns
 
 
-def _request_times(used: Usage | None) -> dict[str, Any]:
-    """Request times, columns of `timings`."""
-    if used is None:
-        return {"request_s": None, "longest_request_s": None}
-    return {"request_s": used.request_s, "longest_request_s": used.longest_request_s}
-
-
-def _cost_usd(used: Usage | None) -> float:
-    """US dollars; 0 if unknown."""
-    return (used.cost_usd or 0.0) if used is not None else 0.0
-
-
-def _tokens(used: Usage | None) -> int:
-    """Input and output tokens; 0 if unknown."""
-    return (used.input_tokens or 0) + (used.output_tokens or 0) if used is not None else 0
+def _spent(used: Usage | None) -> dict[str, Any]:
+    """US dollars and tokens for a `Finished`; 0 if unknown."""
+    known = used or Usage()
+    return {"cost_usd": known.cost_usd or 0.0, "tokens": (known.input_tokens or 0) + (known.output_tokens or 0)}
 
 
 _LONGEST_PAUSE_S = 600.0
@@ -183,12 +165,12 @@ class Worker:
                 break
             used = _add_usage(used, self._guarded.usage())
             record["episode"] |= _usage_columns(used)
-            record["timing"] |= {"attempts": attempt} | _request_times(used)
-            actions = record["episode"]["n_actions"]
-            return record, Finished(1, actions, _cost_usd(used), _tokens(used), 1)
+            times = {name: getattr(used, name, None) for name in ("request_s", "longest_request_s")}
+            record["timing"] |= {"attempts": attempt} | times
+            return record, Finished(1, record["episode"]["n_actions"], **_spent(used), flown=1)
         row = {"attempts": attempt, "kind": failed.kind, "reason": failed.reason} | _usage_columns(used)
         record = {"task_id": task.row["task_id"], "failure": self._key(task) | row}
-        return record, Finished(1, 0, _cost_usd(used), _tokens(used), 0, (failed,))
+        return record, Finished(1, **_spent(used), streak=(failed,))
 
     def _pause(self, attempt: int, requested_s: float | None, stopped: Callable[[], bool]) -> bool:
         """Wait before the next attempt; False if the run is stopped meanwhile."""

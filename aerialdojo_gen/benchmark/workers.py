@@ -21,18 +21,6 @@ from aerialdojo_gen.pipeline.executors import Executor, ParentChannel
 from aerialdojo_gen.pipeline.executors.channels import WorkerChannel, at_end
 from aerialdojo_gen.store.root import DataRoot
 
-
-class RateLimiter:
-    """Spaces requests evenly over all workers."""
-
-    def __init__(self, per_minute: float, link: WorkerChannel) -> None:
-        self._interval_s, self._link = 60.0 / per_minute, link
-
-    def wait(self) -> None:
-        """Wait until the next request may be sent."""
-        time.sleep(self._link.turn(self._interval_s))
-
-
 # Assumed memory per process, megabytes, without an agent's model.
 MEMORY_MB = 1000
 
@@ -44,7 +32,9 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
             raise UsageError(f"agent {evaluation.agent!r} has no pace to be set: leave --requests-per-minute out")
-        agent.pace = RateLimiter(evaluation.requests_per_minute, link).wait
+        # Requests of all workers are spaced evenly.
+        interval_s = 60.0 / evaluation.requests_per_minute
+        agent.pace = lambda: time.sleep(link.turn(interval_s))
     suits: Any = getattr(agent, "suits", None)
     if suits is not None:
         suits(release_fingerprint(data))

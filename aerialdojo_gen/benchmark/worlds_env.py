@@ -82,15 +82,13 @@ class WorldsEnv(gymnasium.Env[dict[str, Any], np.int64]):
             worlds, start_seed, num_worlds, knobs=knobs, held_out=held_out, n_objects=n_objects, folder=cache
         )
         self._options, self._in_a_row = options, episodes_per_world
-        self._inner: AerialDojoEnv | None = None
         self._order: list[int] = []
-        self._left = 0
+        self._at = self._left = 0
         try:
-            self._enter(0)
+            self._inner = AerialDojoEnv(self._maker.root(self._maker.worlds[0]), **options)
         except BaseException:
             self._maker.close()
             raise
-        assert self._inner is not None
         self.render_mode = self._inner.render_mode
         self.action_space = self._inner.action_space
         self.observation_space: spaces.Dict = _for_all_worlds(self._inner.observation_space)
@@ -120,24 +118,20 @@ class WorldsEnv(gymnasium.Env[dict[str, Any], np.int64]):
         elif self._left == 0 and not options:
             self._enter(self._next(), self._order[0] if self._order else None)
             self._left = self._in_a_row
-        assert self._inner is not None
         self._left = max(self._left - 1, 0)
         return self._inner.reset(seed=int(self.np_random.integers(2**31)), options=options or None)
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Carry out an action, as `AerialDojoEnv.step`."""
-        assert self._inner is not None
         return self._inner.step(action)
 
     def render(self) -> Any:
         """Return the four views in one picture, as `AerialDojoEnv.render`."""
-        assert self._inner is not None
         return self._inner.render()
 
     def close(self) -> None:
         """Let go of the world and of what is being made; a second call does nothing."""
-        if self._inner is not None:
-            self._inner.close()
+        self._inner.close()
         self._maker.close()
 
     def _next(self) -> int:
@@ -150,8 +144,7 @@ class WorldsEnv(gymnasium.Env[dict[str, Any], np.int64]):
         root = self._maker.root(self._maker.worlds[at])
         if coming is not None:
             self._maker.prepare(self._maker.worlds[coming])
-        if self._inner is not None:
-            self._inner.close()
+        self._inner.close()
         self._at, self._inner = at, AerialDojoEnv(root, **self._options)
 
 

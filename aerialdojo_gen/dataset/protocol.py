@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import read_json
@@ -29,8 +30,7 @@ SAMPLE = f"{FOLDER}/protocol.json"
 # Of the paper's Tables 4 and 5.
 _SETTINGS = ("base", "standard")
 _MAPS_PER_FAMILY, _TASKS_PER_MAP = 2, 50
-_GOALS = ("semantic", "image")
-_PER_GOAL = _TASKS_PER_MAP // len(_GOALS)
+_PER_GOAL = _TASKS_PER_MAP // len(MODALITIES)
 _COLUMNS = ("task_id", "family", "setting", "modality")
 _ABOUT = (
     "The paper's protocol: an ID and an OOD map of every family, of each map 50 test tasks of Base and 50 of "
@@ -101,9 +101,9 @@ def draw_sample(data: Where) -> Sample:
         if not rows["task_id"]:
             continue
         drawn = dict(_draw(rows))
-        fewest = min(len(drawn.get((setting, goal), ())) for setting in _SETTINGS for goal in _GOALS)
+        fewest = min(len(drawn.get((setting, goal), ())) for setting in _SETTINGS for goal in MODALITIES)
         place = -fewest, rng.rank(0, "protocol", scene)
-        tasks = {s: tuple(sorted(i for goal in _GOALS for i in drawn.get((s, goal), ()))) for s in _SETTINGS}
+        tasks = {s: tuple(sorted(i for goal in MODALITIES for i in drawn.get((s, goal), ()))) for s in _SETTINGS}
         key = rows["family"][0], partition(scene)
         if any(tasks.values()) and (key not in best or place < best[key][0]):
             best[key] = place, scene, {setting: ids for setting, ids in tasks.items() if ids}
@@ -113,7 +113,7 @@ def draw_sample(data: Where) -> Sample:
 def _draw(rows: Mapping[str, Sequence[str]]) -> Iterator[tuple[tuple[str, str], list[str]]]:
     """Draw a scene's tasks by setting and goal."""
     for setting in _SETTINGS:
-        for goal in _GOALS:
+        for goal in MODALITIES:
             pool = [
                 task_id
                 for task_id, s, g in zip(rows["task_id"], rows["setting"], rows["modality"], strict=True)

@@ -55,10 +55,9 @@ class Mine(AgentBase):
 
 
 def test_built_in_agents_are_made_by_name():
-    assert isinstance(load_agent("oracle"), OracleAgent)
+    classes = {"oracle": OracleAgent, "stop": StopAgent, "constant": ConstantAgent}
+    assert all(isinstance(load_agent(name), cls) for name, cls in classes.items())
     assert isinstance(load_agent("random", seed=3), RandomAgent)
-    assert isinstance(load_agent("stop"), StopAgent)
-    assert isinstance(load_agent("constant"), ConstantAgent)
     assert isinstance(load_agent("explorer", likeness=0.9), ExplorerAgent)
     assert isinstance(load_agent(f"{__name__}:Mine", gain=2), Mine)
 
@@ -164,15 +163,9 @@ def test_how_likely_random_stops_can_be_set():
     never = RandomAgent(stop_probability=0.0)
     never.reset(goal())
     assert 0 not in flown(never, 90)
-    always = RandomAgent(stop_probability=1.0)
-    always.reset(goal())
-    assert set(flown(always, 90)) == {0}
-
-
-def test_the_stop_agent_stops():
-    agent = StopAgent()
-    agent.reset(goal())
-    assert flown(agent, 1) == [0]
+    for agent in (RandomAgent(stop_probability=1.0), StopAgent()):
+        agent.reset(goal())
+        assert set(flown(agent, 90)) == {0}
 
 
 class Seer:

@@ -192,7 +192,6 @@ FAILURES = {
     "429": (Status(429, "slow down", {"retry-after": "7"}), r"HTTP 429: slow down", "rate limit", 7.0),
     "500": (Status(500), r"HTTP 500: something is wrong", "server error", None),
     "503": (Status(503, "later", {"retry-after": "0.5"}), r"HTTP 503: later", "server error", 0.5),
-    "529": (Status(529, "overloaded"), r"HTTP 529: overloaded", "server error", None),
     "cut": (Cut(), r"http://127\.0\.0\.1:\d+.*: \w+", "connection lost", None),
     "hang": (Hang(), r"no complete answer within 0\.4 s", "time-out", None),
     "body trickles": (Drip(), r"no complete answer within 0\.4 s", "time-out", None),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -254,8 +253,3 @@ def test_the_order_of_episodes_does_not_matter(drawn: list[dict[str, Any]], shuf
     shuffler.shuffle(shuffled)
     one, other = (summarize(log(*rows), AT_3).overall for rows in (drawn, shuffled))
     assert [getattr(one, m) for m in METRICS] == [getattr(other, m) for m in METRICS]
-
-
-def test_every_column_of_the_log_is_one_of_episodes() -> None:
-    derived = {"viewpoint_distance_m", "target_in_sight"}
-    assert {f.name for f in fields(Episodes)} - {"view_distance_m"} == GOOD.keys() - derived

@@ -15,25 +15,13 @@ class InvalidAnswer(AerialDojoError):  # noqa: N818
 
 @dataclass(frozen=True)
 class Usage:
-    """What an agent has used since its last `reset`.
+    """What an agent has used since its last `reset`; None where it is not known."""
 
-    Attributes
-    ----------
-    requests : int
-        Calls of an outside service, repeated ones too.
-    input_tokens, output_tokens : int or None
-        Where the service says.
-    cost_usd : float or None
-        Where prices are known.
-    request_s, longest_request_s : float or None
-        Time from sending a request to having its answer, seconds: of all requests together, and of the longest.
-    """
-
-    requests: int = 0
+    requests: int = 0  # Calls of an outside service, repeated ones too
     input_tokens: int | None = None
     output_tokens: int | None = None
     cost_usd: float | None = None
-    request_s: float | None = None
+    request_s: float | None = None  # From sending requests to having their answers, seconds
     longest_request_s: float | None = None
 
 

@@ -110,18 +110,10 @@ HINTS = ("heading",)
 
 @dataclass(frozen=True)
 class Heading:
-    """Which way the body faces at the start, as a compass would show it.
+    """Which way the body faces at the start, as a compass would show it."""
 
-    Attributes
-    ----------
-    direction : str
-        The nearest of the eight compass directions: of the same words as `Goal.direction`.
-    heading_deg : int
-        Degrees clockwise from north, 0 to 359.
-    """
-
-    direction: str
-    heading_deg: int
+    direction: str  # The nearest of the eight compass directions: of the same words as `Goal.direction`
+    heading_deg: int  # Degrees clockwise from north, 0 to 359
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,15 @@
-"""Agents that look at nothing: the reference replayed, random actions, the same flight always, and Stop at once."""
+"""Agents that look at nothing: a replayed reference or submission, random actions, the same flight, Stop at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.benchmark.agents.base import AgentBase
+from aerialdojo_gen.base.safe_parse import read_json
+from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import BLIND, N_ACTIONS, Goal, Observation
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP
 
@@ -17,7 +19,21 @@ from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH, STOP
 BEST_CONSTANT = ("MoveForward5", "MoveForward3", "Stop")
 
 
-class OracleAgent(AgentBase):
+class _ListAgent(AgentBase):
+    """Does the actions of a list, and stops where it ends."""
+
+    sensors = BLIND
+    _actions: Sequence[int] = ()
+
+    def reset(self, goal: Goal) -> None:
+        """Begin an episode."""
+
+    def act(self, observation: Observation) -> int:
+        """Do what the list has at this step."""
+        return self._actions[observation.step] if observation.step < len(self._actions) else STOP
+
+
+class OracleAgent(_ListAgent):
     """Replays the reference trajectory: the upper bound, and the self-test of the data.
 
     The runner gives it the reference's actions before each episode, and gives them to no other agent.
@@ -29,24 +45,14 @@ class OracleAgent(AgentBase):
         actions alone and ends where the target is seen.
     """
 
-    sensors = BLIND
-
     def __init__(self, actions: str = "action") -> None:
         if actions not in ("action", "agent_action"):
             raise ValueError(f"routes have the lists action and agent_action, not {actions!r}")
         self.column = actions
-        self._actions: list[int] = [STOP]
 
     def follow(self, actions: Sequence[int]) -> None:
         """Take the reference's actions for the next episode; Approach is left out, for no agent can choose it."""
         self._actions = [action for action in actions if action != APPROACH]
-
-    def reset(self, goal: Goal) -> None:
-        """Begin an episode."""
-
-    def act(self, observation: Observation) -> int:
-        """Do what the reference does at this step, and stop where it ends."""
-        return self._actions[observation.step] if observation.step < len(self._actions) else STOP
 
 
 class RandomAgent(AgentBase):
@@ -82,20 +88,11 @@ class RandomAgent(AgentBase):
         return int(self._actions[observation.step])
 
 
-class StopAgent(AgentBase):
+class StopAgent(_ListAgent):
     """Stops where it stands: how many tasks are solved by doing nothing."""
 
-    sensors = BLIND
 
-    def reset(self, goal: Goal) -> None:
-        """Begin an episode."""
-
-    def act(self, observation: Observation) -> int:
-        """Stop."""
-        return STOP
-
-
-class ConstantAgent(AgentBase):
+class ConstantAgent(_ListAgent):
     """Flies the same few actions in every episode, and stops: how many tasks are solved without looking.
 
     Parameters
@@ -104,8 +101,6 @@ class ConstantAgent(AgentBase):
         Names or numbers of actions, in a string separated by commas. Where they end it stops. The default is the
         best blind flight that is known.
     """
-
-    sensors = BLIND
 
     def __init__(self, actions: str | Sequence[str | int] = BEST_CONSTANT) -> None:
         given = actions.split(",") if isinstance(actions, str) else [str(action) for action in actions]
@@ -116,9 +111,38 @@ class ConstantAgent(AgentBase):
                 raise ValueError(f"no action {action.strip()!r}: there are {', '.join(ACTION_NAMES[:N_ACTIONS])}")
         self._actions = [known[action.strip().lower()] for action in given]
 
+
+# A submission has one character an action: hexadecimal digits, and this one for an answer that named no action.
+NO_ACTION = "-"
+SYMBOLS = f"0123456789abcdef{NO_ACTION}"
+
+
+class SubmittedAgent(AgentBase):
+    """Replays submitted actions; the runner says which task comes next, and says so to no other agent.
+
+    Parameters
+    ----------
+    file : str
+        JSON: the actions of every task, a character of `SYMBOLS` each, by task id.
+    """
+
+    sensors = BLIND
+
+    def __init__(self, file: str) -> None:
+        self._by_task: dict[str, str] = read_json(Path(file))
+        self._actions = ""
+
+    def follow(self, task_id: str) -> None:
+        """Take the actions of the next episode."""
+        self._actions = self._by_task[task_id]
+
     def reset(self, goal: Goal) -> None:
         """Begin an episode."""
 
     def act(self, observation: Observation) -> int:
-        """Do what is done at this step of every episode."""
-        return self._actions[observation.step] if observation.step < len(self._actions) else STOP
+        """Do what was submitted for this step; Stop where the list has ended and the episode has not."""
+        if observation.step >= len(self._actions):
+            return STOP
+        if self._actions[observation.step] == NO_ACTION:
+            raise InvalidAnswer("submitted as an answer that names no action")
+        return SYMBOLS.index(self._actions[observation.step])

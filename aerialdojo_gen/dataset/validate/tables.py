@@ -8,13 +8,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, repeated
 from aerialdojo_gen.store.layout import partition
 from aerialdojo_gen.store.schemas import DIRECTIONS, FAMILIES, SETTINGS, VIEWS
 
 _WORDS = {
-    "modality": ("semantic", "image"),
+    "modality": MODALITIES,
     "setting": SETTINGS,
     "subset": ("train", "test"),
     "direction": DIRECTIONS,
