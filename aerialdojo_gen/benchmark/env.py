@@ -21,15 +21,7 @@ from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.observations import GoalText, mosaic, observed_goal, render_views
 from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
-from aerialdojo_gen.benchmark.tasks import (
-    Selection,
-    Task,
-    TaskSampler,
-    check_tell,
-    image_shape,
-    read_tasks,
-    select,
-)
+from aerialdojo_gen.benchmark.tasks import Selection, Task, TaskSampler, check_tell, image_shape, read_tasks, select
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.scenes.context import SEVERAL
 from aerialdojo_gen.store.root import DataRoot, Where, open_root

@@ -141,8 +141,7 @@ def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float6
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:
     rows = steps.filter(pc.equal(steps["task_id"], episode["task_id"])).to_pylist()
     start = math.dist(
-        [episode[f"start_{a}_m"] for a in "xyz"],
-        [scene.route(episode["nav_id"])[f"goal_{a}_m"] for a in "xyz"],
+        [episode[f"start_{a}_m"] for a in "xyz"], [scene.route(episode["nav_id"])[f"goal_{a}_m"] for a in "xyz"]
     )
     lists: dict[str, list[Any]] = {name: [episode[f"start_{name}"]] for name in ("x_m", "y_m", "z_m", "yaw_rad")}
     lists |= {"distance_m": [start], "said": ["start"], "answers": [""]}

@@ -58,8 +58,7 @@ class Faulty(AgentBase):
     def act(self, observation: Observation) -> Any:
         if self._mine and self._how == "act":
             raise OSError("disk\nof mine")
-        given = {"float": 2.5, "none": None, "far": 16, "true": True, "words": "MoveForward", "list": [3],
-                 "array": np.array([3, 4]), "99": 99, "index": Unsure()}  # fmt: skip
+        given = {"float": 2.5, "none": None, "far": 16, "true": True, "array": np.array([3, 4]), "index": Unsure()}
         return given[self._how] if self._mine and self._how in given else 0
 
     def usage(self) -> Any:
@@ -101,10 +100,7 @@ SAID = {
     "none": r"returned None \(NoneType\) from act",
     "far": r"returned 16 \(int\) from act",
     "true": r"returned True \(bool\) from act",
-    "words": r"returned 'MoveForward' \(str\) from act",
-    "list": r"returned \[3\] \(list\) from act",
     "array": r"returned array\(\[3, 4\]\) \(ndarray\) from act",
-    "99": r"returned 99 \(int\) from act",
     "index": r"returned an unsure number \(Unsure\) from act",
     "usage": r"returned 7 \(int\) from usage, where Usage or None is expected",
 }

@@ -20,10 +20,9 @@ from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_t
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 
-@pytest.mark.parametrize("k", range(16))
-def test_every_action_is_read_and_approach_is_none(k: int) -> None:
-    said = parse_answer(json.dumps({"thought": "so", "action": ACTION_NAMES[k]}))
-    assert SIXTEEN.ids[said.action] == k
+def test_every_action_is_read_and_approach_is_none() -> None:
+    said = [parse_answer(json.dumps({"thought": "so", "action": name})) for name in ACTION_NAMES[:16]]
+    assert [SIXTEEN.ids[answer.action] for answer in said] == list(range(16))
     assert ACTION_NAMES[APPROACH] not in SIXTEEN.names
 
 
@@ -45,7 +44,6 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
     ("text", "why"),
     [
         ("", "it is empty"),
-        ("```json\n\n```", "it is empty"),
         ("Stop", "not one JSON object"),
         ('I would go on: {"action": "Stop"}', "not one JSON object"),
         ('{"action": "Stop"} That is all.', "not one JSON object"),
@@ -53,13 +51,10 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         ('{"action": "Stop"', "not one JSON object"),
         ("{'action': 'Stop'}", "not one JSON object"),
         ('["Stop"]', "JSON, but no object: list"),
-        ("0", "JSON, but no object: int"),
         ("{}", "action: Field required"),
         ('{"action": 0}', "action: Input should be a valid string"),
-        ('{"action": null}', "action: Input should be a valid string"),
         ('{"action": "stop"}', "'stop' is none of the actions"),
         ('{"action": "Approach"}', "'Approach' is none of the actions"),
-        ('{"action": "MoveForward2"}', "'MoveForward2' is none of the actions"),
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
         ('{"action": "Stop", "action": "MoveUp1"}', "a key stands twice"),
         ("[" * 10_000, "not one JSON object"),
@@ -67,7 +62,6 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         ('{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', "not one JSON object .*digits"),
         ('{"thought": 1e999, "action": "Stop"}', "thought: Input should be a valid string"),
         ('{"thought": NaN, "action": "Stop"}', "NaN is no number of JSON"),
-        ('{"thought": -Infinity, "action": "Stop"}', "Infinity is no number of JSON"),
         ('{"thought": "\\ud800", "action": "Stop"}', "half of a surrogate pair|valid string"),
         ('{"action": "\\udfff"}', "surrogate|none of the actions|valid string"),
         ('{"\\ud800": 1, "action": "Stop"}', "Extra inputs|surrogate|valid string"),

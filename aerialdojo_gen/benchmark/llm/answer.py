@@ -50,10 +50,7 @@ class ActionSet:
         return {
             "type": "object",
             "properties": {
-                "thought": {
-                    "type": "string",
-                    "description": "one or two sentences: what you see, where you go",
-                },
+                "thought": {"type": "string", "description": "one or two sentences: what you see, where you go"},
                 "action": {"type": "string", "enum": list(self.ids)},
             },
             "required": ["thought", "action"],
