@@ -1,15 +1,11 @@
 """The valid viewpoints of targets, and whether an episode ended at one of them with the target in sight (SR-view).
 
-The paper's rule knows one viewpoint of a target, the anchor that was selected: who stops before another side of the
-same object has failed. A person would call that a success, and would not call it one where a wall or a floor stands
-between. SR-view is that rule: an explicit Stop, without collision, within the budget, at most the success radius from
-any valid viewpoint of the target, and the target in sight from the place of the Stop.
-
-In sight means that a straight line from the body's centre reaches the target: of points drawn from its surface one at
-least is met, or another place of the target on the way to it, before any other surface is. No line of sight to the
-viewpoint is asked for: what a person asks is whether the drone has found the object, and a post between two places
-from which both see it changes nothing. A goal is a viewpoint of its target in any case, so that every success by the
-paper's rule with the target in sight is one by this rule too.
+The paper's rule knows one viewpoint of a target, its goal anchor: who stops before another side of the object
+has failed, and who stops behind a wall has not. SR-view is an explicit Stop, without collision, within the
+budget, at most the success radius from any valid viewpoint of the target, and with the target in sight: a
+straight line from the body's centre reaches a point of its surface before any other surface. A goal is a
+viewpoint of its target in any case, so that every success by the paper's rule with the target in sight is one
+by this rule too.
 """
 
 from __future__ import annotations
