@@ -29,9 +29,9 @@ _STYLE: dict[Any, Any] = {
 }  # fmt: skip
 
 
-def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0) -> Figure:
-    """Draw overall SR (solid) and OSR (dashed) against the success radius, from 0 to `largest_m` metres."""
-    radii = np.linspace(0.0, largest_m, 501)
+def radius_curve(runs: Sequence[Run], profile: Profile) -> Figure:
+    """Draw overall SR (solid) and OSR (dashed) against the success radius, from 0 to 25 m."""
+    radii = np.linspace(0.0, 25.0, 501)
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -48,7 +48,7 @@ def radius_curve(runs: Sequence[Run], profile: Profile, largest_m: float = 25.0)
             )  # fmt: skip
         axes.plot([], [], "-", color="#555555", lw=1.8, label="SR")
         axes.plot([], [], "--", color="#555555", lw=1.2, label="OSR")
-        axes.set(xlabel="radius, m", ylabel="episodes, %", xlim=(0.0, largest_m), ylim=(-2.0, 102.0))
+        axes.set(xlabel="radius, m", ylabel="episodes, %", xlim=(0.0, 25.0), ylim=(-2.0, 102.0))
         axes.grid(True)
         axes.spines[["top", "right"]].set_visible(False)
         figure.legend(loc="outside right upper", frameon=False)

@@ -14,14 +14,13 @@ import numpy as np
 from scipy import stats
 
 from aerialdojo_gen.base import rng
-from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.benchmark.metrics import METRICS, Episodes, Floats, Profile, Summary, summarize
+from aerialdojo_gen.benchmark.metrics import METRICS, Episodes, Floats, Profile, Summary, outcomes, summarize
 
 RESAMPLES = 9_999
 LEVEL = 0.95
 
 
-def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float = LEVEL) -> tuple[Floats, Floats]:
+def bootstrap(scenes: Sequence[Floats]) -> tuple[Floats, Floats]:
     """95 % percentile intervals, low and high (m,), of the mean of the families.
 
     Scenes are resampled within their family.
@@ -38,7 +37,7 @@ def bootstrap(scenes: Sequence[Floats], resamples: int = RESAMPLES, level: float
 
     draws = rng.generator(0, "bootstrap", *(len(part) for part in scenes))
     found = stats.bootstrap(
-        tuple(part[:, known] for part in scenes), mean_of_families, n_resamples=resamples, confidence_level=level,
+        tuple(part[:, known] for part in scenes), mean_of_families, n_resamples=RESAMPLES, confidence_level=LEVEL,
         axis=0, method="percentile", rng=draws,
     ).confidence_interval  # fmt: skip
     ends[:, known] = found.low, found.high
@@ -76,16 +75,12 @@ class Paired:
     p_mcnemar: float  # Of these two counts, exact (binomial), two-sided; it takes episodes for independent
 
 
-def paired(
-    first: Episodes, second: Episodes, success: tuple[Any, Any], profile: Profile, resamples: int = RESAMPLES
-) -> Paired:
+def paired(first: Episodes, second: Episodes, profile: Profile) -> Paired:
     """Compare two logs of the same tasks, row by row; the permutation test is exact where there are few exchanges."""
-    if not len(first):
-        raise UsageError("the runs have no task in common: a paired test needs runs on the same tasks")
     summaries = [summarize(episodes, profile) for episodes in (first, second)]
     one, other = (scene_scores(summary) for summary in summaries)
     families = [y - x for x, y in zip(one, other, strict=True)]
-    low, high = bootstrap(families, resamples)
+    low, high = bootstrap(families)
     # A scene's share of the overall mean: its family's among the families, its own within its family.
     weight = np.concatenate([np.full(len(part), 1.0 / (len(part) * len(families))) for part in families])
     a, b = np.concatenate(one), np.concatenate(other)
@@ -101,10 +96,11 @@ def paired(
                 p[k] = math.nan
                 continue
             p[k] = stats.permutation_test(
-                (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=resamples,
+                (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=RESAMPLES,
                 rng=rng.generator(0, "permutation"),
             ).pvalue  # fmt: skip
-    only_first, only_second = (int(np.sum(x & ~y)) for x, y in (success, success[::-1]))
+    x, y = (outcomes(episodes, profile).success for episodes in (first, second))
+    only_first, only_second = int(np.sum(x & ~y)), int(np.sum(y & ~x))
     torn = only_first + only_second
     exact = float(stats.binomtest(only_first, torn).pvalue) if torn else 1.0
     means = [np.array(summary.overall[1:]) for summary in summaries]

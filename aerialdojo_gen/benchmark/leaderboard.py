@@ -11,6 +11,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperResult, results
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.metrics import DEFAULT_PROFILES, MEASURES, METRICS, PROFILES
+from aerialdojo_gen.benchmark.registry import NAMES_OF
 from aerialdojo_gen.benchmark.report import page_environment, page_parts
 from aerialdojo_gen.benchmark.scoring import SCORE, ScoreCard, ScoreRow, scored_runs
 from aerialdojo_gen.benchmark.tables import NONE, text
@@ -18,7 +19,7 @@ from aerialdojo_gen.store.atomic import atomic_file, make_folder
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _NEAR_M, _FAR_M = (PROFILES[name].radius_m for name in DEFAULT_PROFILES)
-_TITLES = {"base": "Base", "standard": "Standard", "long_horizon": "Long-Horizon", "all": "All settings"}
+_TITLES = NAMES_OF | {"all": "All settings"}
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.benchmark.intervals import Paired, paired
-from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views, outcomes
+from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.tables import NONE, profile_head, text
 
@@ -38,8 +38,7 @@ def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
 
 
 def _table(first: Run, second: Run, profile: Profile) -> TextTable:
-    success = (outcomes(first.episodes, profile).success, outcomes(second.episodes, profile).success)
-    result = paired(first.episodes, second.episodes, success, profile)
+    result = paired(first.episodes, second.episodes, profile)
     known = any(knows_views(run.episodes, profile) for run in (first, second))
     rows = [(MEASURES[m].head, _cells(result, k, m)) for k, m in enumerate(METRICS) if known or m != "sr_view"]
     notes = [

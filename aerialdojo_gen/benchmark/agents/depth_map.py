@@ -77,8 +77,8 @@ class DepthMap:
         i, j = self.cell(x_m, y_m)
         self._barred[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = 1
 
-    def way_to_frontier(self, x_m: float, y_m: float, least_m: float = 3.0) -> list[tuple[float, float]]:
-        """Find the way to the nearest place, at least `least_m` off, where the known free space ends.
+    def way_to_frontier(self, x_m: float, y_m: float) -> list[tuple[float, float]]:
+        """Find the way to the nearest place, at least 3 m off, where the known free space ends.
 
         Points of the map's frame, from the body's cell on; none where there is no such place within reach.
         """
@@ -93,7 +93,7 @@ class DepthMap:
         wave[max(start[0] - 1, 0) : start[0] + 2, max(start[1] - 1, 0) : start[1] + 2] = 1
         steps[wave > 0] = 1
         wave[start], steps[start] = 1, 0
-        least, k = least_m / _CELL_M, 1
+        least, k = 3.0 / _CELL_M, 1
         while True:
             grown = cv2.dilate(wave, _CROSS) & (open_ | wave)
             fresh = (grown > wave) & (steps < 0)
