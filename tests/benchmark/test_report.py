@@ -223,9 +223,7 @@ def test_markdown_and_latex_have_every_cell_and_escape_the_rest(made_tables: lis
 
 def test_latex_parses(few_runs: list[Run]) -> None:
     labelled = [dataclasses.replace(run, label=f"{NASTY} 50% #{k} ~^[{{}}]") for k, run in enumerate(few_runs)]
-    made = tables.ReportRequest(
-        Path("no-release"), labelled, [AT_3, AT_5], (1.0, 3.0, 5.0, 10.0), paper_results=results()
-    )
+    made = dataclasses.replace(wanted(labelled, AT_3, AT_5), radii_m=(1, 3, 5, 10), paper_results=results())
     text = "\n\n".join(map(table_formats.as_latex, registry.report_tables(made, ["all"])))
     # What TeX would stumble over: signs that it has no glyph for, braces, environments, columns.
     assert {c for c in text if ord(c) > 126} <= set("ä")
