@@ -2,15 +2,24 @@
 
 import numpy as np
 import pytest
-from support.planting import check, definitions, measured, poses, refly, turned
+from support.planting import (
+    PlantedFault,
+    add,
+    check,
+    measured,
+    named,
+    of_nav,
+    plant,
+    poses,
+    refly,
+    scene_data,
+    turned,
+)
 
 from aerialdojo_gen.dataset.validate import collisions, oracle
-from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
-from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
-from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 RADIUS = 0.25
@@ -18,19 +27,14 @@ UP_2, DOWN_2, LEFT_5, RIGHT_5 = 11, 13, 6, 9
 KEY = "routes/train"
 
 
-def key(row):
-    return [f"nav_id={row['nav_id']}"]
-
-
-def replace(planted, old, new):
-    rows = [new if row["nav_id"] == old["nav_id"] else row for row in planted.rows(KEY)]
-    assert rows != planted.rows(KEY)
-    planted.write(KEY, rows)
+@pytest.fixture
+def mesh(planted):
+    return scene_mesh(scene_data(planted))
 
 
 @pytest.fixture
-def world(planted):
-    return CollisionWorld(read_glb(planted.data / "meshes" / f"{planted.scene}.glb"))
+def world(mesh):
+    return mesh.world
 
 
 def roomy(row, metres=0.0, actions=0):
@@ -39,9 +43,15 @@ def roomy(row, metres=0.0, actions=0):
     return row["length_m"] + metres < longest and row["n_actions"] + actions <= budget
 
 
-@pytest.mark.parametrize(
-    ("found_by", "name", "off"),
-    [
+def replace(planted, old, new):
+    rows = [new if row["nav_id"] == old["nav_id"] else row for row in planted.rows(KEY)]
+    assert rows != planted.rows(KEY)
+    planted.write(KEY, rows)
+
+
+NUMBERS = [
+    PlantedFault(found_by, KEY, add(name, off), lambda row: row["min_clearance_m"] < 0.9)
+    for found_by, name, off in (
         ("n_actions", "n_actions", 1),
         ("route_length", "length_m", 0.5),
         ("euclidean_distance", "euclidean_m", -0.01),
@@ -50,60 +60,94 @@ def roomy(row, metres=0.0, actions=0):
         ("min_clearance", "min_clearance_m", -0.01),
         ("goal_anchor", "goal_x_m", 0.1),
         ("goal_anchor", "goal_yaw_rad", 0.01),
-    ],
-)
-def test_a_number_that_is_off(planted, found_by, name, off):
-    def change(row):
-        row[name] += off
-
-    row = planted.edit(KEY, change, lambda row: row["min_clearance_m"] < 0.9)
-    assert check(planted) == {found_by: key(row)}
-
-
-def test_lists_that_do_not_fit_together(planted):
-    row = planted.edit(KEY, lambda row: row["z_m"].pop())
-    assert check(planted) == {"list_lengths_differ": key(row)}
-
-
-def test_a_stop_on_the_way_and_an_approach_in_the_middle(planted):
-    rows = planted.rows(KEY)
-    rows[0]["action"][1] = STOP
-    rows[1]["action"][1] = APPROACH
-    rows[2]["action"][-1] = TURN_LEFT
-    planted.write(KEY, rows)
-    assert check(planted) == {"action_order": sorted(key(rows[k])[0] for k in range(3))}
-
-
-def test_a_route_over_its_budget(planted):
-    old = next(row for row in planted.rows(KEY) if row["setting"] == "base")
-    turns = [TURN_LEFT, TURN_RIGHT] * ((92 - old["n_actions"]) // 2)
-    new = refly(old, [*turns, *old["action"]])
-    assert new["n_actions"] > 90
-    replace(planted, old, new)
-    assert check(planted) == {"keeping_rule": key(old)}
-
-
-def test_a_setting_of_another_length(planted):
-    row = planted.edit(KEY, lambda row: row.update(setting="standard"), lambda row: row["setting"] == "base")
-    planted.edit_all(
-        "tasks/train",
-        lambda task: task.update(setting="standard", action_budget=180),
-        lambda task: task["nav_id"] == row["nav_id"],
     )
-    assert check(planted) == {"route_setting": key(row)}
+]
 
 
-def test_a_dive_below_the_ground(planted):
-    old = next(row for row in planted.rows(KEY) if roomy(row, 20, 10))
-    dive = int(np.ceil((old["z_m"][0] - RADIUS) / 2)) + 1
-    new = refly(old, [DOWN_2] * dive + [UP_2] * dive + old["action"])
-    replace(planted, old, new)
-    assert check(planted) == {"out_of_bounds": key(old)}
+def with_action(place, action):
+    """The route with another action at a place, its poses left as they are."""
+
+    def change(row):
+        actions = list(row["action"])
+        actions[place] = action
+        return row | {"action": actions}
+
+    return change
 
 
-def test_a_way_through_a_wall_and_back(planted, world):
-    scene = read_glb(planted.data / "meshes" / f"{planted.scene}.glb")
-    low, high = scene.bounds[0] + RADIUS, scene.bounds[1] - RADIUS
+def turned_elsewhere(row):
+    return with_action(row["action"].index(TURN_LEFT), TURN_RIGHT)(row) if TURN_LEFT in row["action"] else None
+
+
+def over_its_budget(row):
+    if row["setting"] != "base":
+        return None
+    turns = [TURN_LEFT, TURN_RIGHT] * ((92 - row["n_actions"]) // 2)
+    new = refly(row, [*turns, *row["action"]])
+    assert new["n_actions"] > 90
+    return new
+
+
+def diving_below_the_ground(row):
+    dive = int(np.ceil((row["z_m"][0] - RADIUS) / 2)) + 1
+    return refly(row, [DOWN_2] * dive + [UP_2] * dive + row["action"]) if roomy(row, 20, 10) else None
+
+
+def ending_turned_away(row):
+    last = 2 if row["action"][-2] == APPROACH else 1
+    new = refly(row, [*row["action"][:-last], TURN_LEFT, *row["action"][-last:]])
+    away = abs(turned(new["yaw_rad"][-1] - new["goal_yaw_rad"], 0.0)) > np.radians(7.6)
+    return new if roomy(row, 0, 1) and away else None
+
+
+ROUTES = (
+    ("list_lengths_differ", lambda row: row | {"z_m": row["z_m"][:-1]}),
+    ("action_order", with_action(1, STOP)),
+    ("action_order", with_action(1, APPROACH)),
+    ("action_order", with_action(-1, TURN_LEFT)),
+    ("replay_differs", turned_elsewhere),
+    ("keeping_rule", over_its_budget),
+    ("out_of_bounds", diving_below_the_ground),
+    ("final_yaw", ending_turned_away),
+)
+
+
+def plant_routes(planted, faults):
+    """Plant each fault in a route of its own, from the last one backwards; gives what checks should name."""
+    rows, expected = planted.rows(KEY), {}
+    untouched = rows[::-1]
+    for found_by, change in faults:
+        old, new = next((row, new) for row in untouched if (new := change(row)))
+        untouched.remove(old)
+        rows[rows.index(old)] = new
+        expected[found_by] = sorted([*expected.get(found_by, ()), named(KEY, new)])
+    planted.write(KEY, rows)
+    return expected
+
+
+def test_faults_of_routes(planted):
+    """Wrong numbers stand in the first routes, wrong flights in the last."""
+    rows = planted.rows(KEY) + planted.rows("routes/test")
+    taken = {(r["start_object_id"], r["start_anchor_id"], r["target_object_id"]) for r in rows}
+
+    def from_another_anchor(row):
+        free = (a for a in range(3) if (row["start_object_id"], a, row["target_object_id"]) not in taken)
+        anchor = next(free, None)
+        return None if anchor is None else row | {"start_anchor_id": anchor}
+
+    def of_another_setting(row):
+        return row | {"setting": "standard"} if row["setting"] == "base" else None
+
+    others = (("start_anchor", from_another_anchor), ("route_setting", of_another_setting))
+    expected = plant_routes(planted, (*ROUTES, *others)) | plant(planted, NUMBERS)
+    (longer,) = expected["route_setting"]
+    is_longer = of_nav(longer.removeprefix("nav_id="))
+    planted.edit_all("tasks/train", lambda task: task.update(setting="standard", action_budget=180), is_longer)
+    assert check(planted) == expected
+
+
+def test_a_way_through_a_wall_and_back(planted, mesh, world):
+    low, high = mesh.scene.bounds[0] + RADIUS, mesh.scene.bounds[1] - RADIUS
 
     def through(row):
         for aside in ([LEFT_5, RIGHT_5], [RIGHT_5, LEFT_5]):
@@ -115,14 +159,15 @@ def test_a_way_through_a_wall_and_back(planted, world):
         return None
 
     old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 10, 2) and (new := through(row)))
+    key = [named(KEY, old)]
     replace(planted, old, new)
-    assert check(planted) == {"route_collision": key(old)}
+    assert check(planted) == {"route_collision": key}
     # Not by its own length of arm: a body that fits through finds nothing.
     assert "route_collision" not in check(planted, use_meshes=False)
     # A sample of FCL's certificates may miss the route; the oracle flies them all.
     found = check(planted, sample=0)
     # Out and back through the wall may be a long way round besides, and nothing else.
-    assert found in ({"oracle_fails": key(old)}, {"oracle_fails": key(old), "long_way_round": key(old)})
+    assert found in ({"oracle_fails": key}, {"oracle_fails": key, "long_way_round": key})
 
 
 def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
@@ -152,7 +197,7 @@ def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
             path, *joint = joined(place, rows[k])
             rows[k] |= {name: path[:, i].tolist() for i, name in enumerate(("x_m", "y_m", "z_m", "yaw_rad"))}
             rows[k]["action"] = [STOP] * len(path)
-            joints[key(rows[k])[0]] = joint
+            joints[named(KEY, rows[k])] = joint
         planted.write(part, rows)
     data = scene_data(planted)
     found = {data["routes"].key(f.row): f.found for f in collisions.route_collision(data, data["routes"])}
@@ -160,67 +205,27 @@ def test_a_wall_across_any_one_leg_of_any_route_is_found(planted, world):
     assert found == {name: f"the body touches a surface between ({p}) and ({q}) m" for name, (p, q) in told.items()}
 
 
-def test_an_action_that_leads_elsewhere(planted):
-    def wanted(row):
-        return TURN_LEFT in row["action"]
-
-    def change(row):
-        row["action"][row["action"].index(TURN_LEFT)] = TURN_RIGHT
-
-    row = planted.edit(KEY, change, wanted)
-    assert check(planted) == {"replay_differs": key(row)}
-
-
-def test_an_end_that_faces_away(planted):
-    def away(row):
-        last = 2 if row["action"][-2] == APPROACH else 1
-        new = refly(row, [*row["action"][:-last], TURN_LEFT, *row["action"][-last:]])
-        return new if abs(turned(new["yaw_rad"][-1] - new["goal_yaw_rad"], 0.0)) > np.radians(7.6) else None
-
-    old, new = next((row, new) for row in planted.rows(KEY) if roomy(row, 0, 1) and (new := away(row)))
-    replace(planted, old, new)
-    assert check(planted) == {"final_yaw": key(old)}
-
-
-def test_an_end_beside_the_anchor(planted):
-    old = next(row for row in planted.rows(KEY) if row["action"][-2] == APPROACH)
-    path = poses(old)
+def beside_the_anchor(row):
+    if row["action"][-2] != APPROACH:
+        return None
+    path = poses(row)
     path[-1, 2] += 0.002
-    new = measured(old, path, old["action"])
-    replace(planted, old, new)
-    assert check(planted, use_meshes=False) == {"end_position": key(old)}
+    return measured(row, path, row["action"])
 
 
-def test_an_approach_of_more_than_a_metre(planted):
-    for old in planted.rows(KEY):
-        if old["action"][-2] != APPROACH or old["action"][-3] >= TURN_LEFT:
-            continue
-        new = measured(old, np.delete(poses(old), -3, axis=0), [*old["action"][:-3], APPROACH, STOP])
-        new = refly(new, new["action"])
-        gap = float(np.linalg.norm(np.diff(poses(new)[-2:, :3], axis=0)))
-        if gap > 1.001 and new["detour_ratio"] > 1.06 and new["length_m"] > 5 and roomy(new):
-            break
-    else:
-        pytest.fail("no route of the fixture has a last move to leave out")
-    replace(planted, old, new)
-    assert check(planted, use_meshes=False) == {"stops_far": key(old)}
+def approached_from_afar(row):
+    """Without its last move the Approach is more than a metre long."""
+    if row["action"][-2] != APPROACH or row["action"][-3] >= TURN_LEFT:
+        return None
+    new = measured(row, np.delete(poses(row), -3, axis=0), [*row["action"][:-3], APPROACH, STOP])
+    new = refly(new, new["action"])
+    gap = float(np.linalg.norm(np.diff(poses(new)[-2:, :3], axis=0)))
+    return new if gap > 1.001 and new["detour_ratio"] > 1.06 and new["length_m"] > 5 and roomy(new) else None
 
 
-def test_a_start_that_is_another_anchor(planted):
-    rows = planted.rows(KEY) + planted.rows("routes/test")
-    taken = {(r["start_object_id"], r["start_anchor_id"], r["target_object_id"]) for r in rows}
-
-    def other(row):
-        free = (a for a in range(3) if (row["start_object_id"], a, row["target_object_id"]) not in taken)
-        return next(free, None)
-
-    row = planted.edit(KEY, lambda row: row.update(start_anchor_id=other(row)), lambda row: other(row) is not None)
-    assert check(planted) == {"start_anchor": key(row)}
-
-
-def scene_data(planted, **options):
-    tables, _ = read_tables(release_of(planted.release), planted.scene)
-    return SceneData(planted.scene, release_of(planted.release), definitions(), tables, **options)
+def test_ends_off_the_goal(planted):
+    expected = plant_routes(planted, (("end_position", beside_the_anchor), ("stops_far", approached_from_afar)))
+    assert check(planted, use_meshes=False) == expected
 
 
 def test_replayed_actions_are_swept_for_themselves(planted, world):
@@ -234,7 +239,7 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
     row = planted.edit(KEY, change, hits)
     data = scene_data(planted)
     found = [data["routes"].key(f.row) for f in collisions.replay_collision(data, data["routes"])]
-    assert found == key(row)
+    assert found == [named(KEY, row)]
     assert not list(collisions.route_collision(data, data["routes"]))
 
 

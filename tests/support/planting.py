@@ -7,9 +7,9 @@ import hashlib
 import json
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +17,11 @@ import pyarrow.parquet as pq
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
-from aerialdojo_gen.dataset.validate.parts import part_path
+from aerialdojo_gen.dataset.validate.parts import part_path, read_tables, release_of
+from aerialdojo_gen.dataset.validate.registry import Outcome, run_checks
+from aerialdojo_gen.dataset.validate.report import Report
+from aerialdojo_gen.dataset.validate.rows import SceneData
+from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
 from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store import shards as store
@@ -77,6 +81,56 @@ class Planted:
         return changed
 
 
+class PlantedFault(NamedTuple):
+    """What is done to a row, and the check that names it."""
+
+    found_by: str
+    key: str  # Of the table in `store.LAYOUT`
+    change: Callable[[Row], None]
+    wanted: Callable[[Row], bool] = lambda _: True
+
+
+def plant(planted: Planted, faults: Iterable[PlantedFault]) -> dict[str, list[str]]:
+    """Plant each fault in a row of its own, of another navigation task; gives the rows that checks should name."""
+    expected: dict[str, list[str]] = {}
+    used = set()
+    for fault in faults:
+
+        def free(row: Row, fault: PlantedFault = fault) -> bool:
+            return _of_itself(fault.key, row) not in used and fault.wanted(row)
+
+        row = planted.edit(fault.key, fault.change, free)
+        used.add(_of_itself(fault.key, row))
+        expected.setdefault(fault.found_by, []).append(named(fault.key, row))
+    return {name: sorted(keys) for name, keys in expected.items()}
+
+
+def _of_itself(key: str, row: Row) -> object:
+    return row["nav_id"] if "nav_id" in row else (key, *(row[name] for name in store.LAYOUT[key].spec.key))
+
+
+def named(key: str, row: Row) -> str:
+    """A row as reports name it."""
+    spec = store.LAYOUT[key].spec
+    names = {"tasks": ("task_id",), "scenes": ("scene",)}.get(spec.name, tuple(k for k in spec.key if k != "scene"))
+    return " ".join(f"{name}={row[name]}" for name in names)
+
+
+def put(name: str, value: object) -> Callable[[Row], None]:
+    """The change that gives a column a value."""
+    return lambda row: row.update({name: value})
+
+
+def add(name: str, off: float) -> Callable[[Row], None]:
+    """The change that adds to a number."""
+    return lambda row: row.update({name: row[name] + off})
+
+
+def of_nav(nav_id: object) -> Callable[[Row], bool]:
+    """Whether a row is of a navigation task."""
+    return lambda row: row["nav_id"] == nav_id
+
+
 def poses(row: Row) -> np.ndarray:
     return np.column_stack([row[name] for name in LISTS[:4]])
 
@@ -112,6 +166,25 @@ def faults_of(report) -> dict[str, list[str]]:
     for fault in report.faults:
         found.setdefault(fault.check, []).append(fault.key or fault.part)
     return {name: sorted(set(keys)) for name, keys in found.items()}
+
+
+def scene_data(planted: Planted, **options: Any) -> SceneData:
+    """The scene that was planted in, as checks get it."""
+    release = release_of(planted.release)
+    tables, _ = read_tables(release, planted.scene)
+    return SceneData(planted.scene, release, definitions(), tables, **options)
+
+
+def check_of(planted: Planted, *tables: str) -> dict[str, list[str]]:
+    """Make the checks of some tables alone: of `scenes`, those of the mesh file."""
+    checks = [one for one in SCENE_CHECKS if one.table in tables]
+    return faults_of(Report((planted.scene,), tuple(run_checks(scene_data(planted, pictures=0), checks))))
+
+
+def outcome_of(data: SceneData, name: str) -> Outcome:
+    """Make one check alone."""
+    (outcome,) = run_checks(data, [one for one in SCENE_CHECKS if one.name == name])
+    return outcome
 
 
 def definitions():
