@@ -8,7 +8,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from aerialdojo_gen.dataset.contents import TABLES, check_release
-from aerialdojo_gen.dataset.croissant import write_croissant
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 
@@ -85,9 +84,3 @@ def test_file_sets_hold_every_part_once(smoke, document):
     for split in splits:
         n = sum(pq.read_metadata(p).num_rows for p in (release / "tasks" / split).glob("*.parquet"))
         assert f"{split} ({n:,} rows)" in tasks["description"]
-
-
-def test_it_is_the_same_whenever_it_is_written(smoke):
-    path = smoke / "release" / "croissant.json"
-    before = path.read_bytes()
-    assert write_croissant(smoke).read_bytes() == before

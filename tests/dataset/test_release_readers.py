@@ -25,7 +25,6 @@ from support.command_line import called
 from support.handmade import UNSPLIT
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.dataset.card import render_card, write_card
 from aerialdojo_gen.dataset.contents import SHARDS, TABLES, check_release, counts, table_and_split
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -133,14 +132,6 @@ def test_the_cards_head_names_every_split_and_its_files(smoke, stored):
     assert named == {key: table.num_rows for key, table in stored.items()}
     assert [c["config_name"] for c in head["configs"] if c.get("default")] == ["tasks"]
     assert head["license"] == "apache-2.0"
-
-
-def test_the_card_is_the_same_whenever_it_is_written(smoke, tmp_path):
-    shutil.copytree(smoke / "release", tmp_path / "release")
-    before = (smoke / "release" / "README.md").read_bytes()
-    write_card(tmp_path)
-    assert (tmp_path / "release" / "README.md").read_bytes() == before
-    assert render_card(tmp_path).encode() == before
 
 
 def task(k, setting, modality):

@@ -31,56 +31,60 @@ def test_a_part_that_is_missing(planted, key):
     assert check(planted) == {"part_missing": [relative(planted, key)]}
 
 
-@pytest.mark.parametrize("key", ["tasks/train", "routes/test", "release/anchors"])
-def test_a_part_that_is_cut_short(planted, key):
-    raw = planted.path(key).read_bytes()
-    planted.path(key).write_bytes(raw[: len(raw) * 2 // 3])
-    assert check(planted) == {"part_damaged": [relative(planted, key)]}
-    with pytest.raises(StoreError, match="damaged"):
-        store.read_scene(planted.data, key, planted.scene)
+def cut_short(path):
+    raw = path.read_bytes()
+    path.write_bytes(raw[: len(raw) * 2 // 3])
 
 
-def test_a_flipped_bit_within_a_part(planted):
-    path = planted.path("routes/train")
+def flip_a_bit(path):
     raw = bytearray(path.read_bytes())
     raw[len(raw) // 3] ^= 16
     path.write_bytes(raw)
-    assert check(planted) == {"part_damaged": [relative(planted, "routes/train")]}
 
 
-@pytest.mark.parametrize("key", ["tasks/train", "release/anchors"])
-def test_a_part_that_something_else_wrote(planted, key):
-    path = planted.path(key)
+def write_with_something_else(path):
     pq.write_table(pq.read_table(path, partitioning=None).replace_schema_metadata(None), path)
-    assert check(planted) == {"part_damaged": [relative(planted, key)]}
 
 
-def test_a_column_that_is_missing_or_in_another_unit(planted):
+def lose_rows(path):
+    table = pq.read_table(path, partitioning=None)
+    pq.write_table(table.slice(0, table.num_rows - 2), path)
+
+
+def test_parts_that_are_damaged(planted):
+    damages = {
+        "tasks/train": cut_short, "routes/train": flip_a_bit, "routes/test": cut_short,
+        "release/anchors": write_with_something_else, "tasks/test": lose_rows,
+    }  # fmt: skip
+    for key, damage in damages.items():
+        damage(planted.path(key))
+    assert check(planted) == {"part_damaged": sorted(relative(planted, key) for key in damages)}
+    for key in ("tasks/train", "release/anchors"):
+        with pytest.raises(StoreError, match="damaged"):
+            store.read_scene(planted.data, key, planted.scene)
+
+
+def test_columns_that_are_missing_or_in_another_unit_or_tell_the_goal(planted):
     table = pq.read_table(planted.path("release/landmarks"), partitioning=None)
     planted.write_table("release/landmarks", table.drop_columns(["mesh_node"]))
     field = pq.read_schema(planted.path("release/anchors")).field("x_m").with_metadata({"unit": "cm"})
     anchors = pq.read_table(planted.path("release/anchors"), partitioning=None)
     at = anchors.schema.get_field_index("x_m")
     pq.write_table(anchors.set_column(at, field, anchors["x_m"]), planted.path("release/anchors"))
-    assert check(planted) == {
-        "part_schema": [relative(planted, "release/anchors"), relative(planted, "release/landmarks")]
-    }
-
-
-def test_a_column_that_tells_the_goal(planted):
     table = pq.read_table(planted.path("tasks/train"), partitioning=None)
     planted.write_table("tasks/train", table.append_column("goal_x_m", pa.array([1.5] * table.num_rows)))
-    assert check(planted) == {"leaking_column": [relative(planted, "tasks/train")]}
+    assert check(planted) == {
+        "part_schema": [relative(planted, "release/anchors"), relative(planted, "release/landmarks")],
+        "leaking_column": [relative(planted, "tasks/train")],
+    }
 
 
 def test_rows_that_are_not_those_of_the_footer(planted):
     path = planted.path("tasks/train")
     table = pq.read_table(path, partitioning=None)
-    pq.write_table(table.slice(0, table.num_rows - 2), path)
-    assert check(planted) == {"part_damaged": [relative(planted, "tasks/train")]}
     name = table.schema.names.index("target_name")
     pq.write_table(table.set_column(name, table.schema.field(name), pa.array(["a lamp"] * table.num_rows)), path)
-    assert check(planted)["part_content"] == [relative(planted, "tasks/train")]
+    assert check(planted, use_meshes=False)["part_content"] == [relative(planted, "tasks/train")]
 
 
 def test_files_that_do_not_belong(planted):
@@ -89,27 +93,29 @@ def test_files_that_do_not_belong(planted):
     for name in strange:
         (planted.release / name).parent.mkdir(exist_ok=True)
         (planted.release / name).write_bytes(b"x")
-    assert check(planted) == {"foreign_file": sorted(strange)}
+    assert check(planted, use_meshes=False) == {"foreign_file": sorted(strange)}
 
 
 def test_a_scene_that_the_card_counts_and_nobody_has(planted):
     for key, place in store.LAYOUT.items():
         if place.template.startswith("release/"):
             planted.path(key).unlink()
-    assert set(check(planted, whole=True)) == {"card_counts"}
+    assert set(check(planted, whole=True, use_meshes=False)) == {"card_counts"}
 
 
-@pytest.mark.parametrize("table", ["scenes", "landmarks", "objects", "anchors"])
-def test_a_table_without_rows(planted, table):
-    planted.write(f"release/{table}", [])
-    assert check(planted) == {"part_rows": [relative(planted, f"release/{table}")]}
+@pytest.mark.parametrize("tables", [["landmarks"], ["anchors", "objects"], ["scenes"]])
+def test_tables_without_rows(planted, tables):
+    keys = [f"release/{table}" for table in tables]
+    for key in keys:
+        planted.write(key, [])
+    assert check(planted) == {"part_rows": [relative(planted, key) for key in keys]}
 
 
 def test_parts_of_two_runs(planted):
     path = planted.path("release/anchors")
     table = pq.read_table(path, partitioning=None)
     planted.write_table("release/anchors", table, fingerprint="another")
-    assert check(planted) == {"part_of_other_run": [relative(planted, "release/anchors")]}
+    assert check(planted, use_meshes=False) == {"part_of_other_run": [relative(planted, "release/anchors")]}
 
 
 def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
@@ -127,7 +133,7 @@ def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
     ]
     machine.write_text("{")
     card.unlink()
-    assert check(planted, whole=True) == {"card_counts": ["README.md"]}
+    assert check(planted, whole=True, use_meshes=False) == {"card_counts": ["README.md"]}
 
 
 def test_a_lost_part_is_told_by_whoever_reads_the_release(planted):
@@ -152,20 +158,20 @@ def papers(planted, **changes):
 
 
 def test_counts_that_are_not_the_papers(planted, monkeypatch):
-    pipeline = Pipeline(split=SplitConfig(paper_counts=True))
+    asked = {"pipeline": Pipeline(split=SplitConfig(paper_counts=True)), "use_meshes": False}
     train = {s: sum(r["setting"] == s for r in planted.rows("routes/train")) for s in ("base", "standard")}
     both = papers(planted)[planted.scene].tasks
     splits = {("ID", "train"): train | {"long_horizon": 0}}
     splits["ID", "test"] = {s: n - splits["ID", "train"][s] for s, n in both.items()}
     monkeypatch.setattr(counts, "splits", lambda: splits)
     monkeypatch.setattr(counts, "inventory", lambda: papers(planted))
-    assert check(planted, pipeline=pipeline) == {}
+    assert check(planted, **asked) == {}
     monkeypatch.setattr(counts, "inventory", lambda: papers(planted, objects=99, base=both["base"] + 3))
-    assert check(planted, pipeline=pipeline) == {"scene_counts": ["objects", "test base tasks"]}
+    assert check(planted, **asked) == {"scene_counts": ["objects", "test base tasks"]}
 
 
 def test_splits_and_path_of_the_whole(planted, monkeypatch):
-    pipeline = Pipeline(split=SplitConfig(paper_counts=True))
+    asked = {"pipeline": Pipeline(split=SplitConfig(paper_counts=True)), "use_meshes": False}
     other = type(planted)(planted.data, "U_Courtyard_1")
     whole = papers(planted) | papers(other)
     tally = {
@@ -175,10 +181,10 @@ def test_splits_and_path_of_the_whole(planted, monkeypatch):
     }
     monkeypatch.setattr(counts, "splits", lambda: tally)
     monkeypatch.setattr(counts, "inventory", lambda: whole)
-    assert check(planted, pipeline=pipeline, whole=True) == {}
+    assert check(planted, whole=True, **asked) == {}
     tally["OOD", "test"]["base"] += 1
     whole[planted.scene] = papers(planted, path_m=whole[planted.scene].path_m * 1.02)[planted.scene]
-    found = check(planted, pipeline=pipeline, whole=True)
+    found = check(planted, whole=True, **asked)
     assert found == {"split_counts": ["base tasks"], "path_total": [""]}
 
 
@@ -187,7 +193,7 @@ def run(*args):
 
 
 def test_the_command_passes_a_clean_release_and_says_what_it_did_not_check(planted):
-    done = run("--data", planted.data, "--workers", 1, "--verbose")
+    done = run("--data", planted.data, "--workers", 1, "--verbose", "--pictures", 0)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no fault" in done.stdout
     routes = sum(len(pq.read_table(p, partitioning=None)) for p in planted.release.glob("routes/*/*.parquet"))
@@ -215,7 +221,8 @@ def test_the_command_names_every_row_at_fault(planted, tmp_path):
         row["action_budget"] = 7
     planted.write("tasks/train", rows)
     report = tmp_path / "faults.csv"
-    done = run("--data", planted.data, "--report", report, "--max-faults", 1, "--workers", 1, "--scene", "U_*_0")
+    where = ("--data", planted.data, "--scene", "U_*_0", "--no-meshes", "--workers", 1)
+    done = run(*where, "--report", report, "--max-faults", 1)
     assert done.returncode == 1
     assert "task_budget: 3 at fault" in done.stdout
     assert "and 2 more" in done.stdout
@@ -255,7 +262,7 @@ def test_reports_hold_the_same_faults_in_every_format(tmp_path):
 
 def test_workers_find_the_same_in_the_same_order(planted):
     planted.edit("tasks/train", lambda row: row.update(action_budget=7))
-    options = ValidationOptions(planted.release, pipeline=Pipeline())
+    options = ValidationOptions(planted.release, pipeline=Pipeline(), use_meshes=False)
     one, two = validate(options), validate(options, workers=2)
     assert one.faults == two.faults
     assert set(faults_of(one)) == {"task_budget"}

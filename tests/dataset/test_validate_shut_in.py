@@ -1,11 +1,9 @@
 """The way out to the open sky, looked for by rays alone."""
 
 import numpy as np
-import pytest
 import trimesh
 from support.flying import town
 from support.handmade import instance
-from support.planting import check
 
 from aerialdojo_gen.dataset.validate.reachability import open_above, over_lattice, way_aside
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -50,8 +48,3 @@ def test_where_the_generator_has_a_way_rays_find_one():
     assert reachable.sum() > 300
     free = way_aside(rays, p[reachable])
     assert over_lattice(rays, scene.bounds, p[reachable][~free]).all()
-
-
-@pytest.mark.pipeline
-def test_a_sound_release_has_nobody_shut_in(planted):
-    assert not {"anchor_shut_in", "route_shut_in"} & set(check(planted))

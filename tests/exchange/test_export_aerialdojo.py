@@ -34,6 +34,12 @@ def task_files(layout: Path) -> list[Path]:
     return sorted(layout.glob("*OGS/*/*/*/Task.json"))
 
 
+@pytest.fixture(scope="module")
+def tasks(layout) -> list[tuple[Path, dict]]:
+    """Every task, and the file that it stands in."""
+    return [(path, task) for path in task_files(layout) for task in json.loads(path.read_text())]
+
+
 def test_folders_are_those_of_the_authors(layout, smoke):
     shape = re.compile(
         r"(Semantic|Image)OGS/(IID|OOD)_(TRAINS|TESTS)/(1_BaseTasks|2_StandardTasks|3_LongHorizonTasks)/"
@@ -74,25 +80,23 @@ def test_both_instances_are_the_same_episode(layout):
             assert semantic == image
 
 
-def test_a_task_has_the_fields_of_the_authors(layout):
-    for path in task_files(layout):
-        train = path.parent.name.endswith("Train")
-        for task in json.loads(path.read_text()):
-            goal = {"image"} if "ImageOGS" in path.parts else {"description"}
-            assert set(task) == {
-                "episode_id", "trajectory_id", "map_name", "coordinate_system", "task", "used-in-train",
-                "start_true_name", "goal_true_name", "start_object_name", "goal_object_name",
-                "category", "Landmark", "Direction", "start_pose", "goal_pose", "info",
-            } | goal  # fmt: skip
-            assert task["coordinate_system"] == "ProjectAirSim NED"
-            assert set(task["info"]) == {"geodesic_distance", "euclidean_distance", "complexity"}
-            assert task["map_name"] == path.parent.name.rsplit("_", 2)[0]
-            setting = path.parent.parent.name
-            assert task["task"] == {"1": "base_task", "2": "standard_task", "3": "long_task"}[setting[0]]
-            assert task["used-in-train"] == int(train)
-            pose = task["start_pose"]
-            assert set(pose) == {"start_position", "start_quaternion_xyzw", "start_quaternionr"}
-            assert pose["start_quaternionr"] == pose["start_quaternion_xyzw"]
+def test_a_task_has_the_fields_of_the_authors(tasks):
+    for path, task in tasks:
+        goal = {"image"} if "ImageOGS" in path.parts else {"description"}
+        assert set(task) == {
+            "episode_id", "trajectory_id", "map_name", "coordinate_system", "task", "used-in-train",
+            "start_true_name", "goal_true_name", "start_object_name", "goal_object_name",
+            "category", "Landmark", "Direction", "start_pose", "goal_pose", "info",
+        } | goal  # fmt: skip
+        assert task["coordinate_system"] == "ProjectAirSim NED"
+        assert set(task["info"]) == {"geodesic_distance", "euclidean_distance", "complexity"}
+        assert task["map_name"] == path.parent.name.rsplit("_", 2)[0]
+        setting = path.parent.parent.name
+        assert task["task"] == {"1": "base_task", "2": "standard_task", "3": "long_task"}[setting[0]]
+        assert task["used-in-train"] == int(path.parent.name.endswith("Train"))
+        pose = task["start_pose"]
+        assert set(pose) == {"start_position", "start_quaternion_xyzw", "start_quaternionr"}
+        assert pose["start_quaternionr"] == pose["start_quaternion_xyzw"]
 
 
 def evaluator_reads(task: dict) -> dict:
@@ -116,38 +120,28 @@ def evaluator_reads(task: dict) -> dict:
     }
 
 
-def test_the_authors_evaluator_reads_every_task(layout, smoke):
-    tasks = released(smoke, "tasks")
-    read = 0
-    for path in task_files(layout):
-        for task in json.loads(path.read_text()):
-            seen = evaluator_reads(task)
-            row = tasks.loc[f"{task['trajectory_id']}-{'i' if 'ImageOGS' in path.parts else 's'}"]
-            told = row["description"] if row["modality"] == "semantic" else row["landmark"]
-            assert seen["description"] == told
-            assert np.linalg.norm(seen["quaternion"]) == pytest.approx(1)
-            read += 1
-    assert read == len(tasks)
+def test_the_authors_evaluator_reads_every_task(tasks, smoke):
+    rows = released(smoke, "tasks")
+    for path, task in tasks:
+        seen = evaluator_reads(task)
+        row = rows.loc[f"{task['trajectory_id']}-{'i' if 'ImageOGS' in path.parts else 's'}"]
+        assert seen["description"] == row["description" if row["modality"] == "semantic" else "landmark"]
+        assert np.linalg.norm(seen["quaternion"]) == pytest.approx(1)
+    assert len(tasks) == len(rows)
 
 
-def test_actors_are_the_mesh_nodes_and_readable_names_stand_beside_them(layout, smoke):
+def test_a_task_states_its_route_and_its_objects_by_node_and_name(tasks, smoke):
     objects = pd.read_parquet(smoke / "release/objects").set_index(["scene", "mesh_node"])["name"]
-    for path in task_files(layout):
-        for task in json.loads(path.read_text()):
-            assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"]
-            assert objects[task["map_name"], task["start_object_name"]] == task["start_true_name"]
-
-
-def test_what_a_task_states_of_its_route_is_the_routes(layout, smoke):
     routes = released(smoke, "routes")
-    for path in task_files(layout):
-        for task in json.loads(path.read_text()):
-            route = routes.loc[task["trajectory_id"]]
-            assert task["info"] == {
-                "geodesic_distance": route["length_m"],
-                "euclidean_distance": route["euclidean_m"],
-                "complexity": route["detour_ratio"],
-            }
+    for _, task in tasks:
+        assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"]
+        assert objects[task["map_name"], task["start_object_name"]] == task["start_true_name"]
+        route = routes.loc[task["trajectory_id"]]
+        assert task["info"] == {
+            "geodesic_distance": route["length_m"],
+            "euclidean_distance": route["euclidean_m"],
+            "complexity": route["detour_ratio"],
+        }
 
 
 def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smoke):
@@ -314,12 +308,12 @@ def test_a_folder_of_others_is_never_replaced(smoke, tmp_path):
 
 def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
     out = tmp_path / "out"
-    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"])
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"], picture_px=0)
     before = {p.relative_to(out) for p in out.rglob("*")}
     with pytest.raises(UsageError, match="--force replaces it"):
         export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
     assert {p.relative_to(out) for p in out.rglob("*")} == before
-    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], force=True)
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], force=True, picture_px=0)
     assert not list(out.rglob("U_Courtyard_0*"))
     assert os.listdir(tmp_path) == ["out"]
 
@@ -330,7 +324,7 @@ def test_what_a_killed_export_left_is_swept_and_a_living_one_s_is_not(smoke, tmp
     (left / "lease").write_text("out")
     (left / "new").mkdir()
     with atomic_folder(tmp_path / "other") as living:
-        export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"])
+        export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"], picture_px=0)
         assert living.is_dir()
         assert not left.exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["other", "out"]
@@ -338,7 +332,7 @@ def test_what_a_killed_export_left_is_swept_and_a_living_one_s_is_not(smoke, tmp
 
 def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_path):
     out, item = tmp_path / "out", tmp_path / AREA / "dead"
-    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"])
+    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"], picture_px=0)
     # As a kill leaves it where two names cannot be exchanged.
     item.mkdir(parents=True)
     (item / "lease").write_text("out")
@@ -351,9 +345,8 @@ def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_pa
 
 def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
     runner = CliRunner()
-    done = runner.invoke(
-        app, ["export", "--format", "aerialdojo", "--data", str(smoke), "--out", str(tmp_path / "o")]
-    )
+    arguments = ["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "32", "--out", str(tmp_path / "o")]
+    done = runner.invoke(app, ["export", *arguments])
     assert done.exit_code == 0
     scenes = scenes_there(smoke)
     n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)

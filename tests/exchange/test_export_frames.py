@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.exchange.frames import (
     FRAMES,
     Frame,
@@ -100,8 +99,3 @@ def test_axes_point_where_the_name_says(name, x_points, y_points, z_points):
             "down": [0, 0, -1]}  # fmt: skip
     axes = frame_named(name).positions_to_world(np.eye(3))
     assert axes.tolist() == [ways[x_points], ways[y_points], ways[z_points]]
-
-
-def test_an_unknown_frame_is_named():
-    with pytest.raises(UsageError, match="no frame 'xyz': it is one of enu, nwu, ned, esd"):
-        frame_named("xyz")

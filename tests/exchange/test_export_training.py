@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.exchange import lerobot_writer
 from aerialdojo_gen.exchange.folder import PartialExport
 from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
 from aerialdojo_gen.geometry.motion import replay
@@ -190,28 +191,24 @@ def test_webdataset_reads_the_shards_back(made, seen, lerobot):
     assert at == len(samples)
 
 
-@pytest.mark.parametrize("form", ["lerobot", "webdataset"])
-def test_the_same_bytes_by_any_number_of_workers(form, made, smoke, tmp_path, monkeypatch):
-    # Several parts a scene, so that there is something to share out.
-    from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
-
-    again = export_for_learning(form, smoke, tmp_path / "again", export_options(**OPTIONS), workers=2)
-    assert again == made[1][form]
-    assert files(tmp_path / "again") == files(made[0] / form)
+def test_the_same_bytes_by_any_number_of_workers_and_the_same_data_in_other_parts(made, smoke, tmp_path, monkeypatch):
+    """Of WebDataset's shards the test of a killed export shows it: two processes write them."""
+    folder, options = made[0] / "lerobot", export_options(**OPTIONS)
+    again = export_for_learning("lerobot", smoke, tmp_path / "again", options, workers=2)
+    assert again == made[1]["lerobot"]
+    assert files(tmp_path / "again") == files(folder)
     assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
-    for writer in (lerobot_writer, webdataset_writer):
-        monkeypatch.setattr(writer, "frames_a_part", lambda options: 20)
-    cut = export_for_learning(form, smoke, tmp_path / "cut", export_options(**OPTIONS), workers=1)
+    monkeypatch.setattr(lerobot_writer, "frames_a_part", lambda options: 20)
+    cut = export_for_learning("lerobot", smoke, tmp_path / "cut", options, workers=1)
     assert cut.parts > again.parts
-    if form == "lerobot":
-        one, many = lerobot_reader.load(made[0] / form), lerobot_reader.load(tmp_path / "cut")
-        assert many.frames.equals(one.frames)
-        for key, of in one.stats.items():
-            for name, value in of.items():
-                assert many.stats[key][name] == pytest.approx(value, abs=1e-9)
-        last = len(one.episodes) - 1
-        key = "observation.depth.down"
-        assert (many.video(key, last) == one.video(key, last)).all()
+    one, many = lerobot_reader.load(folder), lerobot_reader.load(tmp_path / "cut")
+    assert many.frames.equals(one.frames)
+    for key, of in one.stats.items():
+        for name, value in of.items():
+            assert many.stats[key][name] == pytest.approx(value, abs=1e-9)
+    last = len(one.episodes) - 1
+    key = "observation.depth.down"
+    assert (many.video(key, last) == one.video(key, last)).all()
 
 
 @pytest.mark.kill
@@ -337,6 +334,6 @@ def test_a_name_that_leads_out_of_the_folder_comes_into_no_tar(planted, tmp_path
         planted.write(table, rows, schema=store.LAYOUT[table].spec.schema)
     with pytest.raises(StoreError, match=r"nav_id '../../outside' cannot name a file"):
         export_for_learning(
-            "webdataset", planted.data, tmp_path / "x", export_options(split=("train",), size=(32, 32))
+            "webdataset", planted.data, tmp_path / "x", export_options(split=("train",), size=(32, 32)), workers=1
         )
     assert not (tmp_path / "x").exists()

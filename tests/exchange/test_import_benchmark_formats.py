@@ -212,7 +212,7 @@ def test_frames_are_asked_for_where_a_format_does_not_state_its_own(tmp_path):
             import_benchmark(format_name, [path], tmp_path)
     with pytest.raises(UsageError, match="uav-on files are ned by their format: leave --frame out"):
         import_benchmark("uav-on", [path], tmp_path, Options(frame="enu"))
-    with pytest.raises(UsageError, match="no frame 'left'"):
+    with pytest.raises(UsageError, match="no frame 'left': it is one of enu, nwu, ned, esd"):
         import_benchmark("openfly", [path], tmp_path, Options(frame="left"))
     assert not (tmp_path / "imported").exists()
 
