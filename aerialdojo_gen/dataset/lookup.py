@@ -22,29 +22,21 @@ from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.stored import mesh_copy
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.root import Where, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 _TASK_ID = re.compile(r"(?P<nav>(?P<scene>[A-Za-z0-9][A-Za-z0-9_-]*)-(?P<key>[0-9a-f]{12}))(?:-[si])?")
-_SIDES = ("train", "test")
+SIDES = ("train", "test")
+
+
+def read_side(root: DataRoot, table: str, side: str, scene: str, columns: Sequence[str] | None) -> pa.Table:
+    """Read a scene's ``tasks`` or ``routes`` of train or test, with the column ``split`` (``id_train``, …)."""
+    part = store.read_scene(root, f"{table}/{side}", scene, columns)
+    split = f"{store.partition(scene)}_{side}"
+    return part.append_column("split", pa.array([split] * part.num_rows, pa.string()))
 
 
 class ReleasedScene:
-    """One scene of a release; tables and mesh are read on first access.
-
-    Parameters
-    ----------
-    data : DataRoot, Path or str
-        The data root.
-    name : str
-        Name of the scene.
-
-    Raises
-    ------
-    UsageError
-        The release has no such scene; the message names those that it has.
-    StoreError
-        There is no release.
-    """
+    """One scene of a release; tables and mesh are read on first access."""
 
     def __init__(self, data: Where, name: str) -> None:
         self.root = open_root(data)
@@ -83,12 +75,7 @@ class ReleasedScene:
 
     def both_sides(self, table: str, columns: Sequence[str] | None = None) -> pa.Table:
         """Read ``tasks`` or ``routes`` of train and test together, with the column ``split`` (``id_train``, …)."""
-        parts = []
-        for side in _SIDES:
-            part = store.read_scene(self.root, f"{table}/{side}", self.name, columns)
-            split = f"{store.partition(self.name)}_{side}"
-            parts.append(part.append_column("split", pa.array([split] * part.num_rows, pa.string())))
-        return pa.concat_tables(parts)
+        return pa.concat_tables([read_side(self.root, table, side, self.name, columns) for side in SIDES])
 
     @cached_property
     def routes(self) -> pa.Table:
@@ -97,13 +84,7 @@ class ReleasedScene:
 
     @property
     def model(self) -> Scene:
-        """The scene's mesh, of its context: read again where that had to go.
-
-        Raises
-        ------
-        AssetError
-            The mesh is missing, leads out of the data directory, or is not the one that the release was made from.
-        """
+        """The scene's mesh, of its context: read again where that had to go."""
         mesh_path = self.row["mesh_path"]
         try:
             path = mesh_copy(self.root, mesh_path)
@@ -132,17 +113,17 @@ class ReleasedScene:
 
     def object(self, object_id: int) -> dict[str, Any]:
         """Return the row of `objects`; UsageError if there is none."""
-        for row in self.objects:
-            if row["object_id"] == object_id:
-                return row
-        raise UsageError(f"{self.name} has no object {object_id}")
+        return self._one(self.objects, "object", object_id)
 
     def landmark(self, landmark_id: int) -> dict[str, Any]:
         """Return the row of `landmarks`; UsageError if there is none."""
-        for row in self.landmarks:
-            if row["landmark_id"] == landmark_id:
+        return self._one(self.landmarks, "landmark", landmark_id)
+
+    def _one(self, rows: list[dict[str, Any]], what: str, number: int) -> dict[str, Any]:
+        for row in rows:
+            if row[f"{what}_id"] == number:
                 return row
-        raise UsageError(f"{self.name} has no landmark {landmark_id}")
+        raise UsageError(f"{self.name} has no {what} {number}")
 
     def clearance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances from points (n, 3), world frame, to the nearest surface (n,), metres, by FCL."""
@@ -152,22 +133,12 @@ class ReleasedScene:
 
 @dataclass(frozen=True)
 class FoundTask:
-    """What an id stands for.
-
-    Attributes
-    ----------
-    scene : ReleasedScene
-    nav_id : str
-    route : dict
-        The row of `routes`, with ``split``.
-    instances : list of dict
-        Its rows of `tasks`, semantic first.
-    """
+    """What an id stands for."""
 
     scene: ReleasedScene
     nav_id: str
-    route: dict[str, Any]
-    instances: list[dict[str, Any]]
+    route: dict[str, Any]  # The row of `routes`, with ``split``
+    instances: list[dict[str, Any]]  # Its rows of `tasks`, semantic first
 
     def as_json(self) -> dict[str, Any]:
         """Return the rows that belong to the task: of `routes`, `tasks`, `objects`, `landmarks` and `scenes`."""

@@ -41,15 +41,9 @@ _ABOUT = (
 
 @dataclass(frozen=True)
 class Sample:
-    """The tasks of a protocol.
+    """The tasks of a protocol."""
 
-    Attributes
-    ----------
-    tasks : mapping of str to mapping of str to tuple of str
-        By scene and setting: ids of test tasks.
-    """
-
-    tasks: Mapping[str, Mapping[str, tuple[str, ...]]]
+    tasks: Mapping[str, Mapping[str, tuple[str, ...]]]  # Ids of test tasks by scene and setting
 
     def ids(self, scenes: Collection[str] | None = None) -> frozenset[str]:
         """Return the ids of tasks in some scenes; of all where absent."""
@@ -131,13 +125,7 @@ def write_sample(data: Where) -> None:
 
 
 def read_sample(data: Where) -> Sample:
-    """Read the sample of a release; that of an older one, which does not name it, is drawn.
-
-    Raises
-    ------
-    StoreError
-        There is no release, or its file is damaged.
-    """
+    """Read the sample of a release; that of an older one, which does not name it, is drawn."""
     root = open_root(data)
     if not root.exists(SAMPLE):
         return draw_sample(root)

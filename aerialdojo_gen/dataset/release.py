@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.contents import scenes_in_release
-from aerialdojo_gen.dataset.lookup import FoundTask, ReleasedScene, find_task
+from aerialdojo_gen.dataset.lookup import SIDES, FoundTask, ReleasedScene, find_task, read_side
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
@@ -107,11 +107,8 @@ class Release:
             if name not in _SPLIT:
                 parts.append(store.read_scene(self._data, key, scene_name, read))
                 continue
-            for side in ("train", "test"):
-                subset = f"{store.partition(scene_name)}_{side}"
-                if subset in splits:
-                    part = store.read_scene(self._data, f"{name}/{side}", scene_name, read)
-                    parts.append(part.append_column("split", pa.array([subset] * part.num_rows, pa.string())))
+            sides = [side for side in SIDES if f"{store.partition(scene_name)}_{side}" in splits]
+            parts += [read_side(self._data, name, side, scene_name, read) for side in sides]
         if not parts:
             raise UsageError(f"no scene that was asked for has a part in {', '.join(splits)}")
         table = pa.concat_tables(parts)

@@ -27,28 +27,15 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True)
 class Moved:
-    """What was sent or fetched.
+    """What was sent or fetched."""
 
-    Attributes
-    ----------
-    where : str
-        The data set's address, or the folder.
-    commit : str
-        The revision, hexadecimal.
-    scenes, files, bytes : int
-    meshes : int
-        How many of the files are meshes.
-    left : tuple of str
-        What the data set holds beside a release, and was left there.
-    """
-
-    where: str
-    commit: str
+    where: str  # The data set's address, or the folder
+    commit: str  # The revision, hexadecimal
     scenes: int
     files: int
     bytes: int
-    meshes: int = 0
-    left: tuple[str, ...] = ()
+    meshes: int = 0  # How many of the files are meshes
+    left: tuple[str, ...] = ()  # What the data set holds beside a release, and was left there
 
     def __str__(self) -> str:
         """Where, and how much."""

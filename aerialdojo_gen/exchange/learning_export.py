@@ -26,11 +26,13 @@ from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
+from aerialdojo_gen.store.schemas import ACTION_NAMES
 from aerialdojo_gen.store.staging import scratch_folder
 
 MARKER = "export.json"
 WRITERS: dict[str, ModuleType] = {"lerobot": lerobot_writer, "webdataset": webdataset_writer}
 FRAME = "of the body at the start: x ahead, y left, z up, metres; yaw in radians, counter-clockwise"
+LOST = {"routes": ["goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses"]}
 _MEASURED_PARTS, _MEASURED_STEPS = 6, 24
 
 
@@ -127,7 +129,7 @@ def export_for_learning(
         with whole_folder(out, MARKER, force=force) as folder:
             made = [unfinished.part(part.number) for part in parts]
             counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, options, made, folder)
-            write_json(folder / MARKER, _marker(format_name, options, parts, counts, writer))
+            write_json(folder / MARKER, _marker(format_name, options, parts, counts))
         unfinished.remove()
     return ExportResult(counts, len(parts), len(parts) - len(left))
 
@@ -222,10 +224,8 @@ def _recordings(root: DataRoot, scene: str) -> list[str]:
 
 
 def _marker(
-    format_name: str, options: ExportOptions, parts: list[Part], counts: dict[str, int], writer: ModuleType
+    format_name: str, options: ExportOptions, parts: list[Part], counts: dict[str, int]
 ) -> dict[str, Any]:  # fmt: skip
-    from aerialdojo_gen.store.schemas import ACTION_NAMES
-
     return {
         "format": format_name,
         "written_by": f"aerialdojo-gen {__version__}",
@@ -234,5 +234,5 @@ def _marker(
         "counts": counts,
         "wanted": _plain(dataclasses.asdict(options)),
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
-        "lost": {table: list(columns) for table, columns in writer.LOST.items()},
+        "lost": LOST,
     }

@@ -40,10 +40,7 @@ Stats = dict[str, list[Any]]
 
 
 def row_stats(values: NDArray[Any]) -> Stats:
-    """Statistics of the rows of an (n, d) array.
-
-    Min, max, mean, std and quantiles of d numbers each, and the count.
-    """
+    """Statistics of the rows of an (n, d) array: d numbers each, and the count."""
     table = np.asarray(values, np.float64).reshape(len(values), -1)
     levels = np.quantile(table, list(QUANTILES.values()), axis=0)
     return {
@@ -57,10 +54,7 @@ def row_stats(values: NDArray[Any]) -> Stats:
 
 
 def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
-    """Statistics of pictures from counts (channels, n) of the values (n,), shaped (channels, 1.
-
-    1) as LeRobot has them.
-    """
+    """Statistics of pictures from counts (channels, n) of the values (n,), shaped (channels, 1, 1) as LeRobot's."""
     total = counts.sum(axis=1).astype(np.float64)
     mean = counts @ values / total
     # Of the differences, not of the squares: those of large values cancel.
@@ -116,10 +110,8 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
             for name, values in own.items():
                 columns[name].append(values)
             for key, found in counts.items():
-                sums[key] = sums[key] + found if key in sums else found
-    arrays = [
-        _column(field.type, np.concatenate(columns[field.name])) for field in frame_schema()
-    ]  # fmt: skip
+                _add(sums, key, found)
+    arrays = [_column(field.type, np.concatenate(columns[field.name])) for field in frame_schema()]
     write_file(folder / "data.parquet", pa.table(arrays, schema=frame_schema()))
     facts = {"stats": episodes, "counts": {key: found.tolist() for key, found in sums.items()}}
     (folder / _FACTS).write_text(json.dumps(facts), encoding="utf-8")
@@ -276,8 +268,3 @@ def _tasks(texts: list[str]) -> pa.Table:
     }  # fmt: skip
     table = pa.table({"task_index": pa.array(range(len(texts)), pa.int64()), "task": pa.array(texts, pa.string())})
     return table.replace_schema_metadata({"pandas": json.dumps(told)})
-
-
-LOST = {
-    "routes": ("goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses"),
-}

@@ -23,23 +23,8 @@ def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
     """Draw points from all surfaces of a scene, hidden ones too, without the backdrop.
 
     Each instance has a random stream of its own: its points depend on it, the scene's name and the density alone.
-
-    Parameters
-    ----------
-    scene : Scene
-    points_per_m2 : float
-        Density on the surface.
-
-    Returns
-    -------
-    (n,) structured array of `POINT`
-        ``x``, ``y``, ``z`` in metres, world frame; sRGB of the material without light; ``instance`` as in recordings:
-        the place of the node in the scene, from 1.
-
-    Raises
-    ------
-    UsageError
-        There would be more than `MOST_POINTS`.
+    They are a structured array of `POINT`: metres in the world frame, sRGB of the material without light, and
+    ``instance`` as in recordings, the place of the node in the scene, from 1.
     """
     expected = points_per_m2 * float(_areas(*soup(scene.instances)).sum()) if scene.instances else 0.0
     if expected > MOST_POINTS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
@@ -42,38 +43,7 @@ def export_shapes(
     """Write a point cloud or an occupancy grid of each scene whose mesh is there; no release is needed.
 
     A folder ``SCENE.ply`` and ``SCENE.nodes.json``, or ``SCENE.npz``, and ``export.json``: whole or not at all.
-
-    Parameters
-    ----------
-    format_name : str
-        ``"pointcloud"`` or ``"occupancy"``.
-    data : str, Path or DataRoot
-        The data directory, with ``meshes/``.
-    out : Path
-        The folder to write.
-    scenes : sequence of str, optional
-        Names and globs; all where absent.
-    points_per_m2 : float
-        Density of points on surfaces.
-    voxel_m : float
-        Edge of a voxel, metres.
-    force : bool
-        Replace an earlier export.
-    reporter : Reporter, optional
-
-    Returns
-    -------
-    dict of str to int
-        Numbers of scenes and points, or of scenes, voxels and occupied ones.
-
-    Raises
-    ------
-    UsageError
-        No such format or scene, a value out of range, or a folder that is there already.
-    StoreError
-        There is no mesh, or the folder cannot be written.
-    AssetError
-        A mesh is damaged.
+    Returns the numbers of scenes and points, or of scenes, voxels and occupied ones.
     """
     if format_name not in SHAPES:
         raise UsageError(unknown("no format", format_name, SHAPES))
@@ -83,7 +53,7 @@ def export_shapes(
         raise UsageError(f"--voxel-m is {_LEAST_VOXEL_M:g} to {_LARGEST_VOXEL_M:g} metres, not {voxel_m:g}")
     root = open_root(data)
     chosen = choose_scenes(scenes, _scenes_with_mesh(root))
-    counts = {"scenes": len(chosen)}
+    counts: Counter[str] = Counter(scenes=len(chosen))
     reporter = reporter or Reporter(quiet=True)
     with (
         whole_folder(out, MARKER, force=force) as folder,
@@ -98,8 +68,7 @@ def export_shapes(
                 found = _write_points(scene, folder / name, points_per_m2)
             else:
                 found = _write_occupancy(scene, folder / name, voxel_m)
-            for what, n in found.items():
-                counts[what] = counts.get(what, 0) + n
+            counts.update(found)
             bar.advance()
         own = {"points_per_m2": points_per_m2} if format_name == "pointcloud" else {"voxel_m": voxel_m}
         write_json(
@@ -114,7 +83,7 @@ def export_shapes(
                 "counts": counts,
             },
         )
-    return counts
+    return dict(counts)
 
 
 def _scenes_with_mesh(root: DataRoot) -> list[str]:

@@ -135,6 +135,3 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
         "samples": sum(part.frames for part in parts),
         "shards": len(parts),
     }
-
-
-LOST = {"routes": ("goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses")}

@@ -100,19 +100,13 @@ def object_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", needs=("mesh",), after=("object_node",))
 def object_category(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's category is its node's."""
-    scene = scene_mesh(data).scene
-    for row, (node, category) in enumerate(zip(rows.texts("mesh_node"), rows.texts("category"), strict=True)):
-        if node in scene and scene[str(node)].category != category:
-            yield Finding(row, repr(category), repr(scene[str(node)].category))
+    yield from _unlike_node(data, rows, "category")
 
 
 @check("objects", needs=("mesh",), after=("object_node",))
 def object_shape(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's shape is its node's."""
-    scene = scene_mesh(data).scene
-    for row, (node, shape) in enumerate(zip(rows.texts("mesh_node"), rows.texts("shape"), strict=True)):
-        if node in scene and shape is not None and scene[str(node)].shape != shape:
-            yield Finding(row, repr(shape), repr(scene[str(node)].shape))
+    yield from _unlike_node(data, rows, "shape")
 
 
 @check("landmarks", needs=("mesh",), after=("landmark_node",))
@@ -126,6 +120,14 @@ def _unknown_nodes(data: SceneData, rows: Rows) -> Iterator[Finding]:
     for row, node in enumerate(rows.texts("mesh_node")):
         if node not in scene:
             yield Finding(row, f"mesh_node = {node!r}", "a node of the mesh")
+
+
+def _unlike_node(data: SceneData, rows: Rows, name: str) -> Iterator[Finding]:
+    """Rows whose value of a column is not their node's attribute of that name."""
+    scene = scene_mesh(data).scene
+    for row, (node, stored) in enumerate(zip(rows.texts("mesh_node"), rows.texts(name), strict=True)):
+        if node in scene and stored is not None and (own := getattr(scene[str(node)], name)) != stored:
+            yield Finding(row, repr(stored), repr(own))
 
 
 def _other_box(data: SceneData, rows: Rows, size: np.ndarray | None) -> Iterator[Finding]:
