@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tarfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from aerialdojo_gen.exchange.folder import whole_folder, write_json
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
+from aerialdojo_gen.store.schemas import ACTION_NAMES, SETTINGS, SUBSETS
 
 # Measured on the paper's scenes: bytes of text a pose and a task, by format; bytes of a picture grow with this power
 # of its edge.
@@ -42,11 +42,7 @@ class Size:
     def __str__(self) -> str:
         """In words."""
         megabytes = self.bytes / 1e6
-        return (
-            f"{self.files:,} files, about {megabytes:,.0f} MB"
-            if megabytes >= 10
-            else (f"{self.files:,} files, about {megabytes:.1f} MB")
-        )
+        return f"{self.files:,} files, about {megabytes:,.{0 if megabytes >= 10 else 1}f} MB"
 
 
 def estimate_size(format_name: str, data: DataRoot, scenes: Sequence[str], picture_px: int) -> Size:
@@ -154,18 +150,10 @@ def export_release(
             instead = f"; --shards writes {len(chosen) + 1} files in their place"
         reporter.line(f"export: {size}{instead}, into {out}")
         check_room(out, size.bytes if shards else size.on_disk)
-        categories = {} if format_name == "aerialdojo" else habitat_writer.categories_of(root, chosen)
-        if format_name == "habitat":
-            habitat_writer.write_index(folder, categories)
+        write_scene = _writer_of_scenes(format_name, root, chosen, folder, size_px, shards)
         with reporter.bar("export", len(chosen), "scenes") as bar:
             for scene in chosen:
-                if format_name == "habitat":
-                    counts.update(habitat_writer.write_scene(root, scene, folder, categories))
-                elif shards:
-                    counts.update(aerialdojo_writer.write_scene(root, scene, folder / scene, size_px))
-                    pack_tar(folder / scene, folder / f"{scene}.tar")
-                else:
-                    counts.update(aerialdojo_writer.write_scene(root, scene, folder, size_px))
+                counts.update(write_scene(scene))
                 bar.advance()
         write_json(
             folder / MARKER,
@@ -175,10 +163,27 @@ def export_release(
                 "frame": frame,
                 "scenes": list(chosen),
                 "counts": dict(counts),
-                "actions": None
-                if format_name == "aerialdojo"
-                else {str(k): v for k, v in habitat_writer.ACTIONS.items()},
+                "actions": dict(enumerate(ACTION_NAMES)) if format_name == "habitat" else None,
                 "lost": {table: list(columns) for table, columns in lost.items()},
             },
         )
     return dict(counts)
+
+
+def _writer_of_scenes(
+    format_name: str, root: DataRoot, scenes: Sequence[str], folder: Path, size_px: int, shards: bool
+) -> Callable[[str], dict[str, int]]:
+    """Return what writes a scene into the folder; Habitat's index, which all scenes share, is written at once."""
+    if format_name == "habitat":
+        categories = habitat_writer.categories_of(root, scenes)
+        habitat_writer.write_index(folder, categories)
+        return lambda scene: habitat_writer.write_scene(root, scene, folder, categories)
+    if not shards:
+        return lambda scene: aerialdojo_writer.write_scene(root, scene, folder, size_px)
+
+    def write_archive(scene: str) -> dict[str, int]:
+        counts = aerialdojo_writer.write_scene(root, scene, folder / scene, size_px)
+        pack_tar(folder / scene, folder / f"{scene}.tar")
+        return counts
+
+    return write_archive

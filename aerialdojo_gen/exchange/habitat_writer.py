@@ -20,7 +20,7 @@ import pyarrow as pa
 from aerialdojo_gen.exchange.frames import world_to_habitat, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot
-from aerialdojo_gen.store.schemas import ACTION_NAMES, DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
+from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBSETS
 
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [
@@ -162,6 +162,3 @@ def _episodes(routes: pa.Table, mesh: str, category_of: Mapping[int, str]) -> It
                 "shortest_paths": [points],
                 "object_category": category_of[row["target_object_id"]],
             }
-
-
-ACTIONS = dict(enumerate(ACTION_NAMES))

@@ -79,6 +79,7 @@ class Context:
         return np.append(self.frame.positions_to_world(position), yaw)
 
 
+_KNOWN = ("family", "scene_type", "partition", "subset", "target_name", "landmark", "direction")
 _BUDGETS = {name: getattr(TaskConfig(), name).action_budget for name in ("base", "standard", "long_horizon")}
 
 
@@ -95,8 +96,7 @@ def task_rows(task: Task, nav_id: str, source: dict[str, Any], pictures: list[st
         **dict.fromkeys(SPLIT_COLUMNS),
         "nav_id": nav_id,
         "scene": task.scene,
-        **{n: known.get(n) for n in ("family", "scene_type", "partition", "subset", "target_name", "landmark")},
-        "direction": known.get("direction"),
+        **{name: known.get(name) for name in _KNOWN},
         "setting": setting,
         "action_budget": _BUDGETS.get(setting) if setting else None,
         **dict(zip(("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad"), task.start.tolist(), strict=True)),

@@ -2,7 +2,7 @@
 
 import numpy as np
 from support.handmade import box, instance
-from support.planting import check
+from support.planting import PlantedFault, check, of_nav, plant
 
 from aerialdojo_gen.dataset.validate.difficulty import _edge_on
 from aerialdojo_gen.pipeline.stages.work.pair_objects import surface_points
@@ -10,41 +10,35 @@ from aerialdojo_gen.store.schemas import SPLIT_COLUMNS
 
 SIDES = ("routes/train", "routes/test")
 
-# What is done to which route, and by which check that is found.
+SEEN_WHOLE = {"target_visible_at_start": 1.0, "visible_view_at_start": "front"}
+UNSEEN = {"target_visible_at_start": 0.0, "visible_view_at_start": None}
+# What is done to a route, and by which check that is found.
 ROUTES = (
-    (lambda r: r.update(plan_detour=r["plan_detour"] + 0.01), lambda _: True, "plan_detour"),
-    (lambda r: r.update(plan_detour=0.9), lambda _: True, "plan_detour"),
-    (lambda r: r.update(climb_m=r["climb_m"] + 1.0), lambda _: True, "climb"),
-    (lambda r: r.update(straight_line_free=not r["straight_line_free"]), lambda _: True, "straight_line"),
-    (lambda r: r.update(target_visible_at_start=1.0, visible_view_at_start="front"),
-     lambda r: r["target_visible_at_start"] == 0.0, "start_view"),
-    (lambda r: r.update(visible_view_at_start=None), lambda r: r["target_visible_at_start"] > 0.3, "start_view"),
-    (lambda r: r.update(target_visible_at_start=0.0, visible_view_at_start=None),
-     lambda r: r["target_visible_at_start"] > 0.5, "start_view"),
-    (lambda r: r.update(visible_view_at_start="behind"), lambda _: True, "unknown_word"),
-    (lambda r: r.update(agent_action=r["action"]), lambda r: 16 in r["action"], "agent_action"),
-    (lambda r: r.update(agent_action=r["agent_action"][:-1]), lambda _: True, "agent_action"),
-    (lambda r: r.update(agent_action=[]), lambda _: True, "agent_action"),
-    (lambda r: r.update(agent_action=[1, 1, *r["agent_action"]]), lambda _: True, "agent_action"),
-    (lambda r: r.update(free_length_m=None), lambda _: True, "difficulty_told"),
-    (lambda r: r.update(agent_action=None), lambda _: True, "difficulty_told"),
-    (lambda r: r.update(free_length_m=r["free_length_m"] * 0.7, plan_detour=r["plan_detour"] / 0.7),
-     lambda _: True, "free_length"),
-    (lambda r: r.update(free_length_m=r["free_length_m"] * 1.3, plan_detour=max(1.0, r["plan_detour"] / 1.3)),
-     lambda _: True, "free_length"),
+    ("plan_detour", lambda r: r.update(plan_detour=r["plan_detour"] + 0.01)),
+    ("plan_detour", lambda r: r.update(plan_detour=0.9)),
+    ("climb", lambda r: r.update(climb_m=r["climb_m"] + 1.0)),
+    ("straight_line", lambda r: r.update(straight_line_free=not r["straight_line_free"])),
+    ("start_view", lambda r: r.update(SEEN_WHOLE), lambda r: r["target_visible_at_start"] == 0.0),
+    ("start_view", lambda r: r.update(visible_view_at_start=None), lambda r: r["target_visible_at_start"] > 0.3),
+    ("start_view", lambda r: r.update(UNSEEN), lambda r: r["target_visible_at_start"] > 0.5),
+    ("unknown_word", lambda r: r.update(visible_view_at_start="behind")),
+    ("agent_action", lambda r: r.update(agent_action=r["action"]), lambda r: 16 in r["action"]),
+    ("agent_action", lambda r: r.update(agent_action=r["agent_action"][:-1])),
+    ("agent_action", lambda r: r.update(agent_action=[])),
+    ("agent_action", lambda r: r.update(agent_action=[1, 1, *r["agent_action"]])),
+    ("difficulty_told", lambda r: r.update(free_length_m=None)),
+    ("difficulty_told", lambda r: r.update(agent_action=None)),
+    ("free_length",
+     lambda r: r.update(free_length_m=r["free_length_m"] * 0.7, plan_detour=r["plan_detour"] / 0.7)),
+    ("free_length",
+     lambda r: r.update(free_length_m=r["free_length_m"] * 1.3, plan_detour=max(1.0, r["plan_detour"] / 1.3))),
 )  # fmt: skip
 
 
 def test_wrong_words_on_difficulty(planted):
     """Each in a route of its own: found there, by its check and by no other."""
-    expected, used = {}, set()
-    for change, wanted, found_by in ROUTES:
-        row = planted.edit(
-            "routes/train", change, lambda r, wanted=wanted: r["nav_id"] not in used and bool(wanted(r))
-        )
-        used.add(row["nav_id"])
-        expected.setdefault(found_by, []).append(f"nav_id={row['nav_id']}")
-    assert check(planted) == {name: sorted(keys) for name, keys in expected.items()}
+    expected = plant(planted, (PlantedFault(name, "routes/train", *change) for name, *change in ROUTES))
+    assert check(planted) == expected
 
 
 def test_points_of_a_face_that_is_seen_edge_on_may_count_or_not():
@@ -70,15 +64,14 @@ def test_a_release_of_an_older_version_is_not_at_fault(planted):
 
 # The same for tasks, of which both instances are changed, as a merge with another table would.
 TASKS = (
-    (lambda r: r.update(target_seen_in_train=not r["target_seen_in_train"]), lambda _: True, "seen_in_train"),
-    (lambda r: r.update(start_seen_in_train=not r["start_seen_in_train"]), lambda _: True, "seen_in_train"),
-    (lambda r: r.update(pair_seen_in_train=not r["pair_seen_in_train"]), lambda _: True, "seen_in_train"),
-    (lambda r: r.update(target_split="train"), lambda r: r["target_split"] == "test", "split_by_objects"),
-    (lambda r: r.update(target_split="test"), lambda r: r["target_split"] == "train", "split_by_objects"),
-    (lambda r: r.update(target_held_out=False, target_split="train"),
-     lambda r: r["target_held_out"] and not r["start_held_out"], "split_by_objects"),
-    (lambda r: r.update(start_held_out=not r["start_held_out"]), lambda r: r["target_held_out"], "split_by_objects"),
-    (lambda r: r.update(target_held_out=None), lambda _: True, "splits_told"),
+    *(("seen_in_train", lambda r, what=what: r.update({what: not r[what]}), lambda _: True)
+      for what in ("target_seen_in_train", "start_seen_in_train", "pair_seen_in_train")),
+    ("split_by_objects", lambda r: r.update(target_split="train"), lambda r: r["target_split"] == "test"),
+    ("split_by_objects", lambda r: r.update(target_split="test"), lambda r: r["target_split"] == "train"),
+    ("split_by_objects", lambda r: r.update(target_held_out=False, target_split="train"),
+     lambda r: r["target_held_out"] and not r["start_held_out"]),
+    ("split_by_objects", lambda r: r.update(start_held_out=not r["start_held_out"]), lambda r: r["target_held_out"]),
+    ("splits_told", lambda r: r.update(target_held_out=None), lambda _: True),
 )  # fmt: skip
 
 
@@ -86,10 +79,10 @@ def test_wrong_words_on_the_splits(planted):
     """No training task has a held-out end, and what training has seen is counted again."""
     expected, used = {}, set()
     for side in ("tasks/train", "tasks/test"):
-        for change, wanted, found_by in TASKS:
+        for found_by, change, wanted in TASKS:
             rows = planted.rows(side)
             nav_id = next(r["nav_id"] for r in rows if r["nav_id"] not in used and wanted(r))
-            planted.edit_all(side, change, lambda r, nav_id=nav_id: r["nav_id"] == nav_id)
+            planted.edit_all(side, change, of_nav(nav_id))
             used.add(nav_id)
             expected.setdefault(found_by, []).extend(f"task_id={nav_id}-{letter}" for letter in "is")
     assert check(planted) == {name: sorted(keys) for name, keys in expected.items()}

@@ -43,20 +43,16 @@ _OF_TASK = (
 )  # fmt: skip
 
 
-def _all_known(rows: Rows, *names: str) -> Mask:
-    """Rows that say all of some columns."""
-    return np.asarray(np.logical_and.reduce([_known(rows, name) for name in names]), dtype=np.bool_)
-
-
-def _known(rows: Rows, name: str) -> Mask:
-    return np.asarray(rows.column(name).is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)
+def _known(rows: Rows, *names: str) -> Mask:
+    """Which of some columns every row says, (n, columns) bool."""
+    return np.column_stack([rows.column(name).is_valid().to_numpy(zero_copy_only=False) for name in names])
 
 
 @check("routes", after=_OF_ROUTE)
 def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every route says how hard it is, unless an older version wrote the release and none does."""
     names = [name for name in DIFFICULTY_COLUMNS if name != "visible_view_at_start"]
-    known = np.column_stack([_known(rows, name) for name in names])
+    known = _known(rows, *names)
     for row in np.flatnonzero(known.any() & ~known.all(axis=1)):
         yield Finding(int(row), f"no {names[int(known[row].argmin())]}", "a value, as other routes of the scene have")
 
@@ -106,7 +102,7 @@ def _unlike(data: SceneData, rows: Rows, name: str, expected: Floats) -> Iterato
 def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`agent_action` has the 16 actions alone, ends in Stop, and leads to within an Approach of the goal in time."""
     budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
-    paths, settings, known = data.paths, rows.texts("setting"), _known(rows, "agent_action")
+    paths, settings, known = data.paths, rows.texts("setting"), _known(rows, "agent_action")[:, 0]
     lists = rows.column("agent_action")
     ends, actions = lists.offsets.to_numpy(), lists.values.to_numpy(zero_copy_only=False)
     most_m = data.pipeline.plan.max_approach_m + _LENGTH_M
@@ -228,7 +224,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     ids = data["objects"].ints("object_id").tolist()
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
     out = held_out(data.scene, ids, fraction, key) if _has_salt(data, key) else None
-    complete = _all_known(rows, *_SPLITS)
+    complete = _known(rows, *_SPLITS).all(axis=1)
     split = rows.texts("target_split")
     is_held_out = {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
     ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in is_held_out}
@@ -257,7 +253,7 @@ def _has_salt(data: SceneData, key: bytes) -> bool:
 @check("tasks")
 def splits_told(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every task says on which sides of the splits it is, unless an older version wrote the release and none does."""
-    known = np.column_stack([_known(rows, name) for name in _SPLITS])
+    known = _known(rows, *_SPLITS)
     if not known.any():
         raise UncheckedError("the release does not say: an older version wrote it")
     for row in np.flatnonzero(~known.all(axis=1)):
