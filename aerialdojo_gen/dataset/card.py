@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -153,9 +154,7 @@ def render_card(data: Where) -> str:
         least_detour=float(np.min(tasks["plan_detour"].to_numpy())) if len(tasks) else None,
         most_visible=float(np.max(tasks["target_visible_at_start"].to_numpy())) if len(tasks) else None,
         detour=DETOUR,
-        citation=CITE_AS.replace(", title", ",\n  title")
-        .replace(", author", ",\n  author")
-        .replace(", year", ",\n  year"),
+        citation=re.sub(", (?=title|author|year)", ",\n  ", CITE_AS),
         hf_type=_hf_type,
         column_type=_column_type,
         meaning=meaning,

@@ -45,10 +45,7 @@ def move(name: str, *, forward: float = 0, left: float = 0, up: float = 0, turn_
 
 
 def replay(start: Sequence[float] | Floats, steps: Floats) -> Floats:
-    """Replay steps (n, 4) (forward, left, up in metres, turn in radians) from a pose, without a map.
-
-    Poses (n + 1, 4).
-    """
+    """Replay steps, (n, 4), from a pose, without a map: poses, (n + 1, 4)."""
     x, y, z, yaw = start
     yaws = yaw + np.concatenate([[0.0], np.cumsum(steps[:, 3])])
     cos, sin = np.cos(yaws[:-1]), np.sin(yaws[:-1])
@@ -84,10 +81,7 @@ _WORD_OF = {a: word for word, actions in _OURS.items() for a in actions}
 
 
 def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
-    """Name what led into each pose in the words of the authors' layout.
-
-    An Approach takes the word of its main body axis.
-    """
+    """Name what led into each pose in the authors' words; an Approach takes the word of its main body axis."""
     words = ["start"]
     for k, action in enumerate(actions[:-1].tolist()):
         if action != APPROACH:
@@ -101,10 +95,7 @@ def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
 
 
 def actions_of(words: Sequence[str], poses: Floats) -> tuple[list[int] | None, float]:
-    """Find our actions for the authors' words from the poses (n, 4) (world metres, radians).
-
-    And the replay error in metres.
-    """
+    """Find our actions for the authors' words from the poses, (n, 4), and the replay error in metres."""
     found = body_steps(poses)
     steps = np.zeros_like(found)
     actions: list[int] = []

@@ -39,18 +39,20 @@ class Frame:
         """Turn world positions, (..., 3) metres, into the frame: the inverse of `positions_to_world`."""
         return np.asarray(np.asarray(xyz_m, np.float64) @ self.matrix + 0.0)
 
+    @property
+    def _sense_and_turn(self) -> tuple[np.float64, np.float64]:
+        """Which way the frame's yaws count, 1 or -1, and the world yaw of its x axis."""
+        m = self.matrix
+        return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0], np.arctan2(m[1, 0], m[0, 0])
+
     def yaw_to_world(self, yaw_rad: ArrayLike) -> Floats:
         """Turn yaws about the frame's own z axis, counted from its x towards its y, into world yaws in (-π, π]."""
-        m = self.matrix
-        turn = np.arctan2(m[1, 0], m[0, 0])
-        sense = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+        sense, turn = self._sense_and_turn
         return wrap_angle_rad(sense * np.asarray(yaw_rad, np.float64) + turn)
 
     def yaw_from_world(self, yaw_rad: ArrayLike) -> Floats:
         """Turn world yaws into the frame's: the inverse of `yaw_to_world`."""
-        m = self.matrix
-        turn = np.arctan2(m[1, 0], m[0, 0])
-        sense = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+        sense, turn = self._sense_and_turn
         return wrap_angle_rad(sense * (np.asarray(yaw_rad, np.float64) - turn))
 
     def quaternion_to_world_yaw(self, quaternion_xyzw: ArrayLike) -> Floats:

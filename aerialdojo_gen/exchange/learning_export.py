@@ -15,11 +15,11 @@ from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
-from aerialdojo_gen.benchmark.tasks import mesh_of
+from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import PartialExport, check_target, whole_folder, whole_part, write_json
-from aerialdojo_gen.exchange.samples import ExportOptions, Part, expand_splits, plan_parts
+from aerialdojo_gen.exchange.samples import ExportOptions, Part, plan_parts
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
@@ -93,8 +93,9 @@ def export_options(
     width, height = (size, size) if isinstance(size, int) else size
     sensors = Sensors(tuple(views), rgb, depth, width, height)
     name = "" if source == "recordings" else renderer_name(renderer)
+    splits = Selection(tuple(split)).splits  # ``train``, ``test`` and ``all`` written out
     return ExportOptions(
-        expand_splits(split), tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
+        splits, tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
         jpeg_quality, tuple(run),
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -200,8 +200,3 @@ class SampleFrames:
         shrinks = picture.shape[0] >= s.height and picture.shape[1] >= s.width
         how = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
         return np.asarray(cv2.resize(picture, (s.width, s.height), interpolation=how), np.uint8)
-
-
-def expand_splits(given: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of splits, ``train``, ``test`` and ``all`` written out; UsageError for others."""
-    return Selection(tuple(given)).splits

@@ -42,11 +42,9 @@ def judged(data, name, table, change, wanted=lambda _: True):
         change(changed[k])
     schema = pa.schema([field.with_nullable(True) for field in rows.table.schema])
     planted = dataclasses.replace(rows, table=pa.Table.from_pylist(changed, schema=schema))
-    here = SceneData(data.scene, data.release, data.pipeline, {**data.tables, table: planted})
-    here.kept.update(data.kept)
+    here = dataclasses.replace(data, tables={**data.tables, table: planted}, faulty={})
     one = next(one for one in SCENE_CHECKS if one.name == name and one.table in (table, "*"))
     (outcome,) = (o for o in run_checks(here, [one]) if o.table == table)
-    data.kept.update(here.kept)
     assert not outcome.skipped
     return sorted(planted.key(k) for k in places), sorted({fault.key for fault in outcome.faults})
 
@@ -55,20 +53,16 @@ def add(column, off, at=None):
     """Add to a number, or to the number that stands in a list at a place: 0 first, 0.5 in the middle, 1 last."""
 
     def change(row):
-        if at is None:
-            row[column] += off
-        else:
-            row[column][int(at * (len(row[column]) - 1))] += off
+        into, key = (row, column) if at is None else (row[column], int(at * (len(row[column]) - 1)))
+        into[key] += off
 
     return change
 
 
 def put(column, value, at=None):
     def change(row):
-        if at is None:
-            row[column] = value
-        else:
-            row[column][int(at * (len(row[column]) - 1))] = value
+        into, key = (row, column) if at is None else (row[column], int(at * (len(row[column]) - 1)))
+        into[key] = value
 
     return change
 
@@ -190,10 +184,8 @@ def test_rows_out_of_order_are_found_in_every_part(data):
     for part, end in enumerate(rows.ends):
         order = np.arange(len(rows))
         order[[end - 2, end - 1]] = order[[end - 1, end - 2]]
-        here = SceneData(
-            data.scene, data.release, data.pipeline,
-            {**data.tables, "routes": dataclasses.replace(rows, table=rows.table.take(order))},
-        )  # fmt: skip
+        swapped = dataclasses.replace(rows, table=rows.table.take(order))
+        here = dataclasses.replace(data, tables={**data.tables, "routes": swapped}, faulty={})
         one = next(one for one in SCENE_CHECKS if one.name == "unsorted_rows")
         (outcome,) = (o for o in run_checks(here, [one]) if o.table == "routes")
         assert [fault.part for fault in outcome.faults] == [rows.parts[part]]

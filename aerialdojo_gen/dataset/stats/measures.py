@@ -57,12 +57,9 @@ def _share(name: str, holds: Callable[[Any], Any]) -> Callable[[pd.DataFrame], F
     return lambda rows: _percent(holds(rows[name]))
 
 
-def _share_of_known(name: str, holds: Callable[[Any], Any]) -> Callable[[pd.DataFrame], Figure]:
+def _share_of_known(name: str, holds: Callable[[Any], Any] = lambda share: share) -> Callable[[pd.DataFrame], Figure]:
+    """Share of the known values that are so; without a condition their mean, as they are shares."""
     return lambda rows: _percent(holds(rows[name]), np.isfinite(rows[name].to_numpy()))
-
-
-def _mean_percent(name: str) -> Callable[[pd.DataFrame], Figure]:
-    return lambda rows: _percent(rows[name], np.isfinite(rows[name].to_numpy()))
 
 
 def _count(*conditions: tuple[str, object]) -> Callable[[pd.DataFrame], Figure]:
@@ -164,8 +161,8 @@ def goal_table(goals: pd.DataFrame) -> Comparison:
         Measure("fronts", lambda rows: int(rows["off_front_rad"].notna().sum())),
         Measure("front %", _share_of_known("off_front_rad", lambda off: off <= FRONT_RAD), "%"),
         Measure("parts %", _share_of_known("tells_shown", lambda shown: shown == 1.0), "%"),
-        Measure("unhidden %", _mean_percent("part_unoccluded"), "%"),
-        Measure("framed %", _mean_percent("part_framed"), "%"),
+        Measure("unhidden %", _share_of_known("part_unoccluded"), "%"),
+        Measure("framed %", _share_of_known("part_framed"), "%"),
         Measure("back m", _quantile("step_back_m", 0.5), "m", 2),
     )
     there = sorted(set(goals["family"]), key=lambda name: ([*FAMILIES.values(), name].index(name), name))
