@@ -19,7 +19,6 @@ from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.dataset.contents import scenes_there
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.staging import AREA
 
 
@@ -316,18 +315,6 @@ def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
     export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], force=True, picture_px=0)
     assert not list(out.rglob("U_Courtyard_0*"))
     assert os.listdir(tmp_path) == ["out"]
-
-
-def test_what_a_killed_export_left_is_swept_and_a_living_one_s_is_not(smoke, tmp_path):
-    left = tmp_path / AREA / "dead"
-    left.mkdir(parents=True)
-    (left / "lease").write_text("out")
-    (left / "new").mkdir()
-    with atomic_folder(tmp_path / "other") as living:
-        export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"], picture_px=0)
-        assert living.is_dir()
-        assert not left.exists()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["other", "out"]
 
 
 def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_path):
