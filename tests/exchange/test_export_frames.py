@@ -27,11 +27,6 @@ def rotate(quaternion_xyzw, vector):
     return v + 2 * np.cross(q, np.cross(q, v) + quaternion_xyzw[3] * v)
 
 
-def habitat_to_world(xyz):
-    x, up, south = xyz
-    return np.array([x, -south, up]) + 0.0
-
-
 def forward(yaw):
     return np.array([math.cos(yaw), math.sin(yaw), 0.0])
 
