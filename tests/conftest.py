@@ -18,6 +18,7 @@ import pytest
 from aerialdojo_gen.base import cli_context
 
 if TYPE_CHECKING:
+    from selenium.webdriver import Chrome as WebDriver
     from support.planting import Planted
 
 # A test with one of these marks is left out of `make test-fast`; every other gets the mark "fast".
@@ -141,6 +142,23 @@ def smoke(project: Path, shared: Path) -> Path:
 def worlds_cache(shared: Path) -> Path:
     """A cache of worlds from seeds that the session's processes have in common; whoever asks first makes a world."""
     return shared / "worlds"
+
+
+@pytest.fixture(scope="session")
+def session_browser() -> Iterator[WebDriver]:
+    from support.browser import chromium
+
+    with chromium("the pages") as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def browser(session_browser: WebDriver) -> WebDriver:
+    """A real Chromium, which the pages' tests of a process share; every module finds it empty."""
+    from support.browser import as_new
+
+    as_new(session_browser)
+    return session_browser
 
 
 @pytest.fixture

@@ -15,7 +15,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from aerialdojo_gen.annotations.format import Anchor, Annotations, Landmark, Object, format_annotations
+from aerialdojo_gen.annotations.format import (
+    Anchor,
+    Annotations,
+    Landmark,
+    Object,
+    format_annotations,
+    parse_annotations,
+)
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError
 from aerialdojo_gen.studio.annotate.document import ConflictError, Operation, apply, describe, difference, edits_of
 from aerialdojo_gen.studio.annotate.storage import Author, StaleError, Storage
@@ -68,7 +75,7 @@ operations = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(operations, max_size=8))
 def test_undo_gives_back_every_byte_and_redo_every_change(tmp_path_factory, todo):
     folder = tmp_path_factory.mktemp("undo")
@@ -95,7 +102,7 @@ def test_undo_gives_back_every_byte_and_redo_every_change(tmp_path_factory, todo
     assert again.redo(state.version, ADA)[1] is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(operations, max_size=6), st.lists(operations, max_size=6))
 def test_the_difference_of_two_states_leads_from_one_to_the_other(first, second):
     def made(todo):
@@ -135,15 +142,14 @@ def test_opening_and_saving_without_a_change_writes_nothing(storage, project):
     assert record is None
     assert storage.path.read_bytes() == before
     assert (storage.path.stat().st_mtime_ns, storage.path.stat().st_ino) == (stamp.st_mtime_ns, stamp.st_ino)
-    # Nor does a change and its undo leave a trace in any of the files that the repository holds.
+    # Nor does a change and its undo leave a trace in a file that is as the program writes it.
+    state, _ = storage.change(state.version, ADA, rename("something else"))
+    assert storage.path.read_bytes() != before
+    storage.undo(state.version, ADA)
+    assert storage.path.read_bytes() == before
     for path in sorted((project / "annotations").glob("[UNID]_*_[01].json")):
-        copy = storage.path.parent / path.name
-        copy.write_bytes(path.read_bytes())
-        other = Storage(copy.parent, path.stem)
-        state, _ = other.change(other.load().version, ADA, rename("something else"))
-        assert copy.read_bytes() != path.read_bytes()
-        other.undo(state.version, ADA)
-        assert copy.read_bytes() == path.read_bytes(), path.name
+        text = path.read_text(encoding="utf-8")
+        assert format_annotations(parse_annotations(text).annotations) == text, path.name
 
 
 def test_the_second_of_two_people_is_told(storage):
@@ -239,6 +245,7 @@ def test_a_name_that_leads_elsewhere_is_none(tmp_path):
     [
         {"do": "change", "kind": "objects", "id": 0, "fields": {"name": "a\nb"}},
         {"do": "change", "kind": "objects", "id": 0, "fields": {"name": "x" * 121}},
+        {"do": "change", "kind": "objects", "id": 0, "fields": {"description": "x" * 2001}},
         {"do": "change", "kind": "objects", "id": 0, "fields": {"name": 3}},
         {"do": "change", "kind": "objects", "id": -1, "fields": {}},
         {"do": "change", "kind": "objects", "id": True, "fields": {}},
@@ -312,7 +319,7 @@ def test_a_line_of_the_history_that_a_crash_cut_is_passed_over(storage):
 
 @pytest.mark.kill
 def test_killed_in_the_middle_of_saves_nothing_that_was_answered_is_lost(storage):
-    for k in range(4):
+    for k in range(3):
         command = [sys.executable, "-c", CRASH, str(storage.path.parent), "anywhere"]
         had = len(Storage(storage.path.parent, "U_Yard_0").load().annotations.objects)
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

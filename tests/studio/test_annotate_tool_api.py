@@ -20,7 +20,7 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.annotate.access import TokenGate
 from aerialdojo_gen.studio.annotate.coco import write_coco
-from aerialdojo_gen.studio.annotate.server import MOST_BYTES, STATIC, make_app, serve_session
+from aerialdojo_gen.studio.annotate.server import STATIC, make_app, serve_session
 from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session
 from aerialdojo_gen.studio.annotate.storage import Storage
 
@@ -243,83 +243,27 @@ def test_the_coco_export_boxes_what_the_pictures_show(client, desk, tmp_path):
     for image in document["images"]:
         png = cv2.imdecode(np.frombuffer(archive.read(f"images/{image['file_name']}"), np.uint8), cv2.IMREAD_COLOR)
         assert png.shape == (image["height"], image["width"], 3)
-    assert client.get("/api/coco").content == client.get("/api/coco").content
+    path = write_coco(desk, tmp_path / "new" / "boxes.zip")
+    assert sorted(p.name for p in path.parent.iterdir()) == ["boxes.zip"]
+    assert path.read_bytes() == client.get("/api/coco").content
 
 
 # What is refused.
 
 
-@pytest.mark.parametrize(
-    "path", ["/api/operations", "/api/undo", "/api/import", "/api/draft", "/api/pick", "/api/objects/0/viewpoint"]
-)
-@pytest.mark.parametrize(
-    "body",
-    [
-        b"", b"{", b"[]", b"null", b'"x"', b"\xff\xfe", b'{"who": 3}', b'{"who": "a", "client": "../x"}',
-        b'{"operation": {}}', b'{"origin_m": [1e999, 0, 0], "direction": [0, 0, 1]}', b'{"position_m": [NaN, 0, 0]}',
-        b"[" * 100_000, b'{"who": "\\ud800", "client": "a"}', b'{"who": "a", "text": "\\ud800"}',
-        b'{"operation": {"do": "add", "kind": "objects", "fields": {"name": "\\ud800"}}}',
-    ],
-)  # fmt: skip
-def test_malformed_bodies_are_refused_in_one_line(client, desk, path, body):
-    before = desk.storage.path.read_bytes()
-    headers = {"If-Match": version_of(client), "Content-Type": "application/json"}
-    answer = client.post(path, content=body, headers=headers)
-    if not (path == "/api/undo" and answer.status_code == 200):
-        assert 400 <= answer.status_code < 500, answer.text
-        assert "\n" not in answer.json()["error"]
-    assert desk.storage.path.read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    "headers",
-    [{"Origin": "http://evil.example"}, {"Origin": "null"}, {"Host": "evil.example"},
-     {"Host": "evil.example", "Origin": "http://evil.example"},
-     {"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://127.0.0.1"}, {"Origin": "http://127.0.0.1:81"}],
-)  # fmt: skip
-def test_other_sites_are_refused(client, desk, headers):
+def test_other_sites_change_nothing(client, desk):
     operation = {"do": "remove", "kind": "objects", "id": 0}
     before = desk.storage.path.read_bytes()
-    answer = client.post(
-        "/api/operations", json=AUTHOR | {"operation": operation}, headers={"If-Match": version_of(client)} | headers
-    )
-    assert answer.status_code == 403
-    assert client.get("/", headers=headers).status_code == 403
+    for headers in ({"Origin": "http://evil.example"}, {"Host": "evil.example", "Origin": "http://evil.example"}):
+        sent = headers | {"If-Match": version_of(client)}
+        answer = client.post("/api/operations", json=AUTHOR | {"operation": operation}, headers=sent)
+        assert (answer.status_code, client.get("/", headers=headers).status_code) == (403, 403)
     assert desk.storage.path.read_bytes() == before
 
 
-def test_a_body_of_a_hundred_megabytes_is_refused_unread(client, desk):
-    read = 0
-
-    def body():
-        nonlocal read
-        for _ in range(100):
-            read += 1
-            yield b"x" * (1 << 20)
-
-    answer = client.post("/api/import", content=body(), headers={"Content-Length": str(100 << 20)})
-    assert answer.status_code == 413
-    assert str(MOST_BYTES) in answer.text
-    chunked = client.post("/api/import", content=body(), headers={"If-Match": "x"})
-    assert chunked.status_code == 411
+def test_a_text_that_is_too_long_and_a_node_that_is_not_in_the_scene_are_refused(client):
     long = operate(client, version_of(client), do="change", kind="objects", id=0, fields={"description": "x" * 2001})
     assert (long.status_code, "2000" in long.json()["error"]) == (422, True)
-
-
-@pytest.mark.parametrize(
-    "path",
-    ["/annotate/../desk.py", "/annotate/%2e%2e/desk.py", "/annotate/..%2fdesk.py", "/static/../serving.py",
-     "/annotate/%2e%2e%2f%2e%2e%2fcli.py", "/annotate//etc/passwd", "/annotate/....//desk.py",
-     "/api/objects/..%2f0/anchors", "/api/nodes/../../../etc/passwd", "/../../etc/passwd"],
-)  # fmt: skip
-def test_no_path_leads_out_of_the_page(client, path):
-    answer = client.get(path)
-    assert answer.status_code in (404, 422) or answer.json() == {}
-    assert "import" not in answer.text
-    assert "root:" not in answer.text
-
-
-def test_a_node_that_is_not_in_the_scene_is_no_node(client):
     for node in ("../../etc/passwd", "delivery_van_000/../x", "nothing"):
         answer = operate(client, version_of(client), do="add", kind="objects", fields={"node": node, "name": "x"})
         assert (answer.status_code, "no node" in answer.json()["error"]) == (400, True)
@@ -388,9 +332,3 @@ def test_several_scenes_at_once_are_refused(project, tmp_path):
         open_session("U_*", pipeline, roots)
     with pytest.raises(UsageError, match="U_Courtyard_0"):
         open_session("u_courtyard_0", pipeline, roots)
-
-
-def test_the_archive_is_written_whole(desk, tmp_path):
-    path = write_coco(desk, tmp_path / "new" / "boxes.zip")
-    assert sorted(p.name for p in path.parent.iterdir()) == ["boxes.zip"]
-    assert zipfile.ZipFile(path).testzip() is None

@@ -39,6 +39,7 @@ from aerialdojo_gen.studio.annotate.session import open_session
 SCRATCH = Path(tempfile.gettempdir()) / f"aerialdojo-gen-{os.getuid()}"
 
 SHED = ([2.5, 2.5, 0.05], [7.5, 7.5, 4.0])
+SHED_BOX = {"low_m": SHED[0], "high_m": SHED[1], "category": "shed"}
 
 
 @pytest.fixture(scope="module")
@@ -158,31 +159,6 @@ def asked(url, path, body=None, method=None):
         return error.code, json.loads(error.read())
 
 
-@pytest.mark.slow
-def test_a_box_that_cannot_be_built_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
-    data, recipe = tmp_path / "data", terrain.pipeline.parent / "scenes" / "Scan.toml"
-    before = recipe.read_bytes()
-    box = {"low_m": SHED[0], "high_m": SHED[1], "category": "shed"}
-    with annotating.served(project, "Scan", terrain.pipeline, data) as (url, _):
-        with held_by_another(data / ".lock"):
-            for _ in range(2):
-                status, answer = asked(url, "api/boxes", box)
-                assert (status, "another run is writing" in answer["error"]) == (400, True), answer
-                assert recipe.read_bytes() == before
-        made = asked(url, "api/boxes", box)
-        assert (made[0], made[1]["node"]) == (200, "shed_000")
-        boxed = recipe.read_bytes()
-        with held_by_another(data / ".lock"):
-            assert asked(url, "api/boxes/shed_000", method="DELETE")[0] == 400
-        assert recipe.read_bytes() == boxed
-        # The scene that the page has is still the one of the recipe.
-        top = {"origin_m": [5.0, 5.0, 20.0], "direction": [0.0, 0.0, -1.0]}
-        assert asked(url, "api/pick", top)[1]["node"] == "shed_000"
-        assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
-    assert recipe.read_bytes() == before
-    assert not list(SCRATCH.rglob("Scan.toml"))
-
-
 def taken(path: Path):
     """Whether somebody holds a lock."""
     with path.open("a") as file:
@@ -193,53 +169,67 @@ def taken(path: Path):
     return False
 
 
+@contextlib.contextmanager
+def killed_while_it_builds(url, process):
+    """Ask a server for the box in another thread, and kill the server after the block."""
+
+    def ask():
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            asked(url, "api/boxes", SHED_BOX)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    yield
+    os.kill(process.pid, signal.SIGKILL)
+    asking.join()
+
+
 @pytest.mark.kill
-def test_a_server_killed_while_it_builds_a_box_leaves_the_recipe_as_it_was(terrain, project, tmp_path):
-    data, recipe, assets = (
-        tmp_path / "data",
-        terrain.pipeline.parent / "scenes" / "Scan.toml",
-        tmp_path / "scene_assets",
-    )
+def test_a_box_that_cannot_be_built_and_a_server_that_is_killed_leave_the_recipe_as_it_was(
+    terrain, project, tmp_path
+):
+    data, recipe = tmp_path / "data", terrain.pipeline.parent / "scenes" / "Scan.toml"
+    assets, pipeline = tmp_path / "scene_assets", tmp_path / "pipeline.toml"
     shutil.copytree(project / "scene_assets", assets, ignore=shutil.ignore_patterns("scenes", "smoke"))
-    pipeline, shard = tmp_path / "pipeline.toml", data / "scenes" / "Scan" / "part-00000.parquet"
     pipeline.write_text(
         f'name = "mine"\nseed = 7\nscene_assets = "{assets}"\nrecipes = "{recipe.parent}"\n'
         f'annotations = "{tmp_path / "annotations"}"\n[annotate-import]\npaper_counts = false\n'
     )
     materials, before = assets / "materials.toml", recipe.read_bytes()
-    box = {"low_m": SHED[0], "high_m": SHED[1], "category": "shed"}
-
-    def ask(url):
-        with contextlib.suppress(OSError, http.client.HTTPException):
-            asked(url, "api/boxes", box)
-
-    def kill(process, asking):
-        os.kill(process.pid, signal.SIGKILL)
-        asking.join()
-
-    # In the middle of the build: it hangs, for want of somebody who writes into the pipe that it reads.
     with annotating.served(project, "Scan", pipeline, data) as (url, process):
+        with held_by_another(data / ".lock"):
+            for _ in range(2):
+                status, answer = asked(url, "api/boxes", SHED_BOX)
+                assert (status, "another run is writing" in answer["error"]) == (400, True), answer
+                assert recipe.read_bytes() == before
+        made = asked(url, "api/boxes", SHED_BOX)
+        assert (made[0], made[1]["node"]) == (200, "shed_000")
+        boxed = recipe.read_bytes()
+        with held_by_another(data / ".lock"):
+            assert asked(url, "api/boxes/shed_000", method="DELETE")[0] == 400
+        assert recipe.read_bytes() == boxed
+        # The scene that the page has is still the one of the recipe.
+        top = {"origin_m": [5.0, 5.0, 20.0], "direction": [0.0, 0.0, -1.0]}
+        assert asked(url, "api/pick", top)[1]["node"] == "shed_000"
+        assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
+        assert recipe.read_bytes() == before
+        # In the middle of the build: it hangs, for want of somebody who writes into the pipe that it reads.
         materials.rename(tmp_path / "kept.toml")
         os.mkfifo(materials)
-        asking = threading.Thread(target=ask, args=(url,))
-        asking.start()
-        until("the build", lambda: taken(data / ".lock"))
-        kill(process, asking)
+        with killed_while_it_builds(url, process):
+            until("the build", lambda: taken(data / ".lock"))
     (tmp_path / "kept.toml").replace(materials)
     assert recipe.read_bytes() == before
-    # As soon as the new scene is in the store: whole or not at all, and the next server begins with that.
     with annotating.served(project, "Scan", pipeline, data) as (url, process):
-        was = shard.stat().st_ino
-        asking = threading.Thread(target=ask, args=(url,))
-        asking.start()
-        end = time.monotonic() + 60
-        while shard.stat().st_ino == was:
-            assert time.monotonic() < end
-        kill(process, asking)
-    assert recipe.read_bytes() == before or recipe.read_bytes().count(b"shed_000") == 1
-    recipe.write_bytes(before)
-    with annotating.served(project, "Scan", pipeline, data) as (url, _):
-        assert asked(url, "api/boxes", box)[1]["node"] == "shed_000"
+        assert asked(url, "api/boxes", SHED_BOX)[1]["node"] == "shed_000"
         assert asked(url, "api/boxes/shed_000", method="DELETE") == (200, {})
-    assert recipe.read_bytes() == before
-    assert not list(SCRATCH.rglob("Scan.toml"))
+        assert recipe.read_bytes() == before
+        assert not list(SCRATCH.rglob("Scan.toml"))
+        # As soon as the new scene is in the store: whole or not at all.
+        shard = data / "scenes" / "Scan" / "part-00000.parquet"
+        was = shard.stat().st_ino
+        with killed_while_it_builds(url, process):
+            end = time.monotonic() + 60
+            while shard.stat().st_ino == was:
+                assert time.monotonic() < end
+    assert recipe.read_bytes() == before or recipe.read_bytes().count(b"shed_000") == 1

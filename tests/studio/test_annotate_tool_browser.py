@@ -34,12 +34,6 @@ UNLABELLED = """
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with chrome.chromium("the annotation page") as driver:
-        yield driver
-
-
-@pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """A block of Helsinki, as add-scene makes it of OpenStreetMap's buildings."""
     folder = tmp_path_factory.mktemp("helsinki")

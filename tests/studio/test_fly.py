@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 from starlette.testclient import TestClient
-from support.browser import chromium, errors, until
+from support.browser import errors, until
+from support.command_line import called
 
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.base.errors import StoreError, UsageError
@@ -236,28 +237,23 @@ def test_successful_flights_are_demonstrations(planted, tmp_path):
     assert (made.parts, made.counts["samples"]) == (1, len(way))
 
 
-@pytest.mark.browser
-def test_a_person_flies_to_the_goal_by_keys_and_report_has_the_rate(smoke, tmp_path):
+def test_a_person_flies_to_the_goal_by_keys_and_report_has_the_rate(browser, smoke, tmp_path):
     one = Selection(modalities=("image",), limit=1)
     (row,) = select(smoke, one).to_pylist()
     routes = reference_actions(open_root(smoke), row["scene"], (row["subset"],), "agent_action")
-    program = [sys.executable, "-m", "aerialdojo_gen.cli"]
-    where = ["--data", str(smoke), "--modality", "image", "--limit", "1", "--no-browser"]
-    process = subprocess.Popen(
-        [*program, "fly", "--name", "pilot-1", "--out", str(tmp_path), *where], stdout=subprocess.PIPE, text=True
-    )
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "fly", "--name", "pilot-1", "--out", str(tmp_path),
+               "--data", str(smoke), "--modality", "image", "--limit", "1", "--no-browser"]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         url = re.search(r"http://127\.0\.0\.1:\d+/", process.stdout.readline())[0]
-        with chromium("the page of fly") as driver:
-            follow(driver, url, row, routes[row["nav_id"]])
+        follow(browser, url, row, routes[row["nav_id"]])
     finally:
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert "1 flown, success rate 100.0%" in out
-    told = [*program, "report", "human-pilot-1", "--log", str(tmp_path), "--data", str(smoke)]
-    report = subprocess.run(told, capture_output=True, text=True, check=True).stdout
-    assert re.search(r"human:pilot-1 .*100\.0", report), report
+    told = called("report", "human-pilot-1", "--log", tmp_path, "--data", smoke)
+    assert re.search(r"human:pilot-1 .*100\.0", told.stdout), told
 
 
 def follow(driver, url, row, actions):

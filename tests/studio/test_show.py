@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pytest
 import trimesh
-from support.browser import chromium, errors
+from support.browser import errors
 from support.command_line import called
 from typer.testing import CliRunner
 
@@ -172,23 +172,24 @@ def test_a_dollar_in_a_name_is_no_mathematics(pictured, tmp_path):
     assert cv2.imread(str(write_png(task, tmp_path / "p.png"))) is not None
 
 
-@pytest.mark.browser
-def test_the_page_opens_in_a_browser_without_a_network(pictured, page, tmp_path):
+def test_the_page_opens_in_a_browser_without_a_network(browser, pictured, page, tmp_path):
     path = tmp_path / "task.html"
     path.write_text(page, encoding="utf-8")
-    with chromium("the page of show") as driver:
-        driver.execute_cdp_cmd("Network.enable", {})
-        offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
-        driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
-        driver.get(path.as_uri())
-        assert driver.title == f"{pictured.instance['task_id']}: {pictured.title}"
-        images = driver.execute_script("return [...document.images].map((i) => [i.complete, i.naturalWidth, i.alt])")
-        assert len(images) == 6
-        assert all(complete and width >= 300 and alt for complete, width, alt in images)
-        assert driver.execute_script("return document.querySelector('.goal').textContent") == pictured.goal
-        # Readable at 1280: nothing sticks out to the side.
-        assert driver.execute_script("return document.documentElement.scrollWidth") <= 1280
-        assert errors(driver) == []
+    limits = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
+    browser.execute_cdp_cmd("Network.enable", {})
+    try:
+        browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": True, **limits})
+        browser.get(path.as_uri())
+    finally:
+        browser.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": False, **limits})
+    assert browser.title == f"{pictured.instance['task_id']}: {pictured.title}"
+    images = browser.execute_script("return [...document.images].map((i) => [i.complete, i.naturalWidth, i.alt])")
+    assert len(images) == 6
+    assert all(complete and width >= 300 and alt for complete, width, alt in images)
+    assert browser.execute_script("return document.querySelector('.goal').textContent") == pictured.goal
+    # Readable at 1280: nothing sticks out to the side.
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= 1280
+    assert errors(browser) == []
 
 
 # ---- the command, and what can be wrong ----

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
-from support.viewing import YARD, served
+from support.viewing import YARD
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.dataset.release import open_release
@@ -89,7 +89,7 @@ def test_tasks_are_found_by_words_in_any_order_and_by_id(client, release):
         assert [task["nav_id"] for task in one["tasks"]] == [routes[0]["nav_id"]]
 
 
-def test_pictures_are_those_of_the_release(smoke, client, release):
+def test_pictures_are_those_of_the_release(view_url, client, release):
     row = release.objects(scene=YARD).to_pylist()[0]
     whole = cv2.imdecode(np.frombuffer(row["reference_image"], np.uint8), cv2.IMREAD_COLOR)
     answer = client.get(f"/scenes/{YARD}/api/objects/{row['object_id']}/thumb")
@@ -99,8 +99,7 @@ def test_pictures_are_those_of_the_release(smoke, client, release):
     wanted = cv2.resize(whole, small.shape[1::-1], interpolation=cv2.INTER_AREA).astype(float)
     assert np.abs(small - wanted).mean() < 6
     # By a process of its own: a renderer of this one would outlive the test, in a thread of the server.
-    with served(smoke) as url:
-        pictures = [urlopen(f"{url}scenes/{name}/picture").read() for name in release.scenes[:2]]
+    pictures = [urlopen(f"{view_url}scenes/{name}/picture").read() for name in release.scenes[:2]]
     assert all(
         len(np.unique(cv2.imdecode(np.frombuffer(p, np.uint8), 1).reshape(-1, 3), axis=0)) > 500 for p in pictures
     )

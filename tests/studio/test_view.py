@@ -1,6 +1,5 @@
 """`view`: the payload is the scene, and the server answers this machine alone, with what the release holds."""
 
-import http.client
 import json
 import re
 import signal
@@ -21,7 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 from support.rendered import MATERIALS, block
-from support.viewing import YARD, served
+from support.viewing import YARD
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.dataset.lookup import ReleasedScene
@@ -112,33 +111,16 @@ def client(smoke):
     return TestClient(view_app(smoke, YARD), base_url="http://127.0.0.1")
 
 
-@pytest.mark.parametrize(
-    "host", ["evil.example", "127.0.0.1.evil.example", "127.0.0.1:81", "localhost:1", "", "[::1]"]
-)
-def test_foreign_hosts_are_refused(client, host):
-    answer = client.get(f"{SCENE}api/index", headers={"host": host})
-    assert answer.status_code == 403
-    assert YARD not in answer.text
-
-
-@pytest.mark.parametrize(
-    "headers",
-    [
-        {"origin": "http://evil.example"},
-        {"origin": "null"},
-        {"origin": "https://127.0.0.1"},
-        {"origin": "http://127.0.0.1:9"},
-        {"sec-fetch-site": "cross-site"},
-        {"sec-fetch-site": "same-site"},
-    ],
-)
-def test_foreign_origins_are_refused(client, headers):
-    assert client.get(f"{SCENE}api/index", headers=headers).status_code == 403
-
-
-def test_ones_own_origin_is_not_refused(client):
+def test_foreign_hosts_and_origins_are_refused_and_ones_own_is_not(client):
+    for host in ("evil.example", "127.0.0.1.evil.example", "127.0.0.1:81", "localhost:1", "", "[::1]"):
+        answer = client.get(f"{SCENE}api/index", headers={"host": host})
+        assert (answer.status_code, YARD in answer.text) == (403, False), host
+    for origin in ("http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:9"):
+        assert client.get(f"{SCENE}api/index", headers={"origin": origin}).status_code == 403, origin
+    for site in ("cross-site", "same-site"):
+        assert client.get(f"{SCENE}api/index", headers={"sec-fetch-site": site}).status_code == 403, site
     for headers in ({}, {"origin": "http://127.0.0.1"}, {"host": "localhost", "origin": "http://localhost"}):
-        assert client.get(f"{SCENE}api/index", headers=headers).status_code == 200
+        assert client.get(f"{SCENE}api/index", headers=headers).status_code == 200, headers
 
 
 def test_a_link_out_of_the_folder_is_not_followed(tmp_path, monkeypatch):
@@ -244,48 +226,11 @@ def test_a_taken_port_is_named():
             serving.open_socket(port)
 
 
-@pytest.fixture(scope="module")
-def server(smoke):
-    with served(smoke, YARD) as url:
-        yield url
-
-
-def test_the_server_listens_on_the_loopback_alone(server):
-    port = urlsplit(server).port
+def test_the_server_listens_on_the_loopback_alone(view_url):
+    port = urlsplit(view_url).port
     listening = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     here = [row[1] for row in listening if row[3] == "0A" and int(row[1].partition(":")[2], 16) == port]
     assert here == [f"0100007F:{port:04X}"]
-
-
-@pytest.mark.parametrize(
-    "path",
-    [
-        "/static/../serving.py",
-        "/static/..%2fserving.py",
-        "/static/%2e%2e/serving.py",
-        "/static/%2e%2e%2fserving.py",
-        "/static/..%5cserving.py",
-        "/static/three/../../serving.py",
-        "/static//etc/passwd",
-        "/static/%2fetc%2fpasswd",
-        "/static/../../../../../../../etc/passwd",
-        "/../serving.py",
-        "/static/",
-        "/static/three",
-        "/scenes/..%2f..%2fserving.py",
-        f"/scenes/{YARD}/api/routes/..%2f..%2fscene",
-    ],
-)
-def test_paths_do_not_escape(server, path):
-    # Not httpx or a browser: they tidy the path up before they send it.
-    connection = http.client.HTTPConnection("127.0.0.1", urlsplit(server).port)
-    connection.request("GET", path)
-    answer = connection.getresponse()
-    text = answer.read().decode()
-    connection.close()
-    assert answer.status == 404, text
-    assert "import" not in text
-    assert "root:" not in text
 
 
 @pytest.mark.kill

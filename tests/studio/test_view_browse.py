@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
-from support.browser import chromium, errors, until
-from support.viewing import YARD, served
+from support.browser import errors, until
+from support.viewing import YARD
 
 from aerialdojo_gen.dataset.release import open_release
-
-pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser(smoke):
-    """A browser and the address of the start page: (driver, address)."""
-    with served(smoke) as url, chromium("looking around in a release") as driver:
-        yield driver, url
 
 
 def ready(driver):
@@ -29,24 +20,22 @@ def ready(driver):
 
 
 @pytest.fixture(scope="module")
-def start(browser):
-    driver, url = browser
-    driver.get(url)
-    ready(driver)
-    return driver
+def start(browser, view_url):
+    browser.get(view_url)
+    ready(browser)
+    return browser
 
 
 @pytest.fixture
-def yard(browser):
+def yard(browser, view_url):
     """The page of the yard, nothing selected."""
-    driver, url = browser
-    address = f"{url}scenes/{YARD}/"
-    if driver.current_url.partition("#")[0] != address:
-        driver.get(address)
-        ready(driver)
-    draw(driver, setting="", split="", modality="", target="", colour="setting", most="")
-    driver.execute_script("page.letGo(); page.tabs.show('panel')")
-    return driver
+    address = f"{view_url}scenes/{YARD}/"
+    if browser.current_url.partition("#")[0] != address:
+        browser.get(address)
+        ready(browser)
+    draw(browser, setting="", split="", modality="", target="", colour="setting", most="")
+    browser.execute_script("page.letGo(); page.tabs.show('panel')")
+    return browser
 
 
 def draw(driver, **choice):

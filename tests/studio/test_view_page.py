@@ -7,24 +7,22 @@ import time
 import cv2
 import numpy as np
 import pytest
-from support.browser import chromium, errors, until
-from support.viewing import YARD, served
+from support.browser import errors, until
+from support.viewing import YARD
 
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.gallery import look_at
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
-pytestmark = pytest.mark.browser
-
 
 @pytest.fixture(scope="module")
-def page(smoke):
+def page(browser, view_url):
     """The page in a browser: (driver, address)."""
-    with served(smoke, YARD) as url, chromium("the page of view") as driver:
-        driver.get(url)
-        ready = "return document.body?.dataset.ready"
-        assert until("the page is ready", lambda: driver.execute_script(ready)) == "yes"
-        yield driver, url
+    url = f"{view_url}scenes/{YARD}/"
+    browser.get(url)
+    ready = "return document.body?.dataset.ready"
+    assert until("the page is ready", lambda: browser.execute_script(ready)) == "yes"
+    return browser, url
 
 
 def screenshot(driver):

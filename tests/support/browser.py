@@ -44,6 +44,19 @@ def chromium(what: str) -> Iterator[Any]:
         shutil.rmtree(profile, ignore_errors=True)
 
 
+def as_new(driver: Any) -> None:
+    """Leave the browser one empty window, no cookie, and nothing in its logs."""
+    first, *others = driver.window_handles
+    for handle in others:
+        driver.switch_to.window(handle)
+        driver.close()
+    driver.switch_to.window(first)
+    driver.get("about:blank")
+    driver.execute_cdp_cmd("Network.clearBrowserCookies", {})
+    for log in ("browser", "performance"):
+        driver.get_log(log)
+
+
 def until(what: str, test: Callable[[], Any], seconds: float = 60.0) -> Any:
     """Wait until a test gives something true, and give it; what the page is just building anew counts as not yet."""
     from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
