@@ -1,4 +1,4 @@
-"""What several commands share: their options, where the sources lie, how a pipeline is opened and run.
+"""What several commands share: scenes by position and option, JSON, how a pipeline is opened and run.
 
 Nothing heavy is imported before a command runs, so that ``--help`` answers at once.
 """
@@ -8,26 +8,20 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING
 
-import typer
-
-from aerialdojo_gen.base import cli_context
-from aerialdojo_gen.cli import completion
-from aerialdojo_gen.dataset.build import (
-    DEFAULT_PIPELINE,
-    default_workers,
-    open_pipeline,
-    pipeline_file,
-    run_stages,
-)
+from aerialdojo_gen.dataset.build import default_workers, open_pipeline, pipeline_file, run_stages
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
+    from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
+    from aerialdojo_gen.scenes.model import Scene
     from aerialdojo_gen.store.root import Where
 
 __all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
@@ -51,133 +45,30 @@ def _plain(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
-    """Keep the options of the command line (not the environment's) for commands in messages."""
-    source = ctx.get_parameter_source(str(param.name))
-    if source is not None and source.name == "COMMANDLINE":
-        cli_context.update_context(**{str(param.name): value})
-    return value
-
-
-Data = Annotated[
-    str,
-    typer.Option(
-        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
-        help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
-    ),
-]  # fmt: skip
-Scene = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--scene",
-        metavar="NAME|GLOB",
-        autocompletion=completion.scenes,
-        help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
-    ),
-]
-Scenes = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
-]
-# Which tasks are flown.
-Split = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--split",
-        help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  (default: all)",
-    ),
-]
-Setting = Annotated[
-    list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
-]  # fmt: skip
-Modality = Annotated[list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")]
-TaskLimit = Annotated[
-    int | None,
-    typer.Option(
-        "--limit",
-        min=1,
-        help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
-        "separately.  (default: all)",
-    ),
-]
-SelectionSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")]
-Tell = Annotated[
-    list[str] | None,
-    typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
-]
-Out = Annotated[
-    str | None,
-    typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
-]
-SubmissionFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
-    ),
-]
-PipelineFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--pipeline",
-        metavar="FILE|NAME",
-        callback=remember_option,
-        autocompletion=completion.pipelines,
-        help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
-        f"else {Path(DEFAULT_PIPELINE).stem})",
-    ),
-]
-PipelineArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="PIPELINE",
-        callback=remember_option,
-        autocompletion=completion.pipelines,
-        help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
-    ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option("--workers", metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)"),
-]
-ExecutorName = Annotated[
-    str, typer.Option("--executor", metavar="local|ray", help="Run on this machine or on a Ray cluster.")
-]
-Address = Annotated[
-    str | None,
-    typer.Option(
-        "--address",
-        metavar="HOST:PORT",
-        help="Address of a running Ray cluster.  (default: start one on this machine)",
-    ),
-]
-Protocol = Annotated[
-    Literal["paper"] | None,
-    typer.Option("--protocol", help="paper: the tasks of the paper's sample alone, two maps a family."),
-]
-Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
-Replace = Annotated[
-    bool, typer.Option("--replace", help="Overwrite a release made by another pipeline; it is deleted.")
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON with unrounded figures.")]
-OneScene = Annotated[
-    str | None,
-    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that matches one."),
-]
-SceneOption = Annotated[
-    str | None,
-    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as SCENE."),
-]
-RendererName = Annotated[
-    Literal["auto", "gl", "pybullet"],
-    typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
-
-
 def merge_scenes(scenes: list[str] | None, scene: list[str] | None) -> list[str] | None:
     """Join scenes that are given by position with those of ``--scene``; None where there is neither."""
     return [*(scenes or ()), *(scene or ())] or None
+
+
+def selection(
+    scenes: list[str] | None, *, split: Sequence[str] | None, setting: list[str] | None, modality: list[str] | None,
+    protocol: str | None, limit: int | None, seed: int,
+) -> Selection:  # fmt: skip
+    """Make the selection of tasks that the options of `evaluate`, `fly` and `score` name."""
+    from aerialdojo_gen.benchmark.tasks import Selection
+
+    splits, settings, modalities, chosen = (tuple(names or ()) for names in (split, setting, modality, scenes))
+    return Selection(splits, settings, modalities, chosen, limit, seed, protocol or "")
+
+
+@contextmanager
+def interruptible(left: str) -> Iterator[None]:
+    """Say what Ctrl-C leaves, and end with 130: Typer turns it into a silent exit."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"interrupted: {left}", file=sys.stderr)
+        raise SystemExit(130) from None
 
 
 def run_until(
@@ -218,18 +109,26 @@ def run_chosen(
     kept = "finished shards are kept, " + (
         "and --force computes them again" if options.force else "the same command continues from where it stopped"
     )
+    reporter = Reporter(quiet=quiet, verbose=verbose)
     try:
-        reporter = Reporter(quiet=quiet, verbose=verbose)
-        run_stages(stages, config, roots, scene, options=options, reporter=reporter)
-    except KeyboardInterrupt:
-        # Said here because Typer turns Ctrl-C into a silent exit.
-        print(f"interrupted: {kept}", file=sys.stderr)
-        raise SystemExit(130) from None
+        with interruptible(kept):
+            run_stages(stages, config, roots, scene, options=options, reporter=reporter)
     except Exception as error:
         # A wrong option or pipeline file ended it before anything was computed.
         if not isinstance(error, UsageError):
             error.add_note(kept)
         raise
+
+
+def print_scene(scene: Scene, notes: Sequence[str]) -> None:
+    """Say what a scene that was added holds, and what was done to it."""
+    size = scene.bounds[1] - scene.bounds[0]
+    print(
+        f"{scene.name}: {len(scene.instances):,} instances, {scene.n_triangles:,} triangles, "
+        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {scene.ceiling_m:.0f} m"
+    )
+    for line in notes:
+        print(f"  {line}")
 
 
 def key_values(given: list[str]) -> dict[str, str]:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from aerialdojo_gen.base import cli_context
-from aerialdojo_gen.cli.common import Json, PipelineFile, pipeline_file, print_json
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import pipeline_file, print_json
 
 app = typer.Typer(help="Show the keys of a pipeline file, or write one to start from.")
 
@@ -18,8 +19,8 @@ def show(
     stage: Annotated[
         str | None, typer.Argument(metavar="STAGE", help="Show the section of one stage, e.g. plan.  (default: all)")
     ] = None,
-    pipeline: PipelineFile = None,
-    as_json: Json = False,
+    pipeline: options.PipelineFile = None,
+    as_json: options.Json = False,
 ) -> None:
     """Show every key of a pipeline: value, default, unit, bounds, meaning."""
     from aerialdojo_gen.base.config.keys import config_keys

@@ -16,30 +16,14 @@ from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.secrets import Secrets
-from aerialdojo_gen.cli import completion
+from aerialdojo_gen.cli import completion, options
 from aerialdojo_gen.cli.common import (
-    Address,
-    Data,
-    ExecutorName,
-    Modality,
-    Out,
-    PipelineFile,
-    Protocol,
-    Quiet,
-    RendererName,
-    Scene,
-    Scenes,
-    SelectionSeed,
-    Setting,
-    Split,
-    SubmissionFile,
-    TaskLimit,
-    Tell,
-    Workers,
     default_workers,
+    interruptible,
     key_values,
     merge_scenes,
     open_pipeline,
+    selection,
 )
 
 if TYPE_CHECKING:
@@ -50,149 +34,145 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
+Agent = Annotated[
+    str | None,
+    typer.Option(
+        "--agent",
+        autocompletion=completion.agents,
+        help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
+    ),
+]
+Preset = Annotated[
+    str | None, typer.Option("--preset", help="A preset language model instead of --agent: qwen3-vl-4b, …")
+]
+AgentOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--option", help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."
+    ),
+]
+Run = Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")]
+View = Annotated[
+    list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
+]
+Width = Annotated[
+    int | None, typer.Option("--width", min=1, max=4096, help="Image width in pixels; overrides the agent's.")
+]
+Height = Annotated[
+    int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
+]
+Attempts = Annotated[
+    int,
+    typer.Option(
+        "--attempts",
+        min=1,
+        max=1000,
+        help="Maximum attempts per episode if something other than the agent fails.",
+    ),
+]
+RerunFailed = Annotated[
+    bool,
+    typer.Option("--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."),
+]
+Tolerate = Annotated[
+    bool,
+    typer.Option(
+        "--tolerate", help="Continue when the agent raises or returns no valid action; the episode counts as failed."
+    ),
+]
+Traceback = Annotated[bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")]
+Restart = Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")]
+Estimate = Annotated[
+    bool,
+    typer.Option("--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."),
+]
+MaxCost = Annotated[
+    float | None, typer.Option("--max-cost", min=0, help="Start no further episode after this cost, US dollars.")
+]
+MaxTokens = Annotated[
+    int | None, typer.Option("--max-tokens", min=0, help="Start no further episode after this number of tokens.")
+]
+RequestsPerMinute = Annotated[
+    float | None,
+    typer.Option("--requests-per-minute", min=0.001, help="Maximum request rate of all workers together."),
+]
+FailuresInRow = Annotated[
+    int,
+    typer.Option("--failures-in-row", min=1, help="Stop after this many failed episodes of one kind in a row."),
+]
+
+
 @app.command("evaluate")
 def evaluate(
-    scenes: Scenes = None,
-    data: Data = "data",
-    agent: Annotated[
-        str | None,
-        typer.Option(
-            "--agent",
-            autocompletion=completion.agents,
-            help="oracle, random, stop, explorer, policy, …, or package.module:Class.  (default: random)",
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option("--preset", help="A preset language model instead of --agent: qwen3-vl-4b, …"),
-    ] = None,
-    option: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--option", help="Option of the agent, repeatable: --option seed=1; converted to the type of its default."
-        ),
-    ] = None,
-    run: Annotated[
-        str | None, typer.Option("--run", help="Name of the run.  (default: that of the agent or preset)")
-    ] = None,
-    split: Split = None,
-    setting: Setting = None,
-    modality: Modality = None,
-    protocol: Protocol = None,
-    scene: Scene = None,
-    limit: TaskLimit = None,
-    seed: SelectionSeed = 0,
-    view: Annotated[
-        list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable; overrides the agent's.")
-    ] = None,
-    width: Annotated[
-        int | None, typer.Option("--width", min=1, max=4096, help="Image width in pixels; overrides the agent's.")
-    ] = None,
-    height: Annotated[
-        int | None, typer.Option("--height", min=1, max=4096, help="Image height in pixels; overrides the agent's.")
-    ] = None,
-    renderer: RendererName = "auto",
-    tell: Tell = None,
-    out: Out = None,
-    submission: SubmissionFile = None,
-    attempts: Annotated[
-        int,
-        typer.Option(
-            "--attempts",
-            min=1,
-            max=1000,
-            help="Maximum attempts per episode if something other than the agent fails.",
-        ),
-    ] = 5,
-    rerun_failed: Annotated[
-        bool,
-        typer.Option(
-            "--rerun-failed", help="Run only those episodes again that failed for reasons outside the agent."
-        ),
-    ] = False,
-    tolerate: Annotated[
-        bool,
-        typer.Option(
-            "--tolerate",
-            help="Continue when the agent raises or returns no valid action; the episode counts as failed.",
-        ),
-    ] = False,
-    traceback: Annotated[
-        bool, typer.Option("--traceback", help="Print the whole traceback of an agent that raises.")
-    ] = False,
-    restart: Annotated[bool, typer.Option("--restart", help="Delete what the run has written before.")] = False,
-    estimate: Annotated[
-        bool,
-        typer.Option(
-            "--estimate", help="Estimate time and cost of a language model with a few requests; fly nothing."
-        ),
-    ] = False,
-    max_cost: Annotated[
-        float | None, typer.Option("--max-cost", min=0, help="Start no further episode after this cost, US dollars.")
-    ] = None,
-    max_tokens: Annotated[
-        int | None, typer.Option("--max-tokens", min=0, help="Start no further episode after this number of tokens.")
-    ] = None,
-    requests_per_minute: Annotated[
-        float | None,
-        typer.Option("--requests-per-minute", min=0.001, help="Maximum request rate of all workers together."),
-    ] = None,
-    failures_in_row: Annotated[
-        int,
-        typer.Option("--failures-in-row", min=1, help="Stop after this many failed episodes of one kind in a row."),
-    ] = 5,
-    workers: Workers = None,
-    executor: ExecutorName = "local",
-    address: Address = None,
-    pipeline: PipelineFile = None,
-    quiet: Quiet = False,
+    scenes: options.Scenes = None,
+    data: options.Data = "data",
+    agent: Agent = None,
+    preset: Preset = None,
+    option: AgentOption = None,
+    run: Run = None,
+    split: options.Split = None,
+    setting: options.Setting = None,
+    modality: options.Modality = None,
+    protocol: options.Protocol = None,
+    scene: options.Scene = None,
+    limit: options.TaskLimit = None,
+    seed: options.SelectionSeed = 0,
+    view: View = None,
+    width: Width = None,
+    height: Height = None,
+    renderer: options.RendererName = "auto",
+    tell: options.Tell = None,
+    out: options.Out = None,
+    submission: options.SubmissionFile = None,
+    attempts: Attempts = 5,
+    rerun_failed: RerunFailed = False,
+    tolerate: Tolerate = False,
+    traceback: Traceback = False,
+    restart: Restart = False,
+    estimate: Estimate = False,
+    max_cost: MaxCost = None,
+    max_tokens: MaxTokens = None,
+    requests_per_minute: RequestsPerMinute = None,
+    failures_in_row: FailuresInRow = 5,
+    workers: options.Workers = None,
+    executor: options.ExecutorName = "local",
+    address: options.Address = None,
+    pipeline: options.PipelineFile = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Evaluate an agent on released tasks, closed loop; finished episodes are kept."""
     from aerialdojo_gen.benchmark.evaluation import Limits
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
-    from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.benchmark.worker import RetryPolicy
-    from aerialdojo_gen.dataset.protocol import sample_shortfall
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
-    splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
-    chosen = tuple(merge_scenes(scenes, scene) or ())
-    name = preset or agent or "random"
+    chosen = selection(
+        merge_scenes(scenes, scene), split=split, setting=setting, modality=modality, protocol=protocol,
+        limit=limit, seed=seed,
+    )  # fmt: skip
     with _tracebacks(traceback):
-        agent, options = _agent(agent, preset, key_values(option or []))
+        name, given = _agent(agent, preset, key_values(option or []))
         evaluation = Evaluation(
-            run or name.replace(".", "-").replace(":", "-"),
-            agent,
-            options,
-            Selection(splits, settings, modalities, chosen, limit, seed, protocol or ""),
-            _sensors(agent, options, view, width, height),
-            config.embodiment,
-            renderer,
-            RetryPolicy(attempts, tolerate=tolerate),
-            requests_per_minute,
-            tell=tuple(tell or ()),
+            run or (preset or name).replace(".", "-").replace(":", "-"), name, given, chosen,
+            _sensors(name, given, view, width, height), config.embodiment, renderer,
+            RetryPolicy(attempts, tolerate=tolerate), requests_per_minute, tell=tuple(tell or ()),
             withheld=submission is not None,
-        )
-    if protocol and (less := sample_shortfall(data)):
-        print(f"--protocol {protocol}: {less}", file=sys.stderr)
+        )  # fmt: skip
+    _warn_of_sample(data, protocol)
     if estimate:
         from aerialdojo_gen.benchmark.estimate import estimate as estimate_cost
 
         print("\n".join(estimate_cost(data, evaluation).lines(workers or default_workers())))
         return
     reporter = Reporter(quiet=quiet)
-    try:
-        with _tracebacks(traceback):
-            outcome = run_evaluation(
-                data, evaluation, out=out, workers=workers, executor=executor, address=address,
-                rerun_failed=rerun_failed, restart=restart,
-                limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        print("interrupted: finished episodes are kept, the same command continues from here", file=sys.stderr)
-        raise SystemExit(130) from None
+    with interruptible("finished episodes are kept, the same command continues from here"), _tracebacks(traceback):
+        outcome = run_evaluation(
+            data, evaluation, out=out, workers=workers, executor=executor, address=address,
+            rerun_failed=rerun_failed, restart=restart,
+            limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
+        )  # fmt: skip
     scores = command("report", evaluation.run, log=out, protocol=protocol)
     _tell(outcome, evaluation.run, scores, data, reporter)
     if submission is not None:
@@ -202,6 +182,14 @@ def evaluate(
         known = outcome.successes is not None
         withheld = "" if known else "; the goals are withheld: score it with the whole release"
         reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes{withheld}")
+
+
+def _warn_of_sample(data: str, protocol: str | None) -> None:
+    """Say what a release lacks of the sample that a protocol asks for."""
+    from aerialdojo_gen.dataset.protocol import sample_shortfall
+
+    if protocol and (less := sample_shortfall(data)):
+        print(f"--protocol {protocol}: {less}", file=sys.stderr)
 
 
 def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
@@ -282,7 +270,7 @@ def train(
     recipe: Annotated[
         Path, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one: imitation, blind, …")
     ],
-    data: Data = "data",
+    data: options.Data = "data",
     small: Annotated[
         bool,
         typer.Option("--small", help="Use the recipe's section [small], with few scenes and epochs, as a first try."),
@@ -309,10 +297,10 @@ def train(
         ),
     ] = None,
     device: Annotated[str, typer.Option("--device", help="auto, cpu or cuda.")] = "auto",
-    renderer: RendererName = "auto",
+    renderer: options.RendererName = "auto",
     restart: Annotated[bool, typer.Option("--restart", help="Delete an earlier training of this name.")] = False,
-    workers: Workers = None,
-    quiet: Quiet = False,
+    workers: options.Workers = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Train a policy by imitation and DAgger; after an interruption the same command continues."""
     from aerialdojo_gen.learning.recipe import load_recipe
@@ -320,11 +308,8 @@ def train(
     from aerialdojo_gen.pipeline.progress import Reporter
 
     chosen = load_recipe(recipe)
-    try:
+    with interruptible("the same command continues from the last checkpoint"):
         run_training(
             data, chosen.reduced() if small else chosen, out=out, cache=cache, init=init, device=device,
             workers=workers, renderer=renderer, restart=restart, reporter=Reporter(quiet=quiet),
         )  # fmt: skip
-    except KeyboardInterrupt:
-        print("interrupted: the same command continues from the last checkpoint", file=sys.stderr)
-        raise SystemExit(130) from None

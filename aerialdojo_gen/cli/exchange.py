@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from aerialdojo_gen.base import cli_context
-from aerialdojo_gen.base.errors import brief
-from aerialdojo_gen.cli.common import Data, Json, Quiet, Scene, Scenes, Workers, merge_scenes
+from aerialdojo_gen.base.errors import UsageError, brief
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import interruptible, merge_scenes, print_json
 
 if TYPE_CHECKING:
     from aerialdojo_gen.store.root import DataRoot
@@ -23,75 +25,115 @@ FOR_TRAINING = ("lerobot", "webdataset")
 SHAPES = ("pointcloud", "occupancy")
 
 
+Format = Annotated[
+    str, typer.Option("--format", help="aerialdojo, habitat, lerobot, webdataset, pointcloud or occupancy.")
+]
+ExportFolder = Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: DATA/exports/FORMAT)")]
+ReplaceExport = Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")]
+PictureSize = Annotated[
+    int | None,
+    typer.Option(help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"),
+]
+Shards = Annotated[
+    bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
+]
+ExportSplit = Annotated[
+    list[str] | None,
+    typer.Option("--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)"),
+]
+ExportLimit = Annotated[
+    int | None,
+    typer.Option(
+        "--limit",
+        min=0,
+        help="Maximum number of trajectories per scene and setting, not in total.  (default: 0, all)",
+    ),
+]
+ExportSeed = Annotated[
+    int | None,
+    typer.Option("--seed", min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)"),
+]
+ExportView = Annotated[
+    list[str] | None, typer.Option("--view", help="front, left, right, down; repeatable.  (default: front)")
+]
+ExportWidth = Annotated[
+    int | None, typer.Option("--width", min=16, max=4096, help="Image width in pixels.  (default: 128)")
+]
+ExportHeight = Annotated[
+    int | None, typer.Option("--height", min=16, max=4096, help="Image height in pixels.  (default: the width)")
+]
+NoDepth = Annotated[bool, typer.Option("--no-depth", help="Export colour images without depth.")]
+GoalKind = Annotated[list[str] | None, typer.Option("--goal", help="text, image; repeatable.  (default: text)")]
+Source = Annotated[
+    str | None,
+    typer.Option(
+        "--source",
+        help="render: render now; recordings: read those of the command render; auto: read where there are.  "
+        "(default: render)",
+    ),
+]
+ExportRenderer = Annotated[str | None, typer.Option("--renderer", help="auto, gl or pybullet.  (default: auto)")]
+JpegQuality = Annotated[
+    int | None,
+    typer.Option("--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG."),
+]
+FlownRun = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--run",
+        help="Export the successful flights of this run of evaluate or fly in place of the references; repeatable.",
+    ),
+]
+PointsPerM2 = Annotated[
+    float | None,
+    typer.Option("--points-per-m2", help="pointcloud: points per square metre of surface.  (default: 20)"),
+]
+VoxelM = Annotated[
+    float | None, typer.Option("--voxel-m", help="occupancy: edge of a voxel in metres.  (default: 0.5)")
+]
+EstimateExport = Annotated[
+    bool,
+    typer.Option("--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing."),
+]
+
+
 @app.command("export")
 def export(
-    form: Annotated[str, typer.Option(
-        "--format", help="aerialdojo, habitat, lerobot, webdataset, pointcloud or occupancy.")],
-    scenes: Scenes = None,
-    data: Data = "data",
-    out: Annotated[Path | None, typer.Option("--out", help="Folder to write.  (default: "
-        "DATA/exports/FORMAT)")] = None,
-    scene: Scene = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an earlier export there.")] = False,
-    picture_size: Annotated[
-        int | None,
-        typer.Option(
-            help="aerialdojo: size of rendered pictures in pixels; 0: those of the release.  (default: 640)"
-        ),
-    ] = None,
-    shards: Annotated[
-        bool, typer.Option("--shards", help="aerialdojo: one tar file per scene instead of one file per trajectory.")
-    ] = False,
-    split: Annotated[list[str] | None, typer.Option(
-        "--split", help="id_train, id_test, ood_train, ood_test, train, test; repeatable.  (default: all)")] = None,
-    setting: Annotated[list[str] | None, typer.Option(
-        "--setting", help="base, standard, long_horizon; repeatable.")] = None,
-    limit: Annotated[int | None, typer.Option(
-        "--limit", min=0, help="Maximum number of trajectories per scene and setting, not in total.  "
-            "(default: 0, all)"
-    )] = None,
-    seed: Annotated[int | None, typer.Option(
-        "--seed", min=0, help="Seed for the selection of trajectories by --limit.  (default: 0)")] = None,
-    view: Annotated[list[str] | None, typer.Option(
-        "--view", help="front, left, right, down; repeatable.  (default: front)")] = None,
-    width: Annotated[int | None, typer.Option(
-        "--width", min=16, max=4096, help="Image width in pixels.  (default: 128)")] = None,
-    height: Annotated[int | None, typer.Option(
-        "--height", min=16, max=4096, help="Image height in pixels.  (default: the width)")] = None,
-    no_depth: Annotated[bool, typer.Option(
-        "--no-depth", help="Export colour images without depth.")] = False,
-    goal: Annotated[list[str] | None, typer.Option(
-        "--goal", help="text, image; repeatable.  (default: text)")] = None,
-    source: Annotated[str | None, typer.Option(
-        "--source", help="render: render now; recordings: read those of the command render; auto: read "
-            "where there are.  "
-        "(default: render)")] = None,
-    renderer: Annotated[str | None, typer.Option(
-        "--renderer", help="auto, gl or pybullet.  (default: auto)")] = None,
-    jpeg_quality: Annotated[int | None, typer.Option(
-        "--jpeg-quality", min=1, max=100, help="webdataset: JPEG quality, instead of lossless PNG.")] = None,
-    run: Annotated[list[str] | None, typer.Option(
-        "--run", help="Export the successful flights of this run of evaluate or fly in place of the references; "
-        "repeatable.")] = None,
-    workers: Workers = None,
-    points_per_m2: Annotated[float | None, typer.Option(
-        "--points-per-m2", help="pointcloud: points per square metre of surface.  (default: 20)")] = None,
-    voxel_m: Annotated[float | None, typer.Option(
-        "--voxel-m", help="occupancy: edge of a voxel in metres.  (default: 0.5)")] = None,
-    estimate: Annotated[bool, typer.Option(
-        "--estimate", help="Measure a few trajectories and estimate time and size for all; write nothing.")] = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-) -> None:  # fmt: skip
+    form: Format,
+    scenes: options.Scenes = None,
+    data: options.Data = "data",
+    out: ExportFolder = None,
+    scene: options.Scene = None,
+    force: ReplaceExport = False,
+    picture_size: PictureSize = None,
+    shards: Shards = False,
+    split: ExportSplit = None,
+    setting: options.Setting = None,
+    limit: ExportLimit = None,
+    seed: ExportSeed = None,
+    view: ExportView = None,
+    width: ExportWidth = None,
+    height: ExportHeight = None,
+    no_depth: NoDepth = False,
+    goal: GoalKind = None,
+    source: Source = None,
+    renderer: ExportRenderer = None,
+    jpeg_quality: JpegQuality = None,
+    run: FlownRun = None,
+    workers: options.Workers = None,
+    points_per_m2: PointsPerM2 = None,
+    voxel_m: VoxelM = None,
+    estimate: EstimateExport = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
     """Write the release in the layout of AerialDojo's authors, as Habitat's ObjectNav-v1, or for training.
 
     lerobot (LeRobotDataset v3) and webdataset (tar shards) contain images and actions of every step; only they
     take the options from --split to --workers, and --estimate. After an interruption the same command continues.
     pointcloud (PLY) and occupancy (NumPy's npz) are of all scenes whose meshes are there, and need no release.
     """
-    from aerialdojo_gen.base.errors import UsageError
     from aerialdojo_gen.base.names import unknown
-    from aerialdojo_gen.cli.common import print_json
     from aerialdojo_gen.exchange.exporting import FORMATS, export_release
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.store.root import LocalRoot, open_root
@@ -102,44 +144,27 @@ def export(
         "depth": False if no_depth else None,
         "size": (width or height or 128, height or width or 128) if width or height else None,
     }  # fmt: skip
-    given = {name: value for name, value in training.items() if value}
-    given |= {name: value for name, value in training.items() if value is not None and not isinstance(value, list)}
+    given = {name: value for name, value in training.items() if value is not None and value != []}
     if form not in (known := (*FORMATS, *FOR_TRAINING, *SHAPES)):
         raise UsageError(unknown("no format", form, known))
-    for name, of, value in (("--points-per-m2", SHAPES[0], points_per_m2), ("--voxel-m", SHAPES[1], voxel_m)):
-        if value is not None and form != of:
-            raise UsageError(f"{name} is for --format {of}, not for {form}")
-    root = open_root(data)
+    _check_fits(form, FOR_TRAINING, {
+        **{_WRITTEN.get(name, f"--{name}"): value for name, value in given.items()},
+        "--estimate": estimate or None, "--workers": workers,
+    })  # fmt: skip
+    _check_fits(form, ("aerialdojo",), {"--picture-size": picture_size, "--shards": shards or None})
+    _check_fits(form, SHAPES[:1], {"--points-per-m2": points_per_m2})
+    _check_fits(form, SHAPES[1:], {"--voxel-m": voxel_m})
+    root, chosen = open_root(data), merge_scenes(scenes, scene)
     if out is None and not isinstance(root, LocalRoot):
         raise UsageError("an export is a folder of this machine: name it with --out")
     target = out or Path(root.at(f"exports/{form}"))
     if form in FOR_TRAINING:
-        if picture_size is not None:
-            raise UsageError("--picture-size is for --format aerialdojo: choose --width and --height here")
-        if shards:
-            raise UsageError("--shards is for --format aerialdojo")
-        _for_training(
-            form,
-            root,
-            target,
-            {**given, "scene": merge_scenes(scenes, scene) or ()},
-            force,
-            workers,
-            estimate,
-            as_json,
-            quiet,
-        )
+        _for_training(form, root, target, {**given, "scene": chosen or ()}, force, workers, estimate, as_json, quiet)
         return
-    if given or estimate or workers is not None:
-        names = _options(given, estimate, workers)
-        verb = "is" if len(names) == 1 else "are"
-        raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(FOR_TRAINING)}, not for {form}")
-    chosen, reporter = merge_scenes(scenes, scene), Reporter(quiet=quiet or as_json)
+    reporter = Reporter(quiet=quiet or as_json)
     if form in SHAPES:
         from aerialdojo_gen.exchange.shape_export import POINTS_PER_M2, VOXEL_M, export_shapes
 
-        if picture_size is not None or shards:
-            raise UsageError("--picture-size and --shards are for --format aerialdojo")
         counts = export_shapes(
             form, root, target, chosen, force=force, reporter=reporter,
             points_per_m2=POINTS_PER_M2 if points_per_m2 is None else points_per_m2,
@@ -149,8 +174,24 @@ def export(
         counts = export_release(
             form, root, target, chosen, force=force, picture_px=picture_size, shards=shards, reporter=reporter
         )
+    _print_export(target, counts, {}, as_json, quiet)
+
+
+# Options by the parameters of `export_options`, where a dash before the name does not do.
+_WRITTEN = {"views": "--view", "size": "--width", "depth": "--no-depth", "jpeg_quality": "--jpeg-quality"}
+
+
+def _check_fits(form: str, formats: Sequence[str], given: dict[str, object]) -> None:
+    """Refuse options of other formats; None is what was not given."""
+    names = [name for name, value in given.items() if value is not None]
+    if names and form not in formats:
+        verb = "is" if len(names) == 1 else "are"
+        raise UsageError(f"{', '.join(names)} {verb} for --format {' and '.join(formats)}, not for {form}")
+
+
+def _print_export(target: Path, counts: dict[str, int], more: dict[str, Any], as_json: bool, quiet: bool) -> None:
     if as_json:
-        print_json({"path": str(target), **counts})
+        print_json({"path": str(target), **(more or counts)})
     elif not quiet:
         print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in counts.items()))
 
@@ -159,20 +200,17 @@ def _for_training(
     form: str,
     root: DataRoot,
     target: Path,
-    options: dict[str, Any],
+    chosen: dict[str, Any],
     force: bool,
     workers: int | None,
     estimate: bool,
     as_json: bool,
     quiet: bool,
 ) -> None:
-    from dataclasses import asdict
-
-    from aerialdojo_gen.cli.common import print_json
     from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, export_options
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    request = export_options(**options)
+    request = export_options(**chosen)
     if estimate:
         estimated = estimate_for_learning(form, root, request, workers)
         if as_json:
@@ -180,32 +218,18 @@ def _for_training(
         else:
             print(estimated)
         return
-    try:
+    with interruptible("finished parts are kept, the same command continues from here"):
         made = export_for_learning(
             form, root, target, request, force=force, workers=workers, reporter=Reporter(quiet=quiet)
         )
-    except KeyboardInterrupt:
-        # Said here because Typer turns Ctrl-C into a silent exit.
-        print("interrupted: finished parts are kept, the same command continues from here", file=sys.stderr)
-        raise SystemExit(130) from None
-    if as_json:
-        print_json({"path": str(target), **asdict(made)})
-    elif not quiet:
-        print(f"{target}: " + ", ".join(f"{n:,} {name}" for name, n in made.counts.items()))
-
-
-def _options(given: dict[str, Any], estimate: bool, workers: int | None) -> list[str]:
-    """Name the options that were given as they are written."""
-    written = {"views": "--view", "size": "--width", "depth": "--no-depth", "jpeg_quality": "--jpeg-quality"}
-    names = [written.get(name, f"--{name}") for name in given]
-    return [*names, *(["--estimate"] if estimate else []), *(["--workers"] if workers is not None else [])]
+    _print_export(target, made.counts, asdict(made), as_json, quiet)
 
 
 @app.command("import-benchmark")
 def import_benchmark(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Task files; aerialdojo: also a folder.")],
     form: Annotated[str, typer.Option("--format", help="aerialdojo, uav-on, cityavos, aerialvln or openfly.")],
-    data: Data = "data",
+    data: options.Data = "data",
     frame: Annotated[
         str | None,
         typer.Option(help="Axes of cityavos and openfly: enu, nwu, ned or esd (east, south, down)."),
@@ -237,7 +261,7 @@ Repo = Annotated[str, typer.Argument(metavar="USER/NAME", help="Dataset on the H
 @app.command("push-to-hub")
 def push_to_hub(
     repo: Repo,
-    data: Data = "data",
+    data: options.Data = "data",
     private: Annotated[bool, typer.Option("--private", help="If the dataset is new, make it private.")] = False,
     revision: Annotated[str | None, typer.Option("--revision", help="Branch to write to.  (default: main)")] = None,
     meshes: Annotated[bool, typer.Option("--meshes", help="Upload scene meshes too; evaluate needs them.")] = False,
@@ -247,7 +271,7 @@ def push_to_hub(
             "--policy", metavar="NAME", help="Upload the weights of this training too, such as imitation; repeatable."
         ),
     ] = None,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Upload the release to the Hugging Face Hub, with its card as README; the token is HF_TOKEN."""
     from aerialdojo_gen.exchange import hub
@@ -263,7 +287,7 @@ def push_to_hub(
 @app.command("pull")
 def pull(
     repo: Repo,
-    data: Data = "data",
+    data: options.Data = "data",
     revision: Annotated[
         str | None, typer.Option("--revision", help="Branch, tag or commit.  (default: main)")
     ] = None,
@@ -273,7 +297,7 @@ def pull(
     replace: Annotated[
         bool, typer.Option("--replace", help="Overwrite the release and meshes in --data; they are deleted.")
     ] = False,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Download a release from the Hugging Face Hub and check it; after a failure the same command continues."""
     from aerialdojo_gen.exchange import hub

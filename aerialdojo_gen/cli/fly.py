@@ -7,24 +7,8 @@ from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.cli.common import (
-    Data,
-    Modality,
-    Out,
-    PipelineFile,
-    Protocol,
-    RendererName,
-    Scene,
-    Scenes,
-    SelectionSeed,
-    Setting,
-    Split,
-    SubmissionFile,
-    TaskLimit,
-    Tell,
-    merge_scenes,
-    open_pipeline,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import merge_scenes, open_pipeline, selection
 
 app = typer.Typer()
 
@@ -35,41 +19,42 @@ def fly(
         str,
         typer.Option("--name", help="The pilot's name in the tables: small letters, digits and -; any name does."),
     ],
-    scenes: Scenes = None,
-    data: Data = "data",
+    scenes: options.Scenes = None,
+    data: options.Data = "data",
     run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: human-NAME)")] = None,
-    split: Split = None,
-    setting: Setting = None,
-    modality: Modality = None,
-    protocol: Protocol = None,
-    scene: Scene = None,
-    limit: TaskLimit = None,
-    seed: SelectionSeed = 0,
-    renderer: RendererName = "auto",
-    tell: Tell = None,
-    out: Out = None,
-    submission: SubmissionFile = None,
+    split: options.Split = None,
+    setting: options.Setting = None,
+    modality: options.Modality = None,
+    protocol: options.Protocol = None,
+    scene: options.Scene = None,
+    limit: options.TaskLimit = None,
+    seed: options.SelectionSeed = 0,
+    renderer: options.RendererName = "auto",
+    tell: options.Tell = None,
+    out: options.Out = None,
+    submission: options.SubmissionFile = None,
     restart: Annotated[bool, typer.Option("--restart", help="Delete the run's earlier flights.")] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
-    pipeline: PipelineFile = None,
+    port: options.Port = 0,
+    browser: options.Browser = True,
+    pipeline: options.PipelineFile = None,
 ) -> None:
     """Fly released tasks yourself in the browser; finished flights are kept, as episodes of human:NAME."""
     from aerialdojo_gen.studio.web.serving import require_web
 
     require_web()
     from aerialdojo_gen.benchmark.evaluation import Evaluation
-    from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.studio.fly.server import serve_session
     from aerialdojo_gen.studio.fly.session import agent_name
 
     config, _ = open_pipeline(pipeline, data, reads=True)
-    splits, settings, modalities = (tuple(names or ()) for names in (split, setting, modality))
-    chosen = tuple(merge_scenes(scenes, scene) or ())
+    chosen = selection(
+        merge_scenes(scenes, scene), split=split, setting=setting, modality=modality, protocol=protocol,
+        limit=limit, seed=seed,
+    )  # fmt: skip
     evaluation = Evaluation(
         run or f"human-{name}",
         agent_name(name),
-        selection=Selection(splits, settings, modalities, chosen, limit, seed, protocol or ""),
+        selection=chosen,
         embodiment=config.embodiment,
         renderer=renderer,
         tell=tuple(tell or ()),

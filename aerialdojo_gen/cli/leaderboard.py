@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aerialdojo_gen.cli.common import (
-    Data,
-    Modality,
-    PipelineFile,
-    Protocol,
-    Quiet,
-    Scene,
-    SelectionSeed,
-    Setting,
-    TaskLimit,
-    Workers,
-    open_pipeline,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import interruptible, open_pipeline, selection
 
 app = typer.Typer()
 
@@ -30,7 +18,7 @@ _FOLDER = Path("scored")
 @app.command("score")
 def score(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Submission, as evaluate --submission writes it.")],
-    data: Data = "data",
+    data: options.Data = "data",
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder of scored runs.")] = _FOLDER,
     name: Annotated[
         str | None, typer.Option("--name", help="Name of the scored run.  (default: that of the submission)")
@@ -41,40 +29,37 @@ def score(
             "--split", help="Splits that must have been flown, as for evaluate; repeatable.  (default: test)"
         ),
     ] = None,
-    setting: Setting = None,
-    modality: Modality = None,
-    protocol: Protocol = None,
-    scene: Scene = None,
-    limit: TaskLimit = None,
-    seed: SelectionSeed = 0,
+    setting: options.Setting = None,
+    modality: options.Modality = None,
+    protocol: options.Protocol = None,
+    scene: options.Scene = None,
+    limit: options.TaskLimit = None,
+    seed: options.SelectionSeed = 0,
     adapted: Annotated[
         bool,
         typer.Option("--adapted", help="The agent was trained on tasks of OOD scenes: list its OOD scores apart."),
     ] = False,
     replace: Annotated[bool, typer.Option("--replace", help="Overwrite a scored run of this name.")] = False,
-    workers: Workers = None,
-    pipeline: PipelineFile = None,
-    quiet: Quiet = False,
+    workers: options.Workers = None,
+    pipeline: options.PipelineFile = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Replay a submission against the release, and add its scores to a folder; refuse it where it does not replay."""
     from aerialdojo_gen.benchmark import scoring
     from aerialdojo_gen.benchmark.metrics import MEASURES
     from aerialdojo_gen.benchmark.tables import text
-    from aerialdojo_gen.benchmark.tasks import Selection
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
-    settings, modalities, scenes = (tuple(names or ()) for names in (setting, modality, scene))
+    chosen = selection(
+        scene, split=split or ["test"], setting=setting, modality=modality, protocol=protocol, limit=limit, seed=seed
+    )
     reporter = Reporter(quiet=quiet)
-    try:
-        selection = Selection(tuple(split or ("test",)), settings, modalities, scenes, limit, seed, protocol or "")
+    with interruptible(f"{into} is as it was"):
         card = scoring.score(
-            data, file, into, selection=selection, embodiment=config.embodiment, name=name, adapted=adapted,
+            data, file, into, selection=chosen, embodiment=config.embodiment, name=name, adapted=adapted,
             replace=replace, workers=workers, reporter=reporter,
         )  # fmt: skip
-    except KeyboardInterrupt:
-        print(f"interrupted: {into} is as it was", file=sys.stderr)
-        raise SystemExit(130) from None
     whole = card.rows[0]
     known = {
         MEASURES[metric].head[:-2]: text(metric, value) for metric, value in whole.mean.items() if value is not None

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.base import cli_context
-from aerialdojo_gen.cli.common import Quiet, Workers
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import print_scene
 
 if TYPE_CHECKING:
     from aerialdojo_gen.imports.places import AddedPlace
@@ -101,8 +102,8 @@ def vary(
         bool, typer.Option("--held-out", help="Use the topologies, palettes and things that no other world has.")
     ] = False,
     objects: Annotated[int, typer.Option(min=2, max=500, help="Maximum annotated objects of a world.")] = 40,
-    workers: Workers = None,
-    quiet: Quiet = False,
+    workers: options.Workers = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Make worlds of a scene type from seeds: plans to read and edit, with annotations."""
     from aerialdojo_gen.dataset.build import default_workers
@@ -149,13 +150,7 @@ def _box(text: str) -> tuple[float, float, float, float]:
 
 def _print_scenes(added: list[AddedPlace], project: Path) -> None:
     for place in added:
-        size = place.scene.bounds[1] - place.scene.bounds[0]
-        print(
-            f"{place.name}: {len(place.scene.instances):,} instances, {place.scene.n_triangles:,} triangles, "
-            f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {place.scene.ceiling_m:.0f} m"
-        )
-        for line in place.notes:
-            print(f"  {line}")
+        print_scene(place.scene, place.notes)
     first = added[0]
     print(f"next: {cli_context.command('annotate-draft', first.name, pipeline=first.pipeline)}")
     print(f"then: {cli_context.command('run', first.pipeline, data=project / 'data')}")

@@ -11,17 +11,8 @@ import typer
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width
-from aerialdojo_gen.cli.common import (
-    Data,
-    Json,
-    PipelineFile,
-    Scene,
-    Scenes,
-    json_text,
-    merge_scenes,
-    open_pipeline,
-    print_json,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import json_text, merge_scenes, open_pipeline, print_json
 
 if TYPE_CHECKING:
     from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
@@ -32,7 +23,8 @@ app = typer.Typer()
 
 @app.command("stats")
 def stats(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None,
     pool: Annotated[bool, typer.Option("--pool", help="Show the candidates that filter kept instead of the "
         "release.")] = False,
     markdown: Annotated[Path | None, typer.Option("--markdown", help="Write the tables to this Markdown "
@@ -42,7 +34,7 @@ def stats(
     figures: Annotated[
         Path | None, typer.Option("--figures", help="Write figures to this folder, as PNG and SVG.")
     ] = None,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:  # fmt: skip
     """Compare the release with the paper's tables; without a release, show what filter kept."""
     from aerialdojo_gen.dataset.contents import files_there, no_release, scenes_in_release, scenes_there
@@ -116,11 +108,11 @@ def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Lis
 @app.command("show")
 def show(
     task_id: Annotated[str, typer.Argument(metavar="TASK_ID", help="A task_id or a nav_id of the release.")],
-    data: Data = "data",
+    data: options.Data = "data",
     out: Annotated[Path | None, typer.Option(help="PNG to write.  (default: TASK_ID.png)")] = None,
     html: Annotated[Path | None, typer.Option(help="HTML page to write, in one file.")] = None,
     frames: Annotated[int, typer.Option(min=0, max=12, help="Number of front views along the route.")] = 5,
-    as_json: Json = False,
+    as_json: options.Json = False,
 ) -> None:
     """Draw one task: goal, route in its scene, clearance, reference image, views along the route."""
     from aerialdojo_gen.base.text_table import facts, terminal_width
@@ -147,11 +139,11 @@ def show(
 
 @app.command("view")
 def view(
-    scenes: Scenes = None,
-    data: Data = "data",
-    scene: Scene = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    scenes: options.Scenes = None,
+    data: options.Data = "data",
+    scene: options.Scene = None,
+    port: options.Port = 0,
+    browser: options.Browser = True,
 ) -> None:
     """Browse the release in the browser: its scenes and tasks, each scene in 3D with objects and routes."""
     from aerialdojo_gen.studio.web.serving import open_socket, require_web, serve, url_of

@@ -11,25 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.cli.common import (
-    Address,
-    Data,
-    ExecutorName,
-    Force,
-    Json,
-    PipelineFile,
-    Quiet,
-    Replace,
-    Scene,
-    Scenes,
-    Verbose,
-    Workers,
-    default_workers,
-    merge_scenes,
-    open_pipeline,
-    print_json,
-    run_until,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import default_workers, merge_scenes, open_pipeline, print_json, run_until
 from aerialdojo_gen.pipeline.registry import BY_NAME
 
 if TYPE_CHECKING:
@@ -42,9 +25,9 @@ _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 
 @app.command("render", help=BY_NAME["render"].help)
 def render(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
-    replace: Replace = False,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
+    quiet: options.Quiet = False, verbose: options.Verbose = False, replace: options.Replace = False,
     split: Annotated[str | None, typer.Option(
         "--split", help="train, test, all, id_train, id_test, ood_train or ood_test.")] = None,
     limit: Annotated[int | None, typer.Option(
@@ -74,8 +57,8 @@ def render(
     prune: Annotated[bool, typer.Option(
         "--prune", help="Remove the recordings of trajectories that the release no longer has, and record nothing."
     )] = False,
-    as_json: Json = False,
-    executor: ExecutorName = "local", address: Address = None,
+    as_json: options.Json = False,
+    executor: options.ExecutorName = "local", address: options.Address = None,
 ) -> None:  # fmt: skip
     """Record four RGB-D views along trajectories of the release."""
     from aerialdojo_gen.pipeline.options import RunLimits, RunOptions

@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width, wrapped
-from aerialdojo_gen.cli.common import Data, Json, Protocol
+from aerialdojo_gen.cli import options
 
 app = typer.Typer()
 
@@ -35,63 +35,83 @@ class _Command(TyperCommand):
         return super().parse_args(ctx, spread)
 
 
+Runs = Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")]
+Log = Annotated[
+    str | None,
+    typer.Option(
+        "--log", metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the data directory)"
+    ),
+]
+Profile = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--profile",
+        help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, openfly.  "
+        "(default: the first two)",
+    ),
+]
+Tables = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--table",
+        help="Print these tables, repeatable: overall, results, partition, family, averages, setting, goal, "
+        "modality, radius, visits, difficulty, seen, conduct, type, scene, all.",
+    ),
+]
+Radius = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--radius",
+        min=0.0,
+        help="Success radii in metres for the radius table: --radius 1 3 5 10.  (default: 3 5)",
+    ),
+]
+Beside = Annotated[
+    Literal["paper"] | None,
+    typer.Option("--beside", help="paper: add the paper's own results, from its simulator."),
+]
+Paired = Annotated[bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")]
+Group = Annotated[
+    list[str] | None,
+    typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group closed=gpt."),
+]
+Intervals = Annotated[bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")]
+Floors = Annotated[
+    bool,
+    typer.Option("--floors/--no-floors", help="Add the baselines stop, constant, random if they did the same tasks."),
+]
+Style = Annotated[
+    Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
+]
+ByScene = Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")]
+ReportFolder = Annotated[
+    Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
+]
+Replays = Annotated[int, typer.Option("--replays", min=0, max=50, help="Number of tasks that report.html replays.")]
+Frames = Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")]
+
+
 @app.command("report", cls=_Command)
 def report(
-    runs: Annotated[list[str] | None, typer.Argument(help="Runs of evaluate.  (default: all)")] = None,
-    data: Data = "data",
-    log: Annotated[
-        str | None,
-        typer.Option("--log", metavar="DIR|URL", help="Where evaluate wrote its log (--out).  (default: the "
-            "data directory)"),
-    ] = None,
-    profile: Annotated[
-        list[str] | None,
-        typer.Option("--profile", help="Success rule, repeatable: aerialdojo, aerialdojo-5m, uav-on, aerialvln, "
-                                       "openfly.  (default: the first two)"),
-    ] = None,
-    table: Annotated[
-        list[str] | None,
-        typer.Option("--table", help="Print these tables, repeatable: overall, results, partition, family, averages, "
-                                     "setting, goal, modality, radius, visits, difficulty, seen, conduct, type, "
-                                     "scene, all."),
-    ] = None,
-    radius: Annotated[
-        list[float] | None,
-        typer.Option("--radius", min=0.0, help="Success radii in metres for the radius table: --radius 1 3 "
-            "5 10.  (default: 3 5)"),
-    ] = None,
-    protocol: Protocol = None,
-    beside: Annotated[
-        Literal["paper"] | None, typer.Option("--beside", help="paper: add the paper's own results, from "
-            "its simulator.")
-    ] = None,
-    paired: Annotated[
-        bool, typer.Option("--paired", help="Compare two runs on the tasks that both have done.")
-    ] = False,
-    group: Annotated[
-        list[str] | None,
-        typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group "
-            "closed=gpt."),
-    ] = None,
-    intervals: Annotated[
-        bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")
-    ] = True,
-    floors: Annotated[
-        bool, typer.Option("--floors/--no-floors", help="Add the baselines stop, constant, random if they "
-            "did the same tasks.")
-    ] = True,
-    style: Annotated[
-        Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
-    ] = "terminal",
-    as_json: Json = False,
-    by_scene: Annotated[bool, typer.Option("--by-scene", help="Print the table by scene too.")] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for report.html, tables, figures and metrics.csv.")
-    ] = None,
-    replays: Annotated[int, typer.Option("--replays", min=0, max=50, help="Number of tasks that report.html "
-        "replays.")] = 4,
-    frames: Annotated[bool, typer.Option("--frames", help="Render front views for the replays.")] = False,
-) -> None:  # fmt: skip
+    runs: Runs = None,
+    data: options.Data = "data",
+    log: Log = None,
+    profile: Profile = None,
+    table: Tables = None,
+    radius: Radius = None,
+    protocol: options.Protocol = None,
+    beside: Beside = None,
+    paired: Paired = False,
+    group: Group = None,
+    intervals: Intervals = True,
+    floors: Floors = True,
+    style: Style = "terminal",
+    as_json: options.Json = False,
+    by_scene: ByScene = False,
+    out: ReportFolder = None,
+    replays: Replays = 4,
+    frames: Frames = False,
+) -> None:
     """Score runs of evaluate: SR, SR-view, OSR, SPL, DTS and CR as tables, figures or a page."""
     from aerialdojo_gen.base.paper_figures import results
     from aerialdojo_gen.benchmark import registry, score_rows

@@ -13,19 +13,8 @@ from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
-from aerialdojo_gen.cli.common import (
-    Data,
-    OneScene,
-    PipelineFile,
-    Quiet,
-    Scene,
-    SceneOption,
-    Scenes,
-    key_values,
-    merge_scenes,
-    open_pipeline,
-    pipeline_file,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import key_values, merge_scenes, open_pipeline, pipeline_file, print_scene
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
@@ -108,14 +97,7 @@ def add_scene(
 
 
 def _describe(added: AddedScene) -> None:
-    scene = added.scene
-    size = scene.bounds[1] - scene.bounds[0]
-    print(
-        f"{scene.name}: {len(scene.instances):,} instances, {scene.n_triangles:,} triangles, "
-        f"{size[0]:.0f} x {size[1]:.0f} m, ceiling {scene.ceiling_m:.0f} m"
-    )
-    for line in added.repairs.lines:
-        print(f"  {line}")
+    print_scene(added.scene, added.repairs.lines)
 
 
 Rewrite = Annotated[
@@ -136,8 +118,8 @@ MaxCost = Annotated[float | None, typer.Option(min=0, help="Ask --rewrite no mor
 
 @app.command("annotate-draft")
 def annotate_draft(
-    name: OneScene = None,
-    scene: SceneOption = None,
+    name: options.OneScene = None,
+    scene: options.SceneOption = None,
     landmarks: Annotated[
         int | None, typer.Option(min=1, help="Number of landmarks.  (default: the paper's, else 1 or 2)")
     ] = None,
@@ -170,14 +152,14 @@ def annotate_draft(
     ] = None,
     landmark: Annotated[list[str] | None, typer.Option(help="Node to use as a landmark; repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed; the same seed gives the same draft.")] = 0,
-    pipeline: PipelineFile = None,
+    pipeline: options.PipelineFile = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     rewrite: Rewrite = None,
     option: ModelOption = None,
     yes: Yes = False,
     max_tokens: MaxTokens = None,
     max_cost: MaxCost = None,
-    quiet: Quiet = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Draft a scene's annotations, for you to check and commit."""
     from aerialdojo_gen.annotations.draft import DraftOptions
@@ -228,15 +210,15 @@ def _writer(protocol: str, option: list[str], max_cost: float | None) -> Languag
 
 @app.command("gallery")
 def gallery(
-    scenes: Scenes = None,
+    scenes: options.Scenes = None,
     out: Annotated[Path, typer.Option("--out", help="Folder for the pictures.")] = Path("docs/gallery"),
-    scene: Scene = None, pipeline: PipelineFile = None,
+    scene: options.Scene = None, pipeline: options.PipelineFile = None,
     props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
     kit: Annotated[bool, typer.Option("--kit", help="Draw the builders that plans call instead.")] = False,
     references: Annotated[bool, typer.Option(
         "--references", help="Draw the objects' reference images with their descriptions instead.")] = False,
-    data: Data = "data",
+    data: options.Data = "data",
 ) -> None:  # fmt: skip
     """Draw every prop and every scene as contact sheets."""
     scene = merge_scenes(scenes, scene)
@@ -325,15 +307,15 @@ def _listed(names: Sequence[str], columns: int = 3) -> list[str]:
 
 @app.command("annotate")
 def annotate(
-    name: OneScene = None,
-    data: Data = "data",
-    scene: SceneOption = None,
-    pipeline: PipelineFile = None,
+    name: options.OneScene = None,
+    data: options.Data = "data",
+    scene: options.SceneOption = None,
+    pipeline: options.PipelineFile = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.  (default: a free one)")] = 0,
     host: Annotated[
         str, typer.Option(help="IPv4 address to listen on; except on loopback, visitors need a token.")
     ] = "127.0.0.1",
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    browser: options.Browser = True,
     coco: Annotated[
         Path | None, typer.Option("--coco", help="Write boxes and pictures to this COCO archive (ZIP) and exit.")
     ] = None,

@@ -11,26 +11,8 @@ import typer
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width
-from aerialdojo_gen.cli.common import (
-    Address,
-    Data,
-    ExecutorName,
-    Force,
-    Json,
-    PipelineArgument,
-    PipelineFile,
-    Quiet,
-    Replace,
-    Scene,
-    Scenes,
-    Verbose,
-    Workers,
-    merge_scenes,
-    open_pipeline,
-    print_json,
-    run_chosen,
-    run_until,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import merge_scenes, open_pipeline, print_json, run_chosen, run_until
 from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 
@@ -42,9 +24,10 @@ _WITH_OPTIONS = ("build-scenes", "plan", "split", "render")
 
 def _stage_command(name: str) -> Callable[..., None]:
     def command(
-        scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-        workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
-        executor: ExecutorName = "local", address: Address = None,
+        scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+        pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
+        quiet: options.Quiet = False, verbose: options.Verbose = False,
+        executor: options.ExecutorName = "local", address: options.Address = None,
     ) -> None:  # fmt: skip
         run_until(
             name, data=data, scene=merge_scenes(scenes, scene), pipeline=pipeline, force=force, quiet=quiet,
@@ -61,14 +44,15 @@ for _stage in STAGES:
 
 @app.command("build-scenes", help=BY_NAME["build-scenes"].help)
 def build_scenes(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
-    executor: ExecutorName = "local", address: Address = None,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
+    quiet: options.Quiet = False, verbose: options.Verbose = False,
+    executor: options.ExecutorName = "local", address: options.Address = None,
     watch: Annotated[
         Path | None, typer.Option("--watch", help="Show this plan in the browser, built again when it is saved.")
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    port: options.Port = 0,
+    browser: options.Browser = True,
 ) -> None:  # fmt: skip
     """Build meshes from plans."""
     if watch is not None:
@@ -96,12 +80,13 @@ def _watch(plan: Path, pipeline: Path | None, port: int, browser: bool) -> None:
 
 @app.command("plan", help=BY_NAME["plan"].help)
 def plan(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
+    quiet: options.Quiet = False, verbose: options.Verbose = False,
     every: Annotated[
         bool, typer.Option("--all", help="Plan all candidates, including those that the release does not need.")
     ] = False,
-    executor: ExecutorName = "local", address: Address = None,
+    executor: options.ExecutorName = "local", address: options.Address = None,
 ) -> None:  # fmt: skip
     """Plan reference trajectories, with what they need upstream."""
     run_until(
@@ -112,10 +97,10 @@ def plan(
 
 @app.command("split", help=BY_NAME["split"].help)
 def split(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
-    replace: Replace = False,
-    executor: ExecutorName = "local", address: Address = None,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None, workers: options.Workers = None, force: options.Force = False,
+    quiet: options.Quiet = False, verbose: options.Verbose = False, replace: options.Replace = False,
+    executor: options.ExecutorName = "local", address: options.Address = None,
 ) -> None:  # fmt: skip
     """Write the release, with what it needs upstream."""
     run_until(
@@ -126,8 +111,8 @@ def split(
 
 @app.command("status")
 def status(
-    scenes: Scenes = None, data: Data = "data", scene: Scene = None, pipeline: PipelineFile = None,
-    as_json: Json = False,
+    scenes: options.Scenes = None, data: options.Data = "data", scene: options.Scene = None,
+    pipeline: options.PipelineFile = None, as_json: options.Json = False,
 ) -> None:  # fmt: skip
     """Say which scenes of each stage are fresh, stale or missing; run and write nothing."""
     from aerialdojo_gen.dataset.status import pipeline_status, status_table
@@ -141,12 +126,11 @@ def status(
 
 @app.command("run")
 def run(
-    pipeline: PipelineArgument, scenes: Scenes = None,
-    data: Data = "data", scene: Scene = None,
-    workers: Workers = None, force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
-    replace: Replace = False,
+    pipeline: options.PipelineArgument, scenes: options.Scenes = None, data: options.Data = "data",
+    scene: options.Scene = None, workers: options.Workers = None, force: options.Force = False,
+    quiet: options.Quiet = False, verbose: options.Verbose = False, replace: options.Replace = False,
     stats: Annotated[bool, typer.Option("--stats", help="Print the tables of stats at the end.")] = False,
-    executor: ExecutorName = "local", address: Address = None,
+    executor: options.ExecutorName = "local", address: options.Address = None,
 ) -> None:  # fmt: skip
     """Run a pipeline's stages, from recipes and annotations to the release."""
     from aerialdojo_gen.pipeline.runner import stages_named

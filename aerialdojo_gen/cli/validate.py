@@ -11,20 +11,8 @@ import typer
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.cli.common import (
-    Address,
-    ExecutorName,
-    Json,
-    PipelineFile,
-    Quiet,
-    Scene,
-    Scenes,
-    Workers,
-    merge_scenes,
-    pipeline_file,
-    print_json,
-    remember_option,
-)
+from aerialdojo_gen.cli import options
+from aerialdojo_gen.cli.common import merge_scenes, pipeline_file, print_json
 
 if TYPE_CHECKING:
     from aerialdojo_gen.dataset.validate.parts import Release
@@ -34,51 +22,65 @@ app = typer.Typer()
 _MANY_DIGITS = 10
 
 
+CheckedData = Annotated[
+    str,
+    typer.Option(
+        "--data",
+        metavar="DIR|URL",
+        envvar="AERIALDOJO_DATA",
+        callback=options.remember_option,
+        help="Data directory or s3://bucket/prefix; its release is checked.",
+    ),
+]
+Elsewhere = Annotated[
+    str | None,
+    typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
+]
+Sample = Annotated[
+    int | None,
+    typer.Option("--sample", min=0, help="Number of routes per scene to check again with FCL.  (default: all)"),
+]
+Pictures = Annotated[
+    str,
+    typer.Option(
+        "--pictures", metavar="N|all", help="Number of reference images per scene to render again and compare."
+    ),
+]
+Meshes = Annotated[
+    Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ next to the release)")
+]
+NoMeshes = Annotated[
+    bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
+]
+Report = Annotated[
+    Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
+]
+MaxFaults = Annotated[int, typer.Option("--max-faults", min=0, help="Maximum number of faults printed per check.")]
+LineACheck = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
+]
+
+
 @app.command("validate")
 def validate(
-    scenes: Scenes = None,
-    data: Annotated[
-        str,
-        typer.Option(
-            "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
-            help="Data directory or s3://bucket/prefix; its release is checked.",
-        ),
-    ] = "data",
-    elsewhere: Annotated[
-        str | None,
-        typer.Option("--release", metavar="DIR|URL", help="Another release to check.  (default: the one in --data)"),
-    ] = None,
-    scene: Scene = None,
-    sample: Annotated[
-        int | None, typer.Option("--sample", min=0, help="Number of routes per scene to check again with "
-            "FCL.  (default: all)")
-    ] = None,
-    pictures: Annotated[
-        str, typer.Option("--pictures", metavar="N|all", help="Number of reference images per scene to "
-            "render again and compare.")
-    ] = "all",
-    meshes: Annotated[
-        Path | None, typer.Option("--meshes", help="Folder of the meshes.  (default: meshes/ next to the release)")
-    ] = None,
-    no_meshes: Annotated[
-        bool, typer.Option("--no-meshes", help="Skip the checks that need meshes; they are reported as not checked.")
-    ] = False,
-    report: Annotated[
-        Path | None, typer.Option("--report", help="Write every fault to a .jsonl, .json, .csv or .parquet file.")
-    ] = None,
-    max_faults: Annotated[
-        int, typer.Option("--max-faults", min=0, help="Maximum number of faults printed per check.")
-    ] = 10,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Print one line per check instead of one per table.")
-    ] = False,
-    pipeline: PipelineFile = None,
-    workers: Workers = None,
-    executor: ExecutorName = "local",
-    address: Address = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:  # fmt: skip
+    scenes: options.Scenes = None,
+    data: CheckedData = "data",
+    elsewhere: Elsewhere = None,
+    scene: options.Scene = None,
+    sample: Sample = None,
+    pictures: Pictures = "all",
+    meshes: Meshes = None,
+    no_meshes: NoMeshes = False,
+    report: Report = None,
+    max_faults: MaxFaults = 10,
+    verbose: LineACheck = False,
+    pipeline: options.PipelineFile = None,
+    workers: options.Workers = None,
+    executor: options.ExecutorName = "local",
+    address: options.Address = None,
+    quiet: options.Quiet = False,
+    as_json: options.Json = False,
+) -> None:
     """Check a release independently, from its Parquet files and meshes, and name every faulty row."""
     from aerialdojo_gen.base.config.pipeline import load_pipeline
     from aerialdojo_gen.base.errors import UsageError
@@ -102,7 +104,7 @@ def validate(
     definitions = load_pipeline(pipeline_file(file))
     if definitions.scene_assets is None:
         definitions = definitions.model_copy(update={"scene_assets": home() / "scene_assets"})
-    options = validation.ValidationOptions(
+    requested = validation.ValidationOptions(
         release=release,
         scenes=tuple(merge_scenes(scenes, scene) or ()),
         meshes=meshes.absolute() if meshes else None,
@@ -114,11 +116,10 @@ def validate(
     reporter = Reporter(quiet=quiet)
     names = pipeline_names(release.root, release.folder)
     if names and definitions.name not in names:
-        reporter.line(
-            f"not the pipeline of the release, which is --pipeline {' or '.join(names)}: {definitions.name}"
-        )
+        is_of = f"which is --pipeline {' or '.join(names)}: {definitions.name}"
+        reporter.line(f"not the pipeline of the release, {is_of}")
     _name_orphans(release, reporter)
-    found = validation.validate(options, workers=workers, executor=executor, address=address, reporter=reporter)
+    found = validation.validate(requested, workers=workers, executor=executor, address=address, reporter=reporter)
     if report is not None:
         validation.write_report(found.faults, report)
     if as_json:

@@ -188,7 +188,7 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(tmp_path):
         (["--format", "pointcloud", "--force", "--voxel-m", "1"], "--voxel-m is for --format occupancy"),
         (["--format", "habitat", "--points-per-m2", "1"], "--points-per-m2 is for --format pointcloud"),
         (["--format", "occupancy", "--force", "--limit", "1"], "--limit is for --format lerobot and webdataset"),
-        (["--format", "occupancy", "--force", "--shards"], "are for --format aerialdojo"),
+        (["--format", "occupancy", "--force", "--shards"], "--shards is for --format aerialdojo"),
         (["--format", "pointcloud", "--force", "--points-per-m2", "0"], "is above 0, not 0"),
         (["--format", "pointcloud", "--force", "--points-per-m2", "1e6"], "more than 50,000,000"),
         (["--format", "occupancy", "--force", "--voxel-m", "nan"], "is 0.05 to 5 metres, not nan"),

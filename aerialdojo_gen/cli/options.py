@@ -1,0 +1,138 @@
+"""The options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from aerialdojo_gen.base import cli_context
+from aerialdojo_gen.cli import completion
+from aerialdojo_gen.dataset.build import DEFAULT_PIPELINE
+
+
+def remember_option(ctx: typer.Context, param: typer.CallbackParam, value: Any) -> Any:
+    """Keep the options of the command line (not the environment's) for commands in messages."""
+    source = ctx.get_parameter_source(str(param.name))
+    if source is not None and source.name == "COMMANDLINE":
+        cli_context.update_context(**{str(param.name): value})
+    return value
+
+
+Data = Annotated[
+    str,
+    typer.Option(
+        "--data", metavar="DIR|URL", envvar="AERIALDOJO_DATA", callback=remember_option,
+        help="Data directory or s3://bucket/prefix, for tables, meshes and the release.",
+    ),
+]  # fmt: skip
+Scene = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scene",
+        metavar="NAME|GLOB",
+        autocompletion=completion.scenes,
+        help="Scene or glob, repeatable: --scene 'U_*'.  (default: all)",
+    ),
+]
+Scenes = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scenes or globs; the same as --scene."),
+]
+# Which tasks are flown.
+Split = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--split",
+        help="id_train, id_test, ood_train, ood_test; train or test for both ID and OOD; repeatable.  (default: all)",
+    ),
+]
+Setting = Annotated[
+    list[str] | None, typer.Option("--setting", help="base, standard, long_horizon; repeatable.")
+]  # fmt: skip
+Modality = Annotated[list[str] | None, typer.Option("--modality", help="semantic or image.  (default: both)")]
+TaskLimit = Annotated[
+    int | None,
+    typer.Option(
+        "--limit",
+        min=1,
+        help="Maximum number of tasks in total, spread evenly over scenes; semantic and image goals count "
+        "separately.  (default: all)",
+    ),
+]
+SelectionSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")]
+Tell = Annotated[
+    list[str] | None,
+    typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
+]
+Out = Annotated[
+    str | None,
+    typer.Option("--out", metavar="DIR|URL", help="Where to write the log.  (default: the data directory)"),
+]
+SubmissionFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--submission", metavar="FILE", help="Write the finished run into this file too, for score to replay."
+    ),
+]
+PipelineFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--pipeline",
+        metavar="FILE|NAME",
+        callback=remember_option,
+        autocompletion=completion.pipelines,
+        help="Pipeline file, or the name of a shipped one.  (default: that of the release in --data, "
+        f"else {Path(DEFAULT_PIPELINE).stem})",
+    ),
+]
+PipelineArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PIPELINE",
+        callback=remember_option,
+        autocompletion=completion.pipelines,
+        help=f"Pipeline file, or the name of a shipped one: {', '.join(completion.shipped_pipelines())}.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, max=1024, help="Number of processes.  (default: one per core)"),
+]
+ExecutorName = Annotated[
+    str, typer.Option("--executor", metavar="local|ray", help="Run on this machine or on a Ray cluster.")
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        "--address",
+        metavar="HOST:PORT",
+        help="Address of a running Ray cluster.  (default: start one on this machine)",
+    ),
+]
+Protocol = Annotated[
+    Literal["paper"] | None,
+    typer.Option("--protocol", help="paper: the tasks of the paper's sample alone, two maps a family."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Compute this stage again even where it is up to date.")]
+Replace = Annotated[
+    bool, typer.Option("--replace", help="Overwrite a release made by another pipeline; it is deleted.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON with unrounded figures.")]
+OneScene = Annotated[
+    str | None,
+    typer.Argument(metavar="SCENE", autocompletion=completion.scenes, help="Scene, or a glob that matches one."),
+]
+SceneOption = Annotated[
+    str | None,
+    typer.Option("--scene", metavar="NAME|GLOB", autocompletion=completion.scenes, help="The same as SCENE."),
+]
+RendererName = Annotated[
+    Literal["auto", "gl", "pybullet"],
+    typer.Option("--renderer", help="Renderer; auto takes the fastest that works on this machine."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Print a line also for stages that are up to date.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1.  (default: a free one)")]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
