@@ -84,6 +84,7 @@ def test_lines_are_those_of_the_values():
         ("[1]", 1, "must be an object"),
         ("[" * 100_000, 0, "line 1, column 65: nested more than 64 deep"),
         ('{"scene": "a",\n "scene": "b"}', 2, "occurs twice"),
+        ('{\n"landmarks": [{\n"name": "\\ud800"}]}', 3, "\\ud800 is half of a surrogate pair: no character"),
     ],
 )
 def test_faults_of_the_text(text, line, words):

@@ -1,21 +1,15 @@
 """Files that would hang a command, fill the memory or end in a traceback: one line at the level of the user."""
 
 import json
-import tomllib
 
 import numpy as np
 import pytest
 from fuzzing.mutate import Raw, toml_dumped
 from shapely.geometry import Polygon
-from starlette.testclient import TestClient
-from support import annotating, rendered
-from support.annotating import AUTHOR, YARD
+from support import rendered
 from support.command_line import said
 
-from aerialdojo_gen.annotations.format import parse_annotations
-from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.rendering.codecs import PngWriter
 from aerialdojo_gen.rendering.reader import read_recording
@@ -25,12 +19,9 @@ from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Material, Scene
-from aerialdojo_gen.scenes.plans.model import PlanHead
-from aerialdojo_gen.scenes.recipe import load_imported, validated
+from aerialdojo_gen.scenes.recipe import load_imported
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 from aerialdojo_gen.store.root import open_root
-from aerialdojo_gen.studio.annotate.server import make_app
-from aerialdojo_gen.studio.annotate.session import open_session
 
 SITE = {"size_m": [30, 30], "ceiling_m": 12}
 COURT = {"plan": 1, **SITE}
@@ -198,47 +189,6 @@ def test_a_prop_s_counts_are_bounded_before_anything_is_made_of_them(tmp_path, p
         load_catalogue(tmp_path).instantiate("post", "post_000", np.random.default_rng(0))
     assert str(refused.value).startswith(f"{path}: [post]")
     assert place in str(refused.value)
-
-
-def test_every_recipe_and_prop_of_ours_lies_within_the_bounds(project):
-    for path in sorted((project / "scene_assets" / "scenes").glob("*.toml")):
-        validated(PlanHead, tomllib.loads(path.read_text()), str(path))
-    assert load_catalogue(project / "scene_assets").targets
-    Pipeline()
-
-
-def test_annotations_with_half_characters_are_refused_by_the_server_and_never_shown(project, tmp_path):
-    pipeline, roots = open_pipeline(annotating.yard_pipeline(project, tmp_path), tmp_path / "data")
-    desk = open_session(YARD, pipeline, roots)
-    client = TestClient(make_app(desk), base_url="http://127.0.0.1", raise_server_exceptions=False)
-    good = desk.storage.path.read_text()
-    version = client.get("/api/document").json()["version"]
-    bad = good.replace('"name": "', '"name": "\\ud800', 1)
-    source = parse_annotations(bad)
-    assert [str(f) for f in source.faults] == [
-        f"line {source.faults[0].line}: landmarks[0].name: \\ud800 is half of a surrogate pair: no character"
-    ]
-    assert '"name"' in bad.splitlines()[source.faults[0].line - 1]
-    headers = {"If-Match": version}
-    for text in (bad, "[" * 50_000, '{"version": ' + "1" * 5000 + "}"):
-        answer = client.post("/api/import", json=AUTHOR | {"text": text}, headers=headers)
-        assert answer.status_code == 400, answer.text
-        assert "the file: " in answer.json()["error"]
-    for body in (
-        b'{"\\ud800": 1}',
-        b'{"who": "\\udfff", "text": ""}',
-        b"[" * 50_000,
-        b'{"text": ' + b"1" * 5000 + b"}",
-    ):
-        answer = client.post("/api/import", content=body, headers=headers | {"content-type": "application/json"})
-        assert 400 <= answer.status_code < 500, answer.text
-        assert answer.json()["error"]
-    assert desk.storage.path.read_text() == good
-    desk.storage.path.write_text(bad)
-    answer = client.get("/api/document")
-    assert answer.status_code == 400
-    assert "half of a surrogate pair" in answer.json()["error"]
-    desk.anchors.close()
 
 
 FINGERPRINT = "f" * 64

@@ -251,12 +251,6 @@ def copied(smoke, tmp_path):
     return tmp_path
 
 
-def set_mesh_path(data, value):
-    table = store.read_scene(data, "release/scenes", YARD)
-    column = table.schema.get_field_index("mesh_path")
-    store.write_shard(data, "release/scenes", YARD, 0, table.set_column(column, "mesh_path", pa.array([value])))
-
-
 def test_another_mesh_is_refused(copied, ids):
     mesh = copied / "meshes" / f"{YARD}.glb"
     shutil.copy(copied / "meshes" / "U_Courtyard_1.glb", mesh)
@@ -269,14 +263,16 @@ def test_another_mesh_is_refused(copied, ids):
         picture_task(find_task(copied, ids[0]), frames=0)
 
 
-@pytest.mark.parametrize("path", ["../outside.glb", "/etc/passwd", "meshes/../../outside.glb", "link/outside.glb"])
-def test_a_mesh_path_does_not_leave_the_data_directory(copied, ids, path, tmp_path_factory):
+def test_a_mesh_path_does_not_leave_the_data_directory(copied, ids, tmp_path_factory):
     outside = tmp_path_factory.mktemp("elsewhere")
     shutil.copy(copied / "meshes" / f"{YARD}.glb", outside / "outside.glb")
     (copied / "link").symlink_to(outside)
-    set_mesh_path(copied, path)
-    with pytest.raises(AssetError, match="leads out of"):
-        picture_task(find_task(copied, ids[0]), frames=0)
+    for path in ("../outside.glb", "/etc/passwd", "meshes/../../outside.glb", "link/outside.glb"):
+        table = store.read_scene(copied, "release/scenes", YARD)
+        column = table.schema.get_field_index("mesh_path")
+        store.write_shard(copied, "release/scenes", YARD, 0, table.set_column(column, "mesh_path", pa.array([path])))
+        with pytest.raises(AssetError, match="leads out of"):
+            picture_task(find_task(copied, ids[0]), frames=0)
 
 
 def test_a_damaged_part_is_named(copied, ids):

@@ -383,9 +383,10 @@ sys.meta_path.insert(0, Missing())
 """
 
 
-@pytest.mark.parametrize("missing", [["fastapi", "starlette", "uvicorn"], ["uvicorn"]])
-@pytest.mark.parametrize("command", ["view", "annotate"])
-def test_a_page_without_the_web_extra_names_it(project, tmp_path, missing, command):
+@pytest.mark.parametrize(
+    ("command", "missing"), [("view", ["fastapi", "starlette", "uvicorn"]), ("annotate", ["uvicorn"])]
+)
+def test_a_page_without_the_web_extra_names_it(project, tmp_path, command, missing):
     (tmp_path / "sitecustomize.py").write_text(BLOCK.format(missing=missing))
     line = [sys.executable, "-m", "aerialdojo_gen.cli", command, "--scene", YARD, "--data", str(tmp_path / "data")]
     environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": f"{tmp_path}:{project}"}
