@@ -193,7 +193,6 @@ def first_sentence(name: str, description: str) -> str:
 
 
 def description_faults(text: str) -> Iterator[str]:
-    """Yield what is wrong with the form of a description."""
     """Yield what is wrong with the form of a person's text."""
     if not text.strip():
         yield "is empty"

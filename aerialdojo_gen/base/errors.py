@@ -89,17 +89,7 @@ class BeyondBounds(Malformed):
 
 
 def lacks(who: str, package: str | None, extra: str) -> str:
-    """Word that a package is not installed, with the command that installs the extra that has it.
-
-    Parameters
-    ----------
-    who : str
-        What needs the package, in the user's terms: an option, a command, a kind of file.
-    package : str or None
-        The package, as it is imported; None as ImportError may have it.
-    extra : str
-        The extra of this distribution that brings it.
-    """
+    """Word that what needs a package, in the user's terms, lacks it, and which extra to install."""
     return f"{who} lacks the package {package or extra}: pip install 'aerialdojo-gen[{extra}]'"
 
 

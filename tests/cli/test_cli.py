@@ -28,18 +28,14 @@ def test_help_imports_nothing_heavy(args):
     assert out.strip().endswith("[]")
 
 
-def test_every_stage_has_a_command_with_the_common_options():
+def test_every_stage_has_a_command_with_the_common_options_and_its_own_help():
+    listed = " ".join(called("--help", COLUMNS="200").stdout.split())
     for one in STAGES:
+        assert f"{one.name} {one.help}" in listed
         text = called(one.name, "--help").stdout
         assert one.help.split()[0] in text
         for option in ("--data", "--scene", "--pipeline", "--workers", "--force", "--quiet"):
             assert option in text, (one.name, option)
-
-
-def test_the_stages_commands_say_what_the_stages_say():
-    text = " ".join(called("--help", COLUMNS="200").stdout.split())
-    for one in STAGES:
-        assert f"{one.name} {one.help}" in text
 
 
 def test_the_commands_are_listed_by_purpose():
@@ -62,44 +58,26 @@ def test_the_help_of_run_names_every_pipeline(project):
         assert file.stem in text
 
 
-def assert_one_line(result, code, *words):
+@pytest.mark.parametrize(
+    ("text", "command", "code", "words"),
+    [
+        ("", ["plan", "--scene", "U_Mal_0"], 2, ["no scene 'U_Mal_0'", "U_Mall_0"]),
+        ("[plan]\nwieght = 2\n", ["run", "mine.toml"], 2, ["mine.toml", "[plan] unknown key 'wieght'"]),
+        ("stages = ['plann']\n", ["run", "mine.toml"], 2, ["no stage 'plann': did you mean 'plan'?"]),
+        ("recipes = 'nowhere'\n", ["run", "mine.toml"], 2, ["nowhere", "set recipes"]),
+        ("", ["build-scenes", "--data", "mine.toml/data"], 1, ["cannot write", "not a folder"]),
+    ],
+)
+def test_what_a_user_gets_wrong_is_one_line(tmp_path, text, command, code, words):
+    (tmp_path / "mine.toml").write_text(text)
+    result = called(*command, cwd=tmp_path)
     assert result.returncode == code
     lines = result.stderr.splitlines()
     # A run says below its error how to continue.
     assert len(lines) == 1 + lines[-1].startswith("finished shards are kept"), result.stderr
     assert result.stderr.startswith("error: ")
-    for word in words:
-        assert word in result.stderr
-
-
-def test_unknown_scene_gives_the_nearest_names(tmp_path):
-    result = called("plan", "--scene", "U_Mal_0", "--data", str(tmp_path / "d"))
-    assert_one_line(result, 2, "no scene 'U_Mal_0'", "U_Mall_0")
-    assert not (tmp_path / "d").exists()
-
-
-def test_unknown_key_in_a_pipeline(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("[plan]\nwieght = 2\n")
-    assert_one_line(
-        called("run", str(path), "--data", str(tmp_path / "d")), 2, str(path), "[plan] unknown key 'wieght'"
-    )
-
-
-def test_unknown_stage_and_missing_folder(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("stages = ['plann']\n")
-    assert_one_line(
-        called("run", str(path), "--data", str(tmp_path / "d")), 2, "no stage 'plann': did you mean 'plan'?"
-    )
-    path.write_text("recipes = 'nowhere'\n")
-    assert_one_line(called("run", str(path), "--data", str(tmp_path / "d")), 2, "nowhere", "set recipes")
-
-
-def test_data_directory_that_cannot_be_written(tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    assert_one_line(called("build-scenes", "--data", str(blocked / "data")), 1, "cannot write", "not a folder")
+    assert all(word in result.stderr for word in words), result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
 
 
 def test_scene_patterns():

@@ -39,10 +39,10 @@ def yard(browser, view_url):
 
 
 def draw(driver, **choice):
-    driver.execute_script(
-        "for (const [id, value] of Object.entries(arguments[0])) document.getElementById(id).value = value", choice
-    )
-    driver.execute_async_script("page.routes.draw().then(arguments[0])")
+    driver.execute_async_script(
+        "for (const [id, value] of Object.entries(arguments[0])) document.getElementById(id).value = value;"
+        "page.routes.draw().then(arguments[1])", choice,
+    )  # fmt: skip
 
 
 def texts(driver, selector):
@@ -132,7 +132,6 @@ def test_the_list_holds_all_routes_sorted_and_makes_only_rows_in_sight(smoke, ya
     routes = open_release(smoke).routes(scene=YARD).to_pylist()
     length = {row["nav_id"]: round(row["length_m"], 3) for row in routes}
     # What is drawn may be a sample: the list is whole.
-    yard.execute_script("document.getElementById('most').value = '100'")
     yard.find_element("css selector", "#tab-list").click()
     draw(yard, most="100")
     assert texts(yard, "#route-count") == [f"{len(routes):,} routes"]
@@ -172,12 +171,16 @@ def test_a_route_is_picked_from_the_list_by_keys(yard):
 
 
 def test_the_panel_begins_at_its_top(yard):
-    yard.execute_script("page.pickObject(page.index.objects[0].object_id)")
-    top = "return document.getElementById('panel').scrollTop"
-    yard.execute_script("document.getElementById('panel').scrollTop = 200")
-    assert yard.execute_script(top) > 100
-    yard.execute_script("page.pickObject(page.index.objects[1].object_id)")
-    assert yard.execute_script(top) == 0
+    tops = yard.execute_script(
+        """const panel = document.getElementById('panel'), [first, second] = page.index.objects;
+        page.pickObject(first.object_id);
+        panel.scrollTop = 200;
+        const scrolled = panel.scrollTop;
+        page.pickObject(second.object_id);
+        return [scrolled, panel.scrollTop];"""
+    )
+    assert tops[0] > 100
+    assert tops[1] == 0
 
 
 # ---- flying along ----
@@ -284,12 +287,8 @@ def test_many_routes_are_one_buffer_with_a_busy_sign(smoke, yard):
         assert ids > routes.num_rows
         # While one moves fewer points are joined, and never more than a level allows; at rest all of them are.
         for most in (segments, 20_000, 5_000):
-            joined = yard.execute_script(
-                LAYER + "layer.thin(arguments[0]); return layer.object.geometry.index.count / 2", most
-            )
-            assert 0.3 * most < joined <= most
-        yard.execute_script("page.view.draw()")
-        assert yard.execute_script(LAYER + "return layer.object.geometry.index.count / 2") == segments
+            assert 0.3 * most < yard.execute_script(f"{LAYER} layer.thin(arguments[0]); {JOINED}", most) <= most
+        assert yard.execute_script(f"{LAYER} page.view.draw(); {JOINED}") == segments
     finally:
         yard.execute_script(
             "delete page.routes.wanted; for (const name of ['objects', 'landmarks']) page.view.setVisible(name, true)"

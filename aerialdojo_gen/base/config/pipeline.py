@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer, model_validator
 
-from aerialdojo_gen.base.config.agreement import disagreements
 from aerialdojo_gen.base.config.sections import (
     AnchorSampleConfig,
     AnnotateImportConfig,
@@ -57,7 +56,7 @@ class Pipeline(Section):
 
     @model_validator(mode="after")
     def _sections_agree(self) -> Pipeline:
-        faults = [*self.fill_shared(), *disagreements(self)]
+        faults = [*self.fill_shared(), *_disagreements(self)]
         if faults:
             raise ValueError("; ".join(faults))
         return self
@@ -164,7 +163,42 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
     except ValidationError as error:
         raise ConfigError("; ".join(explain(error, type(section)))) from None
     whole = pipeline.model_copy(update={stage.replace("-", "_"): changed})
-    faults = whole.fill_shared() or disagreements(whole)
+    faults = whole.fill_shared() or _disagreements(whole)
     if faults:
         raise ConfigError("; ".join(faults))
     return whole
+
+
+def _disagreements(pipeline: Pipeline) -> list[str]:
+    """Find what contradicts another section, so that no stage undoes another's work."""
+    anchor, plan, kept, radius = pipeline.anchor_sample, pipeline.plan, pipeline.filter, pipeline.embodiment.radius_m
+    extra_m = [rung.extra_radius_m for rung in plan.ladder]
+    thinnest, thickest = plan.margin_m + min(extra_m), radius + plan.margin_m + max(extra_m)
+    rules = (
+        (
+            anchor.standoff_m > radius + anchor.margin_m,
+            f"[anchor-sample] standoff_m = {anchor.standoff_m:g} must be more than [embodiment] radius_m + "
+            f"[anchor-sample] margin_m = {radius + anchor.margin_m:g}: every anchor would touch its object",
+        ),
+        (
+            thinnest <= anchor.margin_m,
+            f"[anchor-sample] margin_m = {anchor.margin_m:g} must be at least [plan] margin_m plus the smallest "
+            f"extra_radius_m of its ladder = {thinnest:g}: routes could not leave their anchors",
+        ),
+        (
+            plan.clearance_cap_m > thickest,
+            f"[plan] clearance_cap_m = {plan.clearance_cap_m:g} must be more than [embodiment] radius_m + [plan] "
+            f"margin_m + the largest extra_radius_m of its ladder = {thickest:g}: nothing would be free",
+        ),
+        (
+            plan.min_detour_ratio <= kept.min_detour_ratio,
+            f"[plan] min_detour_ratio = {plan.min_detour_ratio:g} must be at most [filter] min_detour_ratio = "
+            f"{kept.min_detour_ratio:g}: routes that filter would keep are never searched",
+        ),
+        (
+            plan.search == "all" or pipeline.split.paper_counts,
+            '[plan] search = "released" needs [split] paper_counts = true: without them all that is kept is '
+            'released; leave it out, or set search = "all"',
+        ),
+    )
+    return [text for holds, text in rules if not holds]

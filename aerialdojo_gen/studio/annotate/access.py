@@ -6,21 +6,17 @@ import hashlib
 import hmac
 import time
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
-from typing import Any
 from urllib.parse import parse_qs
+
+from aerialdojo_gen.studio.web.serving import Asgi, Message, Receive, Send
 
 COOKIE = "aerialdojo-annotate"
 # Wrong tokens per address: this many at once, then one per interval.
 MOST_GUESSES, SECONDS_A_GUESS = 10, 6.0
 _MOST_ADDRESSES = 4096
-
-_Message = MutableMapping[str, Any]
-_Asgi = Callable[
-    [_Message, Callable[[], Awaitable[_Message]], Callable[[_Message], Awaitable[None]]], Awaitable[None]
-]
 
 
 class TokenGate:
@@ -32,14 +28,12 @@ class TokenGate:
     router must not lock it out.
     """
 
-    def __init__(self, app: _Asgi, token: str) -> None:
+    def __init__(self, app: Asgi, token: str) -> None:
         self._app, self._token = app, token
         self._guesses: OrderedDict[str, _Guesses] = OrderedDict()
         self._known: set[str] = set()
 
-    async def __call__(
-        self, scope: _Message, receive: Callable[[], Awaitable[_Message]], send: Callable[[_Message], Awaitable[None]]
-    ) -> None:
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Answer 401, 403, 429 or 303 itself, or hand the request on."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
@@ -101,7 +95,7 @@ class _Guesses:
         self.seen.add(digest)
 
 
-def _token_of(scope: _Message) -> str:
+def _token_of(scope: Message) -> str:
     try:
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8)
     except ValueError:
@@ -117,12 +111,7 @@ def _cookie(header: str) -> str:
     return morsel.value if morsel else ""
 
 
-async def _respond(
-    send: Callable[[_Message], Awaitable[None]],
-    status: int,
-    text: str,
-    headers: list[tuple[bytes, bytes]] | None = None,
-) -> None:
+async def _respond(send: Send, status: int, text: str, headers: Sequence[tuple[bytes, bytes]] = ()) -> None:
     plain = (b"content-type", b"text/plain; charset=utf-8")
-    await send({"type": "http.response.start", "status": status, "headers": [plain, *(headers or [])]})
+    await send({"type": "http.response.start", "status": status, "headers": [plain, *headers]})
     await send({"type": "http.response.body", "body": text.encode()})

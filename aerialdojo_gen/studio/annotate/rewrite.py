@@ -265,14 +265,8 @@ def rewrite_scene(
 ) -> Rewriting | None:  # fmt: skip
     """Rewrite the descriptions in a scene's annotation file, those of people only if `again`.
 
-    Without limits it says what would be sent, and sends nothing: None.
-
-    Raises
-    ------
-    AnnotationError
-        There is no such file, or it is at fault.
-    ServiceDown
-        The service refuses all requests; the file stays as it is.
+    Without limits it says what would be sent, and sends nothing: None. Where the service refuses all requests
+    (ServiceDown) the file stays as it is.
     """
     path = roots.annotations / f"{name}.json"
     if not path.exists():

@@ -143,11 +143,11 @@ class Storage:
             lines = [record]
             last_version = self.history.records[-1].after if self.history.records else state.version
             if last_version != state.version:
-                outside = {"action": "outside", "what": "changed outside of this tool", "client": "", "who": ""}
-                lines.insert(
-                    0,
-                    record.model_copy(update=outside | {"before": last_version, "after": state.version, "edits": ()}),
-                )
+                outside = Record(
+                    time=now, who="", client="", action="outside", what="changed outside of this tool",
+                    before=last_version, after=state.version, edits=(),
+                )  # fmt: skip
+                lines.insert(0, outside)
             try:
                 self._write(raw, lines)
             except OSError as error:

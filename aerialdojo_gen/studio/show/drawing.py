@@ -204,18 +204,9 @@ def _landmark(axes: Axes, task: PicturedTask, extent: tuple[float, float, float,
     if inside:
         axes.plot(*mark, "*", ms=17, mfc="white", mec="black", mew=1.2, zorder=8)
     axes.annotate(
-        plain(words),
-        tuple(start),
-        offset,
-        textcoords="offset points",
-        ha=side,
-        weight="bold",
-        fontsize=9,
-        color="white",
-        path_effects=_HALO,
-        zorder=9,
-        clip_on=True,
-    )
+        plain(words), tuple(start), offset, textcoords="offset points", ha=side, weight="bold", fontsize=9,
+        color="white", path_effects=_HALO, zorder=9, clip_on=True,
+    )  # fmt: skip
 
 
 def _compass(axes: Axes) -> None:

@@ -12,14 +12,8 @@ from matplotlib.figure import Figure
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.store.atomic import atomic_file
-from aerialdojo_gen.studio.show.drawing import (
-    CLEARANCE_COLOURS,
-    CLEARANCE_SCALE,
-    draw_map,
-    draw_profile,
-    draw_side,
-    plain,
-)
+from aerialdojo_gen.studio.show import drawing
+from aerialdojo_gen.studio.show.drawing import plain
 from aerialdojo_gen.studio.show.pictured import PicturedTask
 
 _WIDTH_IN, _DPI = 14.0, 120
@@ -31,19 +25,13 @@ def task_figure(task: PicturedTask) -> Figure:
     strip = _FRAMES_IN if task.frames else 0.0
     sheet = _Sheet(_WIDTH_IN, 8.7 + strip)
     figure, top = sheet.figure, sheet.height
-    figure.text(
-        0.45 / _WIDTH_IN,
-        1 - 0.42 / top,
-        plain(task.title),
-        fontsize=min(19.0, 1700 / len(task.title)),
-        weight="bold",
-        va="center",
-    )
+    size = min(19.0, 1700 / len(task.title))
+    figure.text(0.45 / _WIDTH_IN, 1 - 0.42 / top, plain(task.title), fontsize=size, weight="bold", va="center")
     figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, plain(task.place), fontsize=11, color="#475569", va="center")
 
-    draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
+    drawing.draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
     side = sheet.axes(0.85, strip + 0.3, 7.9, 1.95)
-    draw_side(side, task, 7.9 / 1.95)
+    drawing.draw_side(side, task, 7.9 / 1.95)
 
     if task.reference is not None:
         image = sheet.axes(9.05, top - 3.35, 2.3, 2.3)
@@ -63,9 +51,10 @@ def task_figure(task: PicturedTask) -> Figure:
         bbox={"facecolor": "#e8eefc", "edgecolor": "none", "boxstyle": "square,pad=0.5"},
     )  # fmt: skip
     under_words = top - 4.25 - 0.19 * (words.count("\n") + 1)
-    draw_profile(sheet.axes(9.5, strip + 1.2, 4.2, min(2.9, under_words - strip - 1.2)), task)
+    drawing.draw_profile(sheet.axes(9.5, strip + 1.2, 4.2, min(2.9, under_words - strip - 1.2)), task)
     bar = figure.colorbar(
-        ScalarMappable(CLEARANCE_SCALE, CLEARANCE_COLOURS), cax=sheet.axes(9.5, strip + 0.5, 4.2, 0.1),
+        ScalarMappable(drawing.CLEARANCE_SCALE, drawing.CLEARANCE_COLOURS),
+        cax=sheet.axes(9.5, strip + 0.5, 4.2, 0.1),
         orientation="horizontal", ticks=[0.25, 0.5, 1, 2, 5], format="%g",
     )  # fmt: skip
     bar.ax.minorticks_off()

@@ -27,16 +27,16 @@ STATIC = Path(__file__).resolve().parent / "static"
 _LOCAL = ("127.0.0.1", "localhost")
 _IMPORT_MAP = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
-_Message = MutableMapping[str, Any]
-_Send = Callable[[_Message], Awaitable[None]]
-_Receive = Callable[[], Awaitable[_Message]]
-_Asgi = Callable[[_Message, _Receive, _Send], Awaitable[None]]
+Message = MutableMapping[str, Any]
+Send = Callable[[Message], Awaitable[None]]
+Receive = Callable[[], Awaitable[Message]]
+Asgi = Callable[[Message, Receive, Send], Awaitable[None]]
 
 
 class _LocalOnly:
     """ASGI middleware: rejects foreign hosts, origins and large bodies, and sets security headers."""
 
-    def __init__(self, app: _Asgi, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
+    def __init__(self, app: Asgi, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
         self._app, self._max_body_bytes, self._any_host = app, max_body_bytes, any_host
         self._headers = [
             (b"content-security-policy", policy.encode()),
@@ -47,13 +47,13 @@ class _LocalOnly:
             (b"cache-control", b"no-cache"),
         ]
 
-    async def __call__(self, scope: _Message, receive: _Receive, send: _Send) -> None:
+    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
         refusal = self._refusal(scope)
 
-        async def send_with_headers(message: _Message) -> None:
+        async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message.get("headers", []), *self._headers]
             await send(message)
@@ -67,7 +67,7 @@ class _LocalOnly:
         )
         await send({"type": "http.response.body", "body": why.encode()})
 
-    def _refusal(self, scope: _Message) -> tuple[int, str] | None:
+    def _refusal(self, scope: Message) -> tuple[int, str] | None:
         if scope["type"] != "http":
             return 400, "plain HTTP only"
         headers: dict[bytes, list[bytes]] = {}
