@@ -31,7 +31,7 @@ SHADES: Mapping[str, frozenset[str]] = {
         "silver": "grey white", "grey": "grey white black", "gray": "grey white black", "black": "black grey",
     }.items()
 }  # fmt: skip
-_DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
+DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
 # Minimum share of the surface: for a colour named alone, and for one of several or of a part.
 _ALONE, _AMONG = 0.1, 0.03
 
@@ -92,7 +92,7 @@ def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, M
     """List the colours of a text that the instance's surface does not have."""
     words = colour_words(text)
     shares = colour_shares(instance, materials)
-    alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in _DEGREES] == words[:1]
+    alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in DEGREES] == words[:1]
     least = _ALONE if alone else _AMONG
     return [word for word in words if sum(shares.get(name, 0.0) for name in SHADES[word]) < least]
 
@@ -115,9 +115,4 @@ def repeats(say: str, instance: Instance) -> bool:
 
 
 def _stems(text: str) -> set[str]:
-    return {word[:_STEM] for word in _normalize(text).split() if word not in _STOP_WORDS}
-
-
-def _normalize(text: str) -> str:
-    words = " ".join(re.findall(r"[^\W_]+", text.lower()))
-    return f" {words} "
+    return {word[:_STEM] for word in re.findall(r"[^\W_]+", text.lower()) if word not in _STOP_WORDS}

@@ -89,10 +89,8 @@ class AnnotationDrafter:
         """Choose up to `n` objects, round-robin over categories; calls `on_chosen` for each."""
         taken: list[int] = []
         everywhere = self._queues()
-        core = {c: [i for i in queue if self._in_core(i)] for c, queue in everywhere.items()}
-        rest = {c: [i for i in queue if i not in core[c]] for c, queue in everywhere.items()}
-        elevated = {c: [i for i in queue if self._is_elevated(i)] for c, queue in core.items()}
-        low = {c: [i for i in queue if i not in elevated[c]] for c, queue in core.items()}
+        core, rest = _parted(everywhere, self._in_core)
+        elevated, low = _parted(core, self._is_elevated)
         in_core = n if self._options.core_radius_m is None else round(n * self._options.core_share)
         phases: tuple[tuple[dict[str, list[int]], int], ...] = (
             (core, in_core),
@@ -191,3 +189,11 @@ class AnnotationDrafter:
         others = self._claims.distractors(i, claims) or self._claims.candidates(i)
         self.confusions.append((instance.node, [self._scene.instances[j].node for j in others]))
         return _INDISTINGUISHABLE
+
+
+def _parted(
+    queues: dict[str, list[int]], test: Callable[[int], bool]
+) -> tuple[dict[str, list[int]], dict[str, list[int]]]:
+    """Part queues into those of what passes a test, and those of the rest."""
+    passing = {c: [i for i in queue if test(i)] for c, queue in queues.items()}
+    return passing, {c: [i for i in queue if i not in passing[c]] for c, queue in queues.items()}

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from aerialdojo_gen.annotations.appearance import SHADES
+from aerialdojo_gen.annotations.appearance import DEGREES, SHADES
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.phrases import phrases_of_value, plural, spoken
 from aerialdojo_gen.base.constants import DIRECTIONS
@@ -34,7 +34,6 @@ _EMPTY = frozenset(re.findall(
     "target be can tell know notice reading stand standing parked lying growing hanging sitting in on at by from "
     "also as your",
 ))  # fmt: skip
-_DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
 
 
 def _relations() -> dict[tuple[str, ...], str]:
@@ -224,7 +223,7 @@ class _Reading:
             self._values.append(meaning)
         elif kind == "thing":
             self._thing(meaning, [*words])
-        elif not kind and first.isalpha() and first not in _EMPTY | _DEGREES:
+        elif not kind and first.isalpha() and first not in _EMPTY | DEGREES:
             self.matched.unchecked.append(first)
         if self._relation:
             self._words += words

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -66,7 +66,6 @@ class Words:
     """Words that drafts use for a category."""
 
     name: str  # Common name
-    looks: tuple[str, ...] = ()  # Noun phrases to follow "with" or "it has"
     nouns: tuple[str, ...] = ()  # Synonyms, true of every instance; of a collective whole: ``"line of wheelie bins"``
     # A collective's words: ``"wheelie bins"``, which adjectives precede, and ``"row"``; empty for all else.
     plural_heads: tuple[str, ...] = ()
@@ -75,16 +74,6 @@ class Words:
     group: str = ""  # Determiner of plural names: ``"a patch of"``; else empty
     reference: bool = True  # Whether descriptions of other objects may refer to it
     target: bool = True  # Whether it may become an object
-
-    @property
-    def verb(self) -> str:
-        """The usual verb: ``"stands"``."""
-        return self.verbs[0][0]
-
-    @property
-    def participle(self) -> str:
-        """Its participle: ``"standing"``."""
-        return self.verbs[0][1]
 
 
 _KEYS = ("nouns", "plural_head", "collective", "verbs", "group", "reference", "target")
@@ -107,14 +96,13 @@ def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, Any], frozenset[str]
     return tables, values, colours
 
 
-def words_of(category: str, name: str | None, kind: str, looks: tuple[str, ...] = (), target: bool = True) -> Words:
+def words_of(category: str, name: str | None, kind: str, target: bool = True) -> Words:
     """Look up the words for a category."""
     entry = _tables()[0].get(category, {})
     verbs = entry.get("verbs", [_VERBS.get(kind, ("stands", "standing"))])
     in_catalogue = name is not None
     return Words(
         name=name or spoken(category),
-        looks=looks,
         nouns=tuple(entry.get("nouns", ())),
         plural_heads=tuple(entry.get("plural_head", ())),
         collectives=tuple(entry.get("collective", ())),
@@ -133,7 +121,6 @@ class Noun:
     adjectives: tuple[str, ...]  # Before the name
     name: str  # The category's
     after: str  # After it: ``"with a black roof"``; may be empty
-    group: str  # See `Words`
 
     @property
     def bare(self) -> str:
@@ -145,28 +132,17 @@ class Noun:
         """Without article and without the tail, unless only the name would remain."""
         return " ".join([*self.adjectives, self.name]) if self.adjectives or not self.after else self.bare
 
-    def a(self, short: bool = False) -> str:
-        """With the indefinite article, or its group."""
-        text = self.short if short else self.bare
-        return f"{self.group} {text}" if self.group else f"{article(text)} {text}"
-
-    def the(self, short: bool = False) -> str:
-        """With the definite article."""
-        return f"the {self.short if short else self.bare}"
-
 
 def noun_of(instance: Instance, words: Words) -> Noun:
     """Make the noun phrase from an instance's attributes."""
-    called, group = (instance.attributes.get(key, "") for key in ("called", "group"))
-    if called or group:
-        words = replace(words, name=called or words.name, group=group or words.group)
+    name = instance.attributes.get("called") or words.name
     before: list[str] = []
     after: list[str] = []
     rest = [k for k in instance.attributes if k not in _ADJECTIVES and k != _PLACE and k not in _NAMING]
     for key in (*_ADJECTIVES, *rest):
         value = instance.attributes.get(key)
         others = [v for k, v in instance.attributes.items() if k != key and k != _PLACE and k not in _NAMING]
-        if not value or value in words.name.split() or any(value in v.split() for v in others):
+        if not value or value in name.split() or any(value in v.split() for v in others):
             continue
         phrase = phrases_of_value(key, value, instance.category)[0]
         if phrase.startswith("+"):
@@ -174,9 +150,9 @@ def noun_of(instance: Instance, words: Words) -> Noun:
         else:
             after.append(phrase)
     tail = _join(after)
-    if " with " in words.name and tail.startswith("with "):
+    if " with " in name and tail.startswith("with "):
         tail = "and" + tail.removeprefix("with")
-    return Noun(tuple(before), words.name, tail, words.group)
+    return Noun(tuple(before), name, tail)
 
 
 def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:

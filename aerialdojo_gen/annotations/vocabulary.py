@@ -38,7 +38,7 @@ class Vocabulary:
                 targets |= {i.category}
             if i.category not in by_category:
                 name, kind = self.names.get(i.category), self.kinds.get(i.category, "")
-                words = words_of(i.category, name, kind, (), i.category in targets)
+                words = words_of(i.category, name, kind, i.category in targets)
                 if scene.imported and (words.plural_heads or not words.group):
                     # What is a row of things in the catalogue is one of them here.
                     group = group_of(words.name)

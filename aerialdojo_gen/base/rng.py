@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
+
+_T = TypeVar("_T")
 
 
 def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
@@ -19,6 +23,11 @@ def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
 def generator(seed: int, stage: str, *key: object) -> np.random.Generator:
     """Make the generator of one row."""
     return np.random.Generator(np.random.PCG64(int.from_bytes(_digest(seed, stage, key), "little")))
+
+
+def pick(options: Sequence[_T], rng: np.random.Generator) -> _T:
+    """Draw one of some options."""
+    return options[int(rng.integers(len(options)))]
 
 
 def rank(seed: int, stage: str, *key: object) -> int:

@@ -157,4 +157,4 @@ def test_in_front_and_behind_ask_for_the_front_that_a_thing_has(catalogue):
 def test_equipment_has_the_article_that_its_head_noun_asks_for(equipment, said):
     box_ = box("box_000", (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     thing = dataclasses.replace(box_, category="brick_pallet", attributes={"equipment": equipment})
-    assert said in noun_of(thing, words_of("brick_pallet", None, "object")).a()
+    assert said in noun_of(thing, words_of("brick_pallet", None, "object")).bare

@@ -28,13 +28,17 @@ def start(browser, view_url):
 
 @pytest.fixture
 def yard(browser, view_url):
-    """The page of the yard, nothing selected."""
+    """The page of the yard: nothing selected, and nothing left of what another test has put in place of its own."""
     address = f"{view_url}scenes/{YARD}/"
     if browser.current_url.partition("#")[0] != address:
         browser.get(address)
         ready(browser)
+    browser.execute_script(
+        "page.routes.ways = (window.real ??= page.routes.ways); delete page.routes.wanted;"
+        "for (const name of ['objects', 'landmarks', 'routes']) page.view.setVisible(name, true);"
+        "page.letGo(); page.view.home(); page.tabs.show('panel')"
+    )
     draw(browser, setting="", split="", modality="", target="", colour="setting", most="")
-    browser.execute_script("page.letGo(); page.tabs.show('panel')")
     return browser
 
 
@@ -261,7 +265,7 @@ def test_many_routes_are_one_buffer_with_a_busy_sign(smoke, yard):
     n = 20_000
     # The yard's routes again and again, each a little aside.
     yard.execute_script(
-        """window.real = page.routes.ways; const n = page.index.routes.nav_id.length;
+        """const n = page.index.routes.nav_id.length;
         page.routes.wanted = () => Array.from({ length: arguments[0] }, (_, k) => k % n);
         window.busy = [];
         const sign = document.getElementById('busy');
@@ -269,37 +273,29 @@ def test_many_routes_are_one_buffer_with_a_busy_sign(smoke, yard):
           { attributes: true, childList: true, subtree: true });""",
         n,
     )
-    try:
-        draw(yard, most="")
-        told = yard.execute_script("return busy")
-        assert [hidden for hidden, _ in told][-1] is True
-        assert [False, f"Drawing {n:,} routes …"] in told
-        kind, ids, calls, segments = yard.execute_script(
-            LAYER + "const gl = page.view.renderer.info; for (const [name, other] of page.view.layers)"
-            " if (name !== 'routes') other.object.visible = false;"
-            "page.view.setVisible('scene', false); gl.autoReset = true; page.view.draw();"
-            "const drawn = gl.render.calls; layer.object.visible = false; page.view.draw();"
-            "const calls = drawn - gl.render.calls; layer.object.visible = true; page.view.setVisible('scene', true);"
-            "return [layer.constructor.name, layer.routes.length, calls, layer.segments]"
-        )
-        assert (kind, ids, calls) == ("CrowdLayer", n, 1)
-        assert segments >= n
-        assert ids > routes.num_rows
-        # While one moves fewer points are joined, and never more than a level allows; at rest all of them are.
-        for most in (segments, 20_000, 5_000):
-            assert 0.3 * most < yard.execute_script(f"{LAYER} layer.thin(arguments[0]); {JOINED}", most) <= most
-        assert yard.execute_script(f"{LAYER} page.view.draw(); {JOINED}") == segments
-    finally:
-        yard.execute_script(
-            "delete page.routes.wanted; for (const name of ['objects', 'landmarks']) page.view.setVisible(name, true)"
-        )
+    draw(yard, most="")
+    told = yard.execute_script("return busy")
+    assert [hidden for hidden, _ in told][-1] is True
+    assert [False, f"Drawing {n:,} routes …"] in told
+    kind, ids, calls, segments = yard.execute_script(
+        LAYER + "const gl = page.view.renderer.info; for (const [name, other] of page.view.layers)"
+        " if (name !== 'routes') other.object.visible = false;"
+        "page.view.setVisible('scene', false); gl.autoReset = true; page.view.draw();"
+        "const drawn = gl.render.calls; layer.object.visible = false; page.view.draw();"
+        "const calls = drawn - gl.render.calls; layer.object.visible = true; page.view.setVisible('scene', true);"
+        "return [layer.constructor.name, layer.routes.length, calls, layer.segments]"
+    )
+    assert (kind, ids, calls) == ("CrowdLayer", n, 1)
+    assert segments >= n
+    assert ids > routes.num_rows
+    # While one moves fewer points are joined, and never more than a level allows; at rest all of them are.
+    for most in (segments, 20_000, 5_000):
+        assert 0.3 * most < yard.execute_script(f"{LAYER} layer.thin(arguments[0]); {JOINED}", most) <= most
+    assert yard.execute_script(f"{LAYER} page.view.draw(); {JOINED}") == segments
 
 
 def test_what_is_drawn_in_motion_stays_near_what_is_drawn_at_rest(yard):
-    draw(yard, most="")
-    yard.execute_script(
-        "page.view.home(); for (const name of page.view.layers.keys()) page.view.setVisible(name, false)"
-    )
+    yard.execute_script("for (const name of page.view.layers.keys()) page.view.setVisible(name, false)")
     picture = (
         "const view = page.view; cancelAnimationFrame(view.pending); view.pending = 1; view.draw(arguments[0]);"
         "return view.canvas.toDataURL().split(',')[1]"
@@ -309,10 +305,7 @@ def test_what_is_drawn_in_motion_stays_near_what_is_drawn_at_rest(yard):
         png = base64.b64decode(yard.execute_script(picture, level))
         image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
         shots.append(cv2.resize(image, (48, 48), interpolation=cv2.INTER_AREA))
-    yard.execute_script(
-        "page.view.pending = 0; page.view.draw();"
-        "for (const name of ['objects', 'landmarks', 'routes']) page.view.setVisible(name, true)"
-    )
+    yard.execute_script("page.view.pending = 0; page.view.draw()")
     assert np.std(shots[0]) > 10
     for level, most, shot in zip((1, 3, 6), (2.0, 5.0, 12.0), shots[1:], strict=True):
         assert np.abs(shot - shots[0]).mean() < most, level
@@ -366,39 +359,32 @@ def test_where_routes_overlap_the_tightest_gives_the_colour(yard, turn):
     # Two routes of one and the same way, many times, so that they are drawn as a crowd.
     yard.execute_script(
         """const [tight, wide, turn] = arguments, pair = turn ? [wide, tight] : [tight, wide];
-        window.real = page.routes.ways;
         page.routes.ways = Promise.resolve(() => new Float32Array([-4, 0, 9, 4, 0, 9]));
         page.routes.wanted = () => Array.from({ length: 600 }, (_, k) => pair[k % 2]);
         for (const name of ['objects', 'landmarks']) page.view.setVisible(name, false);
         page.view.controls.lookFrom([0, -8, 11], [0, 0, 9]);""",
         tight, wide, turn,
     )  # fmt: skip
-    try:
-        draw(yard, colour="clearance", most="")
-        assert "the tightest is on top" in texts(yard, "#legend")[0]
-        colours, pixels = yard.execute_async_script(
-            LAYER + """const [tight, wide, done] = arguments, view = page.view;
-            view.setVisible('scene', false);
-            import("/static/colours.js").then(({ clearanceColour }) => {
-              const rgb = (k) => [1, 3, 5].map((at) =>
-                parseInt(clearanceColour(page.index.routes.min_clearance_m[k]).slice(at, at + 2), 16));
-              view.draw();
-              const gl = view.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
-              const all = new Uint8Array(4 * w * h), count = [0, 0];
-              gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, all);
-              const two = [rgb(tight), rgb(wide)];
-              const like = (i, colour) => colour.every((v, j) => Math.abs(all[i + j] - v) < 3);
-              for (let i = 0; i < all.length; i += 4) two.forEach((colour, j) => { count[j] += like(i, colour); });
-              view.setVisible('scene', true);
-              done([two, count]);
-            });""",
-            tight, wide,
-        )  # fmt: skip
-        assert np.abs(np.subtract(*colours)).sum() > 30
-        assert pixels[0] > 100
-        assert pixels[1] < 0.02 * pixels[0]
-    finally:
-        yard.execute_script(
-            "page.routes.ways = window.real; delete page.routes.wanted;"
-            "for (const name of ['objects', 'landmarks']) page.view.setVisible(name, true); page.view.home()"
-        )
+    draw(yard, colour="clearance", most="")
+    assert "the tightest is on top" in texts(yard, "#legend")[0]
+    colours, pixels = yard.execute_async_script(
+        LAYER + """const [tight, wide, done] = arguments, view = page.view;
+        view.setVisible('scene', false);
+        import("/static/colours.js").then(({ clearanceColour }) => {
+          const rgb = (k) => [1, 3, 5].map((at) =>
+            parseInt(clearanceColour(page.index.routes.min_clearance_m[k]).slice(at, at + 2), 16));
+          view.draw();
+          const gl = view.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+          const all = new Uint8Array(4 * w * h), count = [0, 0];
+          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, all);
+          const two = [rgb(tight), rgb(wide)];
+          const like = (i, colour) => colour.every((v, j) => Math.abs(all[i + j] - v) < 3);
+          for (let i = 0; i < all.length; i += 4) two.forEach((colour, j) => { count[j] += like(i, colour); });
+          view.setVisible('scene', true);
+          done([two, count]);
+        });""",
+        tight, wide,
+    )  # fmt: skip
+    assert np.abs(np.subtract(*colours)).sum() > 30
+    assert pixels[0] > 100
+    assert pixels[1] < 0.02 * pixels[0]

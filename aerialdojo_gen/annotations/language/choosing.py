@@ -12,6 +12,7 @@ from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.locations import WHERE
 from aerialdojo_gen.annotations.language.subject import Wording, wordings_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
+from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.scenes.looks import Look
 
 _MOST_PLACES = 3
@@ -136,7 +137,7 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         plan.places += [k for k in ranked if k not in plan.places and not about.names_again(k, plan)][:1]
     spare = [w for w in about.details if w.index not in plan.indices]
     if rng.random() < _MORE_DETAILS[level] and spare and not plan.details:
-        _add(plan, about, spare[int(rng.integers(len(spare)))].index, rng)
+        _add(plan, about, pick(spare, rng).index, rng)
     # Of two phrases after the noun, one would not be said.
     tails = sum(not wording.adjectives for wording in plan.adjectives)
     return plan if plan.places and tails <= 1 else None

@@ -12,6 +12,7 @@ from aerialdojo_gen.annotations.language.nouns import Names, noun_phrase
 from aerialdojo_gen.annotations.language.relation_words import relation_words
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.base.rng import pick
 
 WHERE = frozenset({"place", "relation", "direction"})
 _SHORT = 5
@@ -47,7 +48,7 @@ class LocationWords:
     def of(self, i: int, index: int, claim: Claim, level: str, rng: np.random.Generator) -> Location:
         """Word a claim of instance `i`, for a text of a level."""
         if claim.kind == "place":
-            text = _one(self._place(claim.key), rng)
+            text = pick(self._place(claim.key), rng)
             return Location(index, "place", claim.key, text)
         things = [self._thing(i, mention, rng) for mention in claim.things]
         direction = claim.key.removesuffix(" of")
@@ -97,7 +98,3 @@ def _is_plural(noun: str) -> bool:
 def _of_many(pronoun: str) -> str:
     pronoun = pronoun.removesuffix(" it") + " them" if pronoun.endswith(" it") else pronoun
     return f" {pronoun}".replace(" its ", " their ").strip()
-
-
-def _one(options: Sequence[str], rng: np.random.Generator) -> str:
-    return options[int(rng.integers(len(options)))]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.annotations.phrases import Words, article, group_of
+from aerialdojo_gen.base.rng import pick
 
 # What "a stack of fish crates" begins with: adjectives of colour and kind go before the crates.
 COLLECTIVES = frozenset(
@@ -119,7 +120,7 @@ class Names:
             others += [Name(head, group) for head in words.plural_heads for group in words.collectives]
         if not others or rng.random() < _USUAL:
             return usual
-        return others[int(rng.integers(len(others)))]
+        return pick(others, rng)
 
 
 def _grouped(words: Words, noun: str) -> Name:

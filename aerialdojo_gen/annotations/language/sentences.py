@@ -12,6 +12,7 @@ from aerialdojo_gen.annotations.language.grammar import Frame, frames
 from aerialdojo_gen.annotations.language.locations import Location
 from aerialdojo_gen.annotations.language.nouns import NounPhrase
 from aerialdojo_gen.annotations.language.subject import Wording
+from aerialdojo_gen.base.rng import pick
 
 _STARTS = re.compile(r"(^|[.?!] +)([a-zé])")
 _GOES_ON = re.compile(r"\{(?:a|the|np)\} (?:[a-z]|\{ing\})")
@@ -76,7 +77,7 @@ def compose(
         if first.text.startswith("{at}") and own[0].lead > _SHORT_LEAD and rng.random() < _RARELY:
             return None
     if "w" in first.slots:
-        slots["w"] = _one(details.pop(0)[0].details, rng)
+        slots["w"] = pick(details.pop(0)[0].details, rng)
     said = [(first, slots)]
     for wording, telling in details:
         said.append(_detail(wording, telling, said, rng))
@@ -97,7 +98,7 @@ def _with_tail(
     phrase = content.phrase
     if phrase.tail or " with " in phrase.bare or len(content.details) > 1:
         return None
-    detail = _one(content.details[0][0].details, rng)
+    detail = pick(content.details[0][0].details, rng)
     named = replace(content, phrase=replace(phrase, tail=f"with {detail}"), details=())
     return compose(named, held_out, used, rng)
 
@@ -149,9 +150,9 @@ def _detail(
     wording: Wording, telling: bool, said: Sequence[tuple[Frame, object]], rng: np.random.Generator
 ) -> tuple[Frame, dict[str, str]]:
     if wording.clauses and rng.random() < _CLAUSE:
-        return _frame("clause", said, rng), {"clause": _one(wording.clauses, rng)}
+        return _frame("clause", said, rng), {"clause": pick(wording.clauses, rng)}
     kind = "telling" if telling and rng.random() < _TELLING else "with"
-    return _frame(kind, said, rng), {"w": _one(wording.details, rng)}
+    return _frame(kind, said, rng), {"w": pick(wording.details, rng)}
 
 
 def _place(
@@ -175,7 +176,3 @@ def _frame(
 
 def _ended(text: str) -> str:
     return text if text[-1] in ".?!" else f"{text}."
-
-
-def _one(options: Sequence[str], rng: np.random.Generator) -> str:
-    return options[int(rng.integers(len(options)))]

@@ -11,6 +11,7 @@ import numpy as np
 from aerialdojo_gen.annotations.claims import Claim
 from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, noun_phrase
 from aerialdojo_gen.annotations.phrases import phrases_of_value
+from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.scenes.colours import COLOURS
 from aerialdojo_gen.scenes.looks import Look
 
@@ -60,7 +61,7 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
     for wording in sorted(ordered, key=lambda w: bool(w.adjectives)):
         after = fresh(wording.tails, name.text) or (() if wording.adjectives else wording.tails)
         options = [*wording.adjectives, *(() if tail else after)]
-        chosen = options[int(rng.integers(len(options)))] if options else ""
+        chosen = pick(options, rng) if options else ""
         if chosen in wording.tails:
             tail = chosen
             continue
