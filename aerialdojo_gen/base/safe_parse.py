@@ -12,7 +12,6 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -78,12 +77,7 @@ def read_json(path: Path, error: type[AerialDojoError] = StoreError, limit: int 
         raise error(f"{path}: {fault}") from None
 
 
-def loads_json(
-    text: str | bytes,
-    *,
-    object_pairs_hook: Callable[[list[tuple[str, Any]]], Any] | None = None,
-    finite: bool = True,
-) -> Any:
+def loads_json(text: str | bytes, *, finite: bool = True) -> Any:
     """Parse JSON within bounds."""
     if isinstance(text, bytes):
         try:
@@ -91,8 +85,7 @@ def loads_json(
         except UnicodeDecodeError as error:
             raise Malformed(f"is not UTF-8 (byte {error.start})") from None
     try:
-        constant = _no_number if finite else None
-        value = json.loads(text, parse_constant=constant, object_pairs_hook=object_pairs_hook)
+        value = json.loads(text, parse_constant=_no_number if finite else None)
     except json.JSONDecodeError as error:
         raise Malformed(f"line {error.lineno}, column {error.colno}: is not JSON: {error.msg}") from None
     except Malformed:

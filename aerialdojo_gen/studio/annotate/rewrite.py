@@ -137,9 +137,7 @@ class Rewriter:
             f"{into:,} tokens in and {out:,} out{priced}"
         )
 
-    def rewrite(
-        self, objects: Sequence[Object], limits: Limits, on_done: Callable[[], object] = lambda: None
-    ) -> tuple[dict[int, str], Rewriting]:
+    def rewrite(self, objects: Sequence[Object], limits: Limits) -> tuple[dict[int, str], Rewriting]:
         """Write descriptions of objects; returns those that are verified, by the objects' ids."""
         done, failures = Rewriting(), 0
         texts: dict[int, str] = {}
@@ -158,7 +156,6 @@ class Rewriter:
             else:
                 done.kept += 1
                 texts[entry.id] = text
-            on_done()
         return texts, done
 
     def _at_limit(self, done: Rewriting, limits: Limits) -> bool:

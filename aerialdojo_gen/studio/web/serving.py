@@ -103,10 +103,10 @@ def require_web() -> None:
         raise MissingPackage(lacks("the page", error.name, "web")) from None
 
 
-def one_line(text: str, most: int = 500) -> str:
+def one_line(text: str) -> str:
     """Make a printable single line of a text that may come from a client."""
     shown = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" if c not in "\t\n\r" else " " for c in text)
-    return shown if len(shown) <= most else f"{shown[: most - 4]} ..."
+    return shown if len(shown) <= 500 else f"{shown[:496]} ..."
 
 
 def local_app(
