@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.annotation_scenes import GOOD, box, street, street_vocabulary
 
-from aerialdojo_gen.annotations.bearings import nearest_landmark
+from aerialdojo_gen.annotations.bearings import BORDER_DEG, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.matching import Matcher
@@ -131,7 +131,7 @@ def test_relations_grow_with_slack_and_near_is_mutual(a, b):
 
 
 @given(st.lists(_spot, min_size=1, max_size=6), _spot)
-def test_nearest_landmark_is_nearest_and_its_direction_points_there(places, here):
+def test_nearest_landmark_is_nearest_and_its_direction_is_the_octant_from_there(places, here):
     bearing = nearest_landmark(np.array(here), np.array(places))
     offsets = np.array(here) - np.array(places)
     away = np.hypot(*offsets.T)
@@ -139,9 +139,12 @@ def test_nearest_landmark_is_nearest_and_its_direction_points_there(places, here
         assert away.min() < 1e-3
         return
     assert away[bearing.landmark] <= away.min() + 1e-3
-    angle = np.deg2rad(45 * DIRECTIONS.index(bearing.direction))
-    along = offsets[bearing.landmark] @ [np.cos(angle), np.sin(angle)]
-    assert along >= np.cos(np.deg2rad(22.5)) * away[bearing.landmark] - 1e-9
+    dx, dy = offsets[bearing.landmark]
+    degrees = np.degrees(np.arctan2(dy, dx)) % 360.0
+    off = (degrees - 45.0 * DIRECTIONS.index(bearing.direction) + 180.0) % 360.0 - 180.0
+    assert abs(off) <= 22.5 + 1e-9
+    assert bearing.clear == (abs(off) <= 22.5 - BORDER_DEG) or abs(abs(off) - 22.5 + BORDER_DEG) < 1e-9
+    assert [d for d in DIRECTIONS if lies_towards((dx, dy), d, 22.4999)] in ([bearing.direction], [])
 
 
 def test_the_first_of_equally_near_landmarks_is_taken():

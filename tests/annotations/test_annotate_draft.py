@@ -20,7 +20,6 @@ from aerialdojo_gen.annotations.phrases import article, noun_of, words_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,11 +30,6 @@ def draft_annotations(scene, catalogue, n_landmarks, n_objects, seed, options=No
     landmarks = choose_landmarks(vocabulary, n_landmarks)
     drafter = AnnotationDrafter(vocabulary, landmarks, dataclasses.replace(options or DraftOptions(), seed=seed))
     return Annotations(scene.name, landmarks, drafter.objects(n_objects))
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(ROOT / "scene_assets")
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 from support.annotation_scenes import PAINTS, box, street, street_annotations, street_vocabulary
@@ -16,16 +15,8 @@ from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.phrases import noun_of, words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.claims import valid_looks
 from aerialdojo_gen.scenes.model import Material, Part, Scene
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(ROOT / "scene_assets")
 
 
 def _faults(scene: Scene | None = None, **texts: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 import dataclasses
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,17 +11,11 @@ from aerialdojo_gen.annotations.appearance import repeats
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
 from aerialdojo_gen.scenes.model import Scene
 
 WHEELS = "silvery hubcaps"
 ROOF = "a long roof down to the tailgate"
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(Path(__file__).resolve().parents[2] / "scene_assets")
 
 
 def stand(catalogue, category: str, level_m: float, variant: str | None = None, deck_m: float | None = None) -> Scene:

@@ -13,16 +13,14 @@ from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Material, Scene
 
 _PAINTS = PAINTS | {"teal": Material("teal", (0, 128, 128)), "dark red": Material("dark red", (140, 20, 20))}
 
 
 @pytest.fixture(scope="module")
-def faults_of(project):
+def faults_of(catalogue):
     """What is false of a text about the only thing of a scene."""
-    catalogue = load_catalogue(project / "scene_assets")
 
     def faults(text, category, colour):
         thing = box(f"{category}_000", (0, 0, 0), (1, 1, 1), colour=colour)
@@ -62,8 +60,7 @@ def test_what_is_only_put_otherwise_is_no_contradiction(faults_of, text, categor
     assert faults_of(text, category, "grey") == []
 
 
-def test_the_import_refuses_a_red_sedan_that_is_a_wall(project):
-    catalogue = load_catalogue(project / "scene_assets")
+def test_the_import_refuses_a_red_sedan_that_is_a_wall(project, catalogue):
     scene = build_scene(project / "scene_assets" / "smoke" / "U_Courtyard_0.toml", catalogue)
     document = json.loads((project / "annotations" / "smoke" / "U_Courtyard_0.json").read_text())
     entry = next(e for e in document["objects"] if e["category"] == "delivery_van")

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.annotation_scenes import box, street
+from support.annotation_scenes import box, street, street_vocabulary
 
-from aerialdojo_gen.annotations.bearings import BORDER_DEG, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.claims import KINDS, Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
-from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 
-ROOT = Path(__file__).resolve().parents[2]
 TOWER = Landmark(id=0, name="clock tower", node="clock_tower_000")
 
 
 @pytest.fixture(scope="module")
 def claims() -> SceneClaims:
-    return SceneClaims(Vocabulary(street(), load_catalogue(ROOT / "scene_assets")), [TOWER])
+    return SceneClaims(street_vocabulary(), [TOWER])
 
 
 _word = st.text(min_size=1, max_size=8)
@@ -85,28 +79,12 @@ def test_a_relation_holds_to_any_thing_that_the_words_fit(claims):
     assert not claims.holds(Claim("relation", "beside", (Mention(lamp, "tree"),)), second)
 
 
-_spot = st.tuples(st.floats(-40, 40), st.floats(-40, 40))
-
-
-@given(_spot, st.lists(_spot, min_size=1, max_size=4))
-def test_a_direction_is_the_octant_from_the_nearest_centroid(here, marks):
-    bearing = nearest_landmark(np.array(here), np.array(marks))
-    if bearing is None:
-        return
-    dx, dy = np.array(here) - np.array(marks[bearing.landmark])
-    degrees = np.degrees(np.arctan2(dy, dx)) % 360.0
-    off = (degrees - 45.0 * DIRECTIONS.index(bearing.direction) + 180.0) % 360.0 - 180.0
-    assert abs(off) <= 22.5 + 1e-9
-    assert bearing.clear == (abs(off) <= 22.5 - BORDER_DEG) or abs(abs(off) - 22.5 + BORDER_DEG) < 1e-9
-    assert [d for d in DIRECTIONS if lies_towards((dx, dy), d, 22.4999)] in ([bearing.direction], [])
-
-
 def test_near_a_border_nothing_is_said(claims):
     scene = street()
     angle = np.radians(22.5 + 4.0)
     edge = box("bench_001", (8 * np.cos(angle), 8 * np.sin(angle), 0), (1, 1, 1))
     extended = type(scene)(scene.name, (*scene.instances, edge), scene.materials, scene.bounds)
-    own = SceneClaims(Vocabulary(extended, load_catalogue(ROOT / "scene_assets")), [TOWER])
+    own = SceneClaims(street_vocabulary(extended), [TOWER])
     i = own.geometry.index["bench_001"]
     said = [c for c in own.of(i) if c.kind == "direction" or c.key.removesuffix(" of") in DIRECTIONS]
     assert own.bearings[i].direction == "northeast"

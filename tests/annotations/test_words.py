@@ -2,25 +2,15 @@
 
 import itertools
 import re
-from pathlib import Path
-
-import pytest
 
 from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.phrases import group_of, words_of
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 NUMBERS = dict(
     zip(("two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"), range(2, 11), strict=True)
 )
 # "Four axles" of eight wheels, "seven pairs" of fourteen skis.
 HALVES = ("axles", "pairs", "bogies", "sets")
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(ASSETS)
 
 
 def nouns(catalogue, category):
