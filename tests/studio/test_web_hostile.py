@@ -55,7 +55,8 @@ BODIES = {
     "/api/import": b"{" + AUTHOR + b', "text": %(text)s}',
     "/api/pick": b'{"origin_m": %(triple)s, "direction": %(other)s}',
     "/api/boxes": b'{"low_m": %(triple)s, "high_m": %(other)s, "category": %(name)s}',
-    "/api/objects/0/viewpoint": b'{"position_m": %(triple)s, "yaw_deg": %(id)s, "snap": %(flag)s}',
+    # Of an object that is not there: nothing is computed for a body that makes sense.
+    "/api/objects/9999/viewpoint": b'{"position_m": %(triple)s, "yaw_deg": %(id)s, "snap": %(flag)s}',
 }
 GOOD = {
     b"who": b'"Ada"', b"client": b'"hostile"', b"do": b'"change"', b"kind": b'"objects"', b"id": b"0",
