@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.kernels import njit
 
 Floats = NDArray[np.float64]
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -37,6 +38,15 @@ def unit(v: Floats) -> Floats:
 def distances_along(line: Floats) -> Floats:
     """Distance along a line of n points, (n, 2) or (n, 3), at each of them: (n,), the first 0."""
     return np.concatenate([[0.0], np.cumsum(norm(np.diff(line, axis=0)))])
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Vector products along the last axis."""
+    # np.cross spends ten times the arithmetic on checking axes, and meshes are many and small.
+    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return np.stack([x, y, z], axis=-1)
 
 
 def product(a: Floats, b: Floats) -> Floats:

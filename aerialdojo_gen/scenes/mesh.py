@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.geometry.portable import dot, norm, product
+from aerialdojo_gen.geometry.portable import cross, dot, norm, product
 from aerialdojo_gen.scenes.model import Part
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Mesh:
     def volume_m3(self) -> float:
         """Signed volume: positive for a closed mesh whose faces are wound outwards."""
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return float(dot(a, _cross(b, c)).sum() / 6.0)
+        return float(dot(a, cross(b, c)).sum() / 6.0)
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
@@ -147,23 +147,15 @@ def _areas(v: Floats, f: Ints) -> Floats:
     return out
 
 
-def _cross(u: Floats, w: Floats) -> Floats:
-    # np.cross spends ten times the arithmetic on checking axes, and meshes are many and small.
-    x = u[:, 1] * w[:, 2] - u[:, 2] * w[:, 1]
-    y = u[:, 2] * w[:, 0] - u[:, 0] * w[:, 2]
-    z = u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]
-    return np.stack([x, y, z], axis=1)
-
-
 def _projected_uv(m: Mesh) -> Floats:
     corners = m.vertices[m.faces]
-    normals = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(norm(normals)[:, None], 1e-300)
     flat = np.abs(normals[:, 2]) > _FLAT_COSINE
     along = np.column_stack([-normals[:, 1], normals[:, 0], np.zeros(len(normals))])
     along /= np.maximum(norm(along)[:, None], 1e-12)
     along[flat] = (1.0, 0.0, 0.0)
-    up = _cross(normals, along)
+    up = cross(normals, along)
     up[flat] = (0.0, 1.0, 0.0)
     return np.stack([dot(corners, along[:, None]), dot(corners, up[:, None])], axis=2)
 

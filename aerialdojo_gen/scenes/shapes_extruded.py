@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
-from aerialdojo_gen.geometry.portable import dot, norm, unit
+from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, number, rows_of, whole
 
@@ -182,11 +182,11 @@ def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
         if norm(middle) < 1e-6:
             raise ShapeError("the path turns back on itself")
         middle = unit(middle)
-        level = np.cross(middle, (0.0, 0.0, 1.0))
+        level = cross(middle, UP)
         # Nearly vertical stretches have no level direction of their own: carry the last one on.
         right = level if norm(level) > 0.1 else right - middle * dot(right, middle)
         right = unit(right)
-        up = np.cross(right, middle)
+        up = cross(right, middle)
         offsets = ring[:, :1] * right + ring[:, 1:] * up
         bend = t1 - t0
         bend = bend - middle * dot(bend, middle)

@@ -12,7 +12,7 @@ from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 
-SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
+SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_0", "N_Forest_1"]
 of_each_scene = each_scene(SCENES)
 
 
@@ -28,6 +28,7 @@ def test_boulders_touch_the_ground(scene_of, name):
         assert above.min() < 0.0 < above.max(), boulder.node
 
 
+@pytest.mark.nightly
 def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
     scene = scene_of("N_Mountain_0")
     ground, cross = scene["ground"], scene["summit_cross_000"]

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.catalogue_faults import catalogue_faults
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
@@ -202,38 +201,3 @@ def test_254_categories_load(assets):
     body = MAILBOX
     (assets / "props" / "many.toml").write_text("".join(body.replace("mailbox", f"box_{k}") for k in range(253)))
     assert len(load_catalogue(assets)) == 254
-
-
-@pytest.fixture(scope="module")
-def shipped():
-    return load_catalogue(ASSETS)
-
-
-@pytest.mark.slow
-def test_every_shipped_variant_is_a_body_of_sensible_size(shipped):
-    faults = []
-    for category in shipped:
-        for variant in shipped[category].variants:
-            made = shipped.instantiate(category, "n", generator(0, "t", category), variant=variant.name)
-            low, high = made.bounds
-            largest = float((high - low).max())
-            if not 0.05 < largest < 120 or low[2] < -2.5 or len(made.faces) > 6000:
-                faults.append((category, variant.name, made.bounds.round(2).tolist(), len(made.faces)))
-            area = np.linalg.norm(np.cross(*(made.vertices[made.faces][:, k] - made.vertices[made.faces][:, 0]
-                                             for k in (1, 2))), axis=1)  # fmt: skip
-            if area.min() <= 0:
-                faults.append((category, variant.name, "a face without area"))
-    assert not faults
-
-
-def test_every_shipped_surface_can_be_drawn(shipped):
-    for name in shipped.materials.names:
-        surface = shipped.materials[name]
-        assert surface.texture is None or surface.texture.shape[2] == 3
-        assert 0 <= min(surface.colour) <= max(surface.colour) <= 255
-
-
-def test_all_that_the_catalogue_says_of_targets_is_so_of_every_variant_it_builds():
-    catalogue = load_catalogue(ASSETS)
-    assert len(catalogue.targets) == 254
-    assert catalogue_faults(catalogue) == []

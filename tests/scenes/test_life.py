@@ -1,7 +1,8 @@
-"""People and animals stand on the right ground with room, alike in every build, and no text names them."""
+"""People and animals stand on the right ground with room, and no text names them."""
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,12 @@ from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.checks import clashes, floating
 from aerialdojo_gen.scenes.kit.life import WALKED, life
-from aerialdojo_gen.scenes.plans.build import build_plan, build_site
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.plans.build import build_site
+from aerialdojo_gen.scenes.site import Site
 
 ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
-SCENES = ("U_Alley_0", "N_Coast_1", "D_Flood_1")
+SCENES = ("U_Alley_0", "D_Flood_1", "I_RailCorridor_0")
 POSTURES = {"standing": 0, "walking": 1, "sitting": 2, "at work": 3, "on the phone": 4}
 
 
@@ -27,10 +30,20 @@ def catalogue() -> Catalogue:
     return load_catalogue(ASSETS)
 
 
-@pytest.fixture(scope="module", params=SCENES)
-def built(request, catalogue):
-    path = ASSETS / "scenes" / f"{request.param}.toml"
-    return build_site(request.param, read_toml(path, AssetError), catalogue, request.param, path.parent)[0]
+@cache
+def site_of(name: str) -> Site:
+    path = ASSETS / "scenes" / f"{name}.toml"
+    return build_site(name, read_toml(path, AssetError), load_catalogue(ASSETS), name, path.parent)[0]
+
+
+@cache
+def scene_of(name: str) -> Scene:
+    return site_of(name).scene()
+
+
+@pytest.fixture(params=SCENES)
+def built(request) -> Site:
+    return site_of(request.param)
 
 
 def living(catalogue, instances, kinds=None):
@@ -73,7 +86,7 @@ def test_people_stand_where_people_walk(catalogue, built):
 
 def test_people_stand_on_platforms(catalogue):
     """Away from the edges, and no more than two in five."""
-    scene = build_plan(ASSETS / "scenes" / "I_RailCorridor_0.toml", catalogue)
+    scene = scene_of("I_RailCorridor_0")
     tops = [i.bounds for i in scene.instances if i.category == "platform"]
     people = living(catalogue, scene.instances, {"person"})
     above = [
@@ -85,7 +98,7 @@ def test_people_stand_on_platforms(catalogue):
 
 
 def test_nobody_floats_or_stands_in_another(catalogue, built):
-    scene = built.scene()
+    scene = scene_of(built.name)
     nodes = {i.node for i in living(catalogue, scene.instances)}
     assert nodes
     assert not nodes & set(floating(scene, catalogue))
@@ -101,20 +114,13 @@ def test_birds_stand_on_what_is_high(catalogue, built):
 
 
 def test_no_claim_is_about_somebody_who_moves(catalogue):
-    scene = build_plan(ASSETS / "scenes" / "U_Alley_0.toml", catalogue)
+    scene = scene_of("U_Alley_0")
     kinds = {i.node: i.category for i in living(catalogue, scene.instances)}
     claims = SceneClaims(Vocabulary(scene, catalogue), ())
     named = [m.node for k, i in enumerate(scene.instances) if i.category in catalogue.targets
              for claim in claims.of(k) for m in claim.things]  # fmt: skip
     assert named
     assert not kinds.keys() & set(named)
-
-
-def test_they_are_the_same_in_every_build(catalogue):
-    one, two = (build_plan(ASSETS / "scenes" / "U_Alley_0.toml", catalogue) for _ in range(2))
-    for a, b in zip(living(catalogue, one.instances), living(catalogue, two.instances), strict=True):
-        assert a.node == b.node
-        assert np.array_equal(a.vertices, b.vertices)
 
 
 def test_an_unknown_group_of_people_is_named(catalogue, built):

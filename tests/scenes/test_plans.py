@@ -68,8 +68,16 @@ def schema():
 
 
 def test_the_schema_fits_every_plan(schema):
-    found = {path.stem: [e.json_path for e in schema.iter_errors(tomllib.loads(path.read_text()))] for path in PLANS}
-    assert {name: paths for name, paths in found.items() if paths} == {}
+    """An entry with `make` is held against its builder's branch alone: to try all of them takes minutes."""
+    branches = {one["title"]: schema.evolve(schema=one) for one in schema.schema["$defs"]["Entry"]["anyOf"]}
+    entry = schema.evolve(schema=schema.schema["$defs"]["Entry"])
+    faults = []
+    for path in PLANS:
+        plan = tomllib.loads(path.read_text())
+        entries = [one for several in plan["site"] for one in several.get("entries", [several])]
+        faults += [(path.stem, one) for one in entries if not branches.get(one.get("make"), entry).is_valid(one)]
+        faults += [path.stem] if not schema.is_valid({**plan, "site": [{"entries": []}]}) else []
+    assert faults == []
     assert schema.is_valid(YARD)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from aerialdojo_gen.geometry.portable import distances_along, dot, norm, product, unit
+from aerialdojo_gen.geometry.portable import UP, cross, distances_along, dot, norm, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -29,7 +29,7 @@ def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
     for p, t, r in zip(line[:rings], ahead[:rings], radii[:rings], strict=True):
         side = side - t * dot(side, t)
         side = unit(side)
-        other = np.cross(t, side)
+        other = cross(t, side)
         vertices.append(p + r * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other))
     along = distances_along(line)
     width = 2 * np.pi * max(radii) / sides
@@ -89,7 +89,7 @@ def _hull(points: Floats) -> tuple[Floats, Ints]:
     index = np.zeros(len(points), dtype=np.int32)
     index[used] = np.arange(len(used))
     v, faces = points[used], index[hull.simplices]
-    normals = np.cross(v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]])
+    normals = cross(v[faces[:, 1]] - v[faces[:, 0]], v[faces[:, 2]] - v[faces[:, 0]])
     inward = dot(normals, v[faces].mean(axis=1) - v.mean(axis=0)) < 0
     faces[inward] = faces[inward][:, ::-1]
     order = np.lexsort(faces.T[::-1])
@@ -124,7 +124,7 @@ def whorl(
 def blade(root: ArrayLike, bend: ArrayLike, tip: ArrayLike, width: float) -> Mesh:
     """Make a frond or leaf: two long facets a side from a root over a bend to a tip, 1 cm thick at the bend."""
     a, b, c = (np.asarray(p, dtype=np.float64) for p in (root, bend, tip))
-    across = np.cross(c - a, (0.0, 0.0, 1.0))
+    across = cross(c - a, UP)
     length = float(norm(across))
     across = np.array([1.0, 0.0, 0.0]) if length < 1e-6 else across / length
     w = across * width / 2
@@ -151,7 +151,7 @@ def stone(rng: np.random.Generator, radii: ArrayLike, corners: int = 22, sunk: f
 def split_by_slope(m: Mesh, cosine: float) -> tuple[Mesh, Mesh]:
     """Part a mesh into what faces up (normal's z above `cosine`), where moss lies, and the rest."""
     a, b, c = (m.vertices[m.faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
+    normals = cross(b - a, c - a)
     up = normals[:, 2] > cosine * norm(normals)
     return mesh(m.vertices, m.faces[up]), mesh(m.vertices, m.faces[~up])
 
