@@ -1,0 +1,284 @@
+"""The catalogue that ships: every shape of every category, built once, and what holds of each.
+
+Things are as large as the real ones (`scene_assets/sizes.toml`), their designs differ, round parts stay round, and
+held-out designs stand where they should.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.catalogue_faults import catalogue_faults
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.designs import PLAIN, DesignSets, of_side, parse_designs
+from aerialdojo_gen.scenes.materials import read_toml
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.plans.build import build_plan, build_tables
+from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
+
+ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
+SLACK = 1.05
+# Made to a standard, joined to what stands beside them, or varied by their own builder.
+FEW_DESIGNS = 30
+URBAN = {"vehicles", "street", "retail", "park", "signs", "shopfronts", "landmarks_urban"}
+HUNG = {"shop_sign", "wall_banner", "wall_clock", "storefront", "dock_door"}
+Ranges = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Body:
+    """What the tests ask of a shape: its bounds, the digest of its geometry, its faces."""
+
+    bounds: NDArray[np.float64]
+    shape: str
+    n_faces: int
+    least_area_m2: float
+
+    @property
+    def size_m(self) -> NDArray[np.float64]:
+        return np.ptp(self.bounds, axis=0)
+
+
+Bodies = Mapping[str, Mapping[tuple[str, str], Body]]
+
+
+@pytest.fixture(scope="module")
+def catalogue() -> Catalogue:
+    return load_catalogue(ASSETS)
+
+
+@pytest.fixture(scope="module")
+def sizes() -> Mapping[str, Ranges]:
+    return read_toml(ASSETS / "sizes.toml")
+
+
+def shapes_of(prop: Category) -> Iterator[Variant]:
+    """Variants, one of those that differ in nothing but their surfaces."""
+    written = any("{" in part.get("text", "") for part in prop.parts)
+    built = set()
+    for variant in prop.variants:
+        shape = (variant.without, *sorted(variant.params.items()))
+        key = (shape, tuple(variant.attributes.items()) if written else ())
+        if key not in built:
+            built.add(key)
+            yield variant
+
+
+def made(catalogue: Catalogue, category: str, variant: str, design: str) -> Instance:
+    return catalogue.instantiate(category, "thing", generator(0, "test"), variant=variant, design=design)
+
+
+@pytest.fixture(scope="module")
+def bodies(catalogue: Catalogue) -> Bodies:
+    """Every category's shapes, by variant and design; the first is that of the first variant and design."""
+    out: dict[str, dict[tuple[str, str], Body]] = {}
+    for category in catalogue:
+        prop, own = catalogue[category], out.setdefault(category, {})
+        for variant in shapes_of(prop):
+            for design in prop.designs:
+                thing = made(catalogue, category, variant.name, design.name)
+                area = float(areas(thing.vertices, thing.faces).min())
+                own[variant.name, design.name] = Body(thing.bounds, thing.shape, len(thing.faces), area)
+    return out
+
+
+def designs_of_first(bodies: Bodies, catalogue: Catalogue, category: str) -> list[Body]:
+    """Bodies of the first variant in every design."""
+    prop = catalogue[category]
+    return [bodies[category][prop.variants[0].name, design.name] for design in prop.designs]
+
+
+def outliers(extents: Mapping[tuple[str, str], Sequence[float]], ranges: Ranges) -> list[tuple[str, str]]:
+    """Variants and designs of which the longest horizontal extent or the height is out of its range."""
+    (least, most), (lowest, highest) = ranges
+    return [
+        name
+        for name, (x, y, z) in extents.items()
+        if not (least / SLACK <= max(x, y) <= most * SLACK and lowest / SLACK <= z <= highest * SLACK)
+    ]
+
+
+def test_every_category_has_a_size(catalogue, sizes):
+    assert set(sizes) == set(catalogue)
+    for category, ranges in sizes.items():
+        assert len(ranges) == 2, category
+        assert all(0 < low < high for low, high in ranges), category
+
+
+@pytest.mark.slow
+def test_things_are_as_large_as_real_ones(bodies, sizes):
+    wrong = {
+        category: outliers({name: body.size_m for name, body in own.items()}, sizes[category])
+        for category, own in bodies.items()
+    }
+    assert not {category: names for category, names in wrong.items() if names}
+
+
+@pytest.mark.slow
+def test_every_shape_is_a_body_that_stands_on_the_ground(catalogue, bodies):
+    for category, own in bodies.items():
+        assert min(body.least_area_m2 for body in own.values()) > 0, category
+        for (_, design), body in own.items():
+            if design == catalogue[category].designs[0].name:
+                assert 0.05 < body.size_m.max() < 120, category
+                assert body.bounds[0, 2] >= -2.5, category
+                assert body.n_faces <= 6000, category
+
+
+@pytest.mark.slow
+def test_urban_things_have_looks_that_differ_and_few_triangles(catalogue, bodies):
+    urban = [c for c in catalogue if Path(catalogue[c].source.partition(":")[0]).stem in URBAN]
+    assert len(urban) > 80
+    for category in urban:
+        looks = [tuple(sorted(variant.attributes.items())) for variant in catalogue[category].variants]
+        assert all(looks), category
+        assert len(set(looks)) == len(looks), category
+        for (_, design), body in bodies[category].items():
+            if design == catalogue[category].designs[0].name:
+                # A stack of pallets is made of boards.
+                assert 12 <= body.n_faces <= 3000, category
+                assert -0.05 <= body.bounds[0, 2] < 0.5 or category in HUNG, category
+                assert 0.4 < body.size_m.max() < 25.0, category
+
+
+@pytest.mark.slow
+def test_designs_of_a_category_are_different_shapes(catalogue, bodies):
+    few = []
+    for category in catalogue.targets:
+        designs = catalogue[category].designs
+        assert len({body.shape for body in designs_of_first(bodies, catalogue, category)}) == len(designs), category
+        few += [category] if len([d for d in designs if not d.held_out]) < 4 or len(designs) < 6 else []
+    assert len(few) < FEW_DESIGNS, few
+
+
+@pytest.mark.slow
+def test_no_design_changes_a_thing_beyond_use(catalogue, bodies):
+    """Its extents stay within a third, and it stands where the first design stands."""
+    for category in catalogue.targets:
+        plain, *others = designs_of_first(bodies, catalogue, category)
+        for other in others:
+            ratio = other.size_m / plain.size_m
+            assert ((ratio > 0.66) & (ratio < 1.4)).all(), (category, ratio)
+            # What hangs above its origin, or reaches below it, does so in proportion.
+            low, own = plain.bounds[0, 2], other.bounds[0, 2]
+            assert abs(own - low) <= 0.25 * abs(low) + 0.02, (category, low, own)
+
+
+@pytest.mark.slow
+def test_all_that_the_catalogue_says_of_targets_is_so_of_every_variant_it_builds(catalogue):
+    assert catalogue_faults(catalogue) == []
+
+
+def test_every_surface_can_be_drawn(catalogue):
+    for name in catalogue.materials.names:
+        surface = catalogue.materials[name]
+        assert surface.texture is None or surface.texture.shape[2] == 3
+        assert 0 <= min(surface.colour) <= max(surface.colour) <= 255
+
+
+def test_a_thing_of_a_wrong_size_is_found(catalogue, sizes):
+    sedan = {("", ""): np.ptp(made(catalogue, "sedan", catalogue["sedan"].variants[0].name, "plain").bounds, axis=0)}
+    for factors in ([0.7, 0.7, 1.0], [1.4, 1.4, 1.0], [1.0, 1.0, 0.7], [1.0, 1.0, 1.4]):
+        assert outliers({name: size * factors for name, size in sedan.items()}, sizes["sedan"])
+    assert not outliers(sedan, sizes["sedan"])
+
+
+def test_the_scale_of_a_category_multiplies_all_extents(catalogue):
+    fox = catalogue["fox"]
+    assert fox.scale < 1.0
+    made = catalogue.instantiate("fox", "fox", generator(0, "test"), scale=1.0 / fox.scale)
+    own = catalogue.instantiate("fox", "fox", generator(0, "test"))
+    np.testing.assert_allclose(np.ptp(own.bounds, axis=0), np.ptp(made.bounds, axis=0) * fox.scale, rtol=1e-5)
+    assert own.shape != made.shape
+
+
+@pytest.mark.parametrize("scale", [0, 0.09, 10.5, -1, True, "2", float("nan")])
+def test_a_scale_beyond_use_is_named(catalogue, scale):
+    body = {"name": "box", "scale": scale, "parts": [{"shape": "box", "size": [1, 1, 1], "role": "wood"}]}
+    sets: DesignSets = dict.fromkeys(("free", "fixed"), (PLAIN,))
+    with pytest.raises(AssetError, match=r"\[crate\]: scale must be a number from 0.1 to 10"):
+        parse_category(Path("props.toml"), "crate", body, catalogue.materials, sets)
+
+
+@pytest.mark.parametrize(("category", "part", "axes"), [
+    ("sedan", "tyre", (0, 2)), ("delivery_van", "tyre", (0, 2)), ("bicycle", "tyre", (0, 2)),
+    ("fire_hydrant", "body", (0, 1)), ("stop_sign", "back", (1, 2)),
+])  # fmt: skip
+def test_what_is_round_stays_round(catalogue, category, part, axes):
+    """Wheels, bodies and discs keep their proportions in their own plane, and wheels stand on the ground."""
+    round_m = {}
+    for design in catalogue[category].designs:
+        thing = made(catalogue, category, catalogue[category].variants[0].name, design.name)
+        assert thing.copies_of(part), (category, part)
+        faces = thing.copies_of(part)[0]
+        extents = np.ptp(thing.vertices[thing.faces[faces]].reshape(-1, 3), axis=0)[list(axes)]
+        round_m[design.name] = extents[0] / extents[1]
+        assert part != "tyre" or abs(thing.bounds[0, 2]) < 0.02
+    assert np.allclose(list(round_m.values()), round_m["plain"], rtol=1e-4), round_m
+
+
+def test_vehicles_in_bays_differ_beside_their_designs_and_stand_on_round_wheels(catalogue):
+    bays = {"make": "parking_rows", "rows": [[0, 0, 90, 24]], "occupancy": 1.0, "vehicles": {"sedan": 1.0}}
+    plan = {"plan": 1, "seed": 3, "size_m": [80, 40], "ceiling_m": 12, "sky": "#a9c6e8"}
+    height = np.ptp(made(catalogue, "sedan", catalogue["sedan"].variants[0].name, "plain").bounds[:, 2])
+    for differ, different in ((0.0, range(1, 11)), (0.06, [24])):
+        cars = [
+            thing
+            for thing in build_tables("U_Test_0", plan | {"site": [bays | {"differ": differ}]}, catalogue).instances
+            if thing.category == "sedan"
+        ]
+        assert len(cars) == 24
+        assert len({car.shape for car in cars}) in different
+        for car in cars:
+            tyre = car.vertices[car.faces[car.copies_of("tyre")[0]]].reshape(-1, 3)
+            assert abs(car.bounds[0, 2]) < 0.02
+            # Its radius is the same ahead and upwards: along x and y the car's yaw mixes it with the tyre's width.
+            around = np.linalg.norm(np.ptp(tyre, axis=0)[:2])
+            assert np.ptp(tyre[:, 2]) < around < 1.3 * np.ptp(tyre[:, 2])
+            assert abs(np.ptp(car.bounds[:, 2]) / height - 1.0) < 0.25
+
+
+def test_out_of_distribution_scenes_have_held_out_designs(catalogue):
+    shapes: dict[str, dict[str, set[str]]] = {"0": defaultdict(set), "1": defaultdict(set)}
+    for name in ("U_Alley_0", "U_Alley_1"):
+        for thing in build_plan(ASSETS / "scenes" / f"{name}.toml", catalogue).instances:
+            if thing.category in catalogue.targets:
+                designs = catalogue[thing.category].designs
+                assert thing.held_out == (name.endswith("_1") and len(designs) > 1)
+                shapes[name[-1]][thing.category].add(thing.shape)
+    several = [c for c in shapes["0"] if c in shapes["1"] and len(catalogue[c].designs) > 1]
+    assert several
+    assert not any(shapes["0"][c] & shapes["1"][c] for c in several)
+    assert any(len(found) > 1 for found in shapes["0"].values())
+
+
+def test_a_side_without_designs_takes_the_first(catalogue):
+    designs = catalogue["sedan"].designs
+    assert {d.held_out for d in of_side(designs, "train")} == {False}
+    assert {d.held_out for d in of_side(designs, "held_out")} == {True}
+    assert of_side(designs, "plain") == designs[:1] == of_side(designs[:1], "held_out")
+
+
+@pytest.mark.parametrize(("raw", "named"), [
+    ([], "array of tables"),
+    ([{"name": "plain", "held_out": True}], "first design"),
+    ([{"name": "plain"}, {"name": "plain"}], "one name"),
+    ([{"name": "plain", "stretch": [1, 1]}], "three factors"),
+    ([{"name": "plain", "stretch": [1, 1, 9]}], "three factors"),
+    ([{"name": "plain", "without": ["roof"]}], "'roof'"),
+    ([{"name": "plain", "params": {"high": 2}}], "'high'"),
+    ([{"name": "plain", "stretches": [1, 1, 1]}], "'stretches'"),
+])  # fmt: skip
+def test_what_is_wrong_with_a_design_is_named(raw, named):
+    with pytest.raises(AssetError, match=named):
+        parse_designs(raw, {"height": (1, 2)}, {"door"}, "props.toml: [booth]")
