@@ -12,10 +12,12 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.geometry.portable import norm
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
-from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, rotated, rotation, translated
+from aerialdojo_gen.scenes.ground import edge_strip
+from aerialdojo_gen.scenes.mesh import Mesh, mesh, posed, rotated, rotation
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.shapes_extruded import extrude, profile
+from aerialdojo_gen.scenes.shapes_extruded import profile, upright
 from aerialdojo_gen.scenes.site import Site
 
 ROOFS = ("flat", "gable", "hip")
@@ -53,8 +55,7 @@ def building(
         lid = plan.buffer(-0.02 if parapet_m > 0.0 else 0.15, join_style="mitre")
         parts += [(roof, slab(p, top - 0.3, top)) for p in _pieces(lid)]
         if parapet_m > 0.0:
-            rim = plan.difference(plan.buffer(-0.3, join_style="mitre"))
-            parts += [("concrete", slab(p, top, top + parapet_m)) for p in _pieces(rim)]
+            parts += [("concrete", slab(p, top, top + parapet_m)) for p in _pieces(edge_strip(plan, 0.3))]
     else:
         parts += pitched_roof(plan, top, roof_m, wall, roof, hip=roof_kind == "hip", overhang_m=overhang_m)
     return site.add(node, category, [*parts, *extra], attributes, footprint=plan)
@@ -115,8 +116,7 @@ def pitched_roof(
         parts.append((roof, rotated(profile(points=chevron, width=length + 2 * overhang_m), quarter)))
         gable = profile(points=[(-width / 2, 0.0), (width / 2, 0.0), (0.0, height_m)], width=length)
         parts.append((wall, rotated(gable, quarter)))
-    turn = rotation(0.0, 0.0, yaw)
-    return [(m, translated(rotated(b, turn), (*centre, z_m))) for m, b in parts]
+    return Frame(*centre, yaw).parts(parts, z_m)
 
 
 def wall_with_openings(
@@ -130,16 +130,16 @@ def wall_with_openings(
     """Make a straight wall from `a` to `b` with openings (from, to, sill, head), metres, to look and fly through."""
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     face: BaseGeometry = Polygon([(0, 0), (length, 0), (length, z1_m - z0_m), (0, z1_m - z0_m)])
+    wall = upright(_pieces(opened(face, openings)), thickness_m)
+    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    return posed(wall, rotation(0.0, 0.0, yaw), (*a, z0_m))
+
+
+def opened(face: BaseGeometry, openings: Sequence[tuple[float, float, float, float]]) -> BaseGeometry:
+    """Cut openings (from, to, sill, head) out of a wall's side view."""
     for u0, u1, sill, head in openings:
         face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
-    bodies = []
-    for piece in _pieces(face):
-        flat = extrude(piece, thickness_m)
-        u, v, w = flat.vertices.T
-        # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
-        bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
-    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
-    return translated(rotated(merge(bodies), rotation(0.0, 0.0, yaw)), (*a, z0_m))
+    return face
 
 
 def before_walls(plan: Polygon, spacing_m: float, offset_m: float, inset_m: float = 1.0) -> list[Pose]:

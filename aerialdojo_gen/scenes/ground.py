@@ -184,6 +184,12 @@ def disc(x: float, y: float, radius_m: float, corners: int = 24) -> Polygon:
     return Polygon(np.column_stack([x + radius_m * np.cos(angles), y + radius_m * np.sin(angles)]))
 
 
+def edge_strip(plan: BaseGeometry, in_m: float, out_m: float = 0.0) -> BaseGeometry:
+    """Make the strip along a plan's outline that reaches so far in and out of it, metres: a parapet, a kerb."""
+    outer = plan.buffer(out_m, join_style="mitre") if out_m else plan
+    return outer.difference(plan.buffer(-in_m, join_style="mitre"))
+
+
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> Polygon:
     """Make an axis-aligned rectangle, metres, world frame."""
     return Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])

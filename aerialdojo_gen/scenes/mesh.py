@@ -99,6 +99,11 @@ def rotated(m: Mesh, matrix: Floats) -> Mesh:
     return replace(m, vertices=product(m.vertices, matrix.T))
 
 
+def posed(m: Mesh, turn: Floats, at: ArrayLike) -> Mesh:
+    """Turn a mesh by a matrix (3, 3), then move it by (x, y, z) metres."""
+    return translated(rotated(m, turn), at)
+
+
 def mirrored(m: Mesh, axis: int) -> Mesh:
     """Mirror in the plane where coordinate `axis` is 0, with faces wound outwards again."""
     v = m.vertices.copy()

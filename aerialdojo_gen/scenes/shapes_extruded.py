@@ -15,7 +15,7 @@ from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, unit
-from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, merge, mesh, outward
 from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, number, rows_of, whole
 
 _SECTIONS = ("gable", "wedge", "trapezoid")
@@ -51,9 +51,17 @@ def profile(*, points: Sequence[Numbers], width: float) -> Mesh:
     """Extrude a side view along y, centred on y = 0; `points` are (x, z), metres."""
     _positive("width", (width,), 1)
     outline = rows_of("points", points, 2, 0)
-    body = extrude(_checked(Polygon(outline) if len(outline) > 2 else None), width)
-    a, b, c = body.vertices.T
-    return Mesh(np.column_stack([a, width / 2 - c, b]), body.faces)
+    return upright([_checked(Polygon(outline) if len(outline) > 2 else None)], width)
+
+
+def upright(faces: Sequence[Polygon], width_m: float, y_m: float = 0.0) -> Mesh:
+    """Extrude side views, polygons of (x, z) in metres, along y, centred on `y_m`; patterns are projected anew."""
+    bodies = []
+    for face in faces:
+        body = extrude(face, width_m)
+        a, b, c = body.vertices.T
+        bodies.append(Mesh(np.column_stack([a, y_m + width_m / 2 - c, b]), body.faces))
+    return merge(bodies)
 
 
 def block(*, corners: Numbers, z: Numbers) -> Mesh:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Unpack, overload
 
@@ -272,6 +272,11 @@ class Site:
         """Occupy an area, over all heights by default."""
         self._footprints.add(area, z0_m, z1_m)
 
+    def occupy_about(self, points: Iterable[tuple[float, float]], half_m: float, z0_m: float, z1_m: float) -> None:
+        """Occupy squares about points, such as the feet of columns, between two heights."""
+        for x, y in points:
+            self.occupy(rectangle(x - half_m, y - half_m, x + half_m, y + half_m), z0_m, z1_m)
+
     def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
         """Whether a disc of ground inside the site is free up to `height_m` above the ground (or above `z`)."""
         base = self.ground_z(x, y) if z is None else z
@@ -355,6 +360,11 @@ class Footprints:
         shapely.prepare(area)
         for cell in _cells(area.bounds):
             self._buckets.setdefault(cell, []).append((area, z0_m, z1_m))
+
+    def occupy_about(self, points: Iterable[tuple[float, float]], half_m: float, z0_m: float, z1_m: float) -> None:
+        """Occupy squares about points, such as the feet of columns, between two heights."""
+        for x, y in points:
+            self.occupy(rectangle(x - half_m, y - half_m, x + half_m, y + half_m), z0_m, z1_m)
 
     def is_free(self, area: BaseGeometry, z0_m: float, z1_m: float) -> bool:
         """Whether the area is unoccupied between two heights, metres."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
@@ -77,12 +77,12 @@ class Terrain:
         """
         if area.is_empty:
             return self
-        near = self._distance(area)
+        near = self.distance(area)
         inside = near <= self.cell_m * 1.5
         if z_m is None and not inside.any():
             raise AssetError(f"the ground about ({area.centroid.x:g}, {area.centroid.y:g}) lies off the site")
         level = float(self.heights_m[inside].mean()) if z_m is None else z_m
-        return self._blended(np.full_like(self.heights_m, level), near, blend_m)
+        return self._sloped(np.full_like(self.heights_m, level), near, blend_m)
 
     def graded(self, path: ArrayLike, width_m: float, blend_m: float = 3.0, smooth_m: float = 12.0) -> Terrain:
         """Lay a path (n, 2), world metres, into the ground: level across and smoothed along over `smooth_m`."""
@@ -95,21 +95,32 @@ class Terrain:
         corners = self.corners()
         at = line.project(shapely.points(corners[:, :2]))
         target = np.interp(at, s, profile).reshape(self.heights_m.shape)
-        return self._blended(target, self._distance(line.buffer(width_m / 2)), blend_m)
+        return self._sloped(target, self.distance(line.buffer(width_m / 2)), blend_m)
 
     def lowered(self, area: BaseGeometry, depth_m: float, blend_m: float) -> Terrain:
         """Sink an area by `depth_m`, with slopes of `blend_m` inside its border: a bed of water, a crater."""
-        inside = shapely.distance(area.boundary, shapely.points(self.corners()[:, :2]))
-        inside = np.where(shapely.contains_xy(area, *self.corners()[:, :2].T), inside, 0.0)
-        t = np.clip(inside.reshape(self.heights_m.shape) / blend_m, 0.0, 1.0)
-        return replace(self, heights_m=self.heights_m - depth_m * _smooth(t))
+        return self.raised(-depth_m * smooth(self.inside(area) / blend_m))
 
-    def _distance(self, area: BaseGeometry) -> Floats:
+    def raised(self, by_m: Floats) -> Terrain:
+        """Add to the heights of the corners, given in rows or as `corners` lists them."""
+        return replace(self, heights_m=self.heights_m + by_m.reshape(self.heights_m.shape))
+
+    def blended(self, to_m: Floats | float, share: Floats) -> Terrain:
+        """Mix the heights with others, which have a share at every corner, all in rows."""
+        return replace(self, heights_m=self.heights_m * (1.0 - share) + to_m * share)
+
+    def distance(self, area: BaseGeometry) -> Floats:
+        """Distance of the corners from an area, in rows, metres."""
         shapely.prepare(area)
         return np.asarray(shapely.distance(area, shapely.points(self.corners()[:, :2])).reshape(self.heights_m.shape))
 
-    def _blended(self, target: Floats, distance: Floats, blend_m: float) -> Terrain:
-        t = _smooth(np.clip((distance - self.cell_m * 1.5) / max(blend_m, 1e-9), 0.0, 1.0))
+    def inside(self, area: BaseGeometry) -> Floats:
+        """How deep in an area the corners lie, in rows, metres: 0 outside."""
+        within = shapely.contains_xy(area, *self.corners()[:, :2].T).reshape(self.heights_m.shape)
+        return np.where(within, self.distance(area.boundary), 0.0)
+
+    def _sloped(self, target: Floats, distance: Floats, blend_m: float) -> Terrain:
+        t = smooth((distance - self.cell_m * 1.5) / max(blend_m, 1e-9))
         return replace(self, heights_m=target * (1.0 - t) + self.heights_m * t)
 
 
@@ -147,11 +158,10 @@ def flat_terrain(size_m: tuple[float, float], z_m: float = 0.0) -> Terrain:
 
 def mound(terrain: Terrain, centre: tuple[float, float], radius_m: float, height_m: float) -> Terrain:
     """Raise a round hill, or sink a hollow where `height_m` is negative."""
-    corners = terrain.corners()[:, :2]
-    d: NDArray[np.float64] = np.asarray(shapely.distance(Point(centre), shapely.points(corners)))
-    t = _smooth(np.clip(1.0 - d / radius_m, 0.0, 1.0)).reshape(terrain.heights_m.shape)
-    return replace(terrain, heights_m=terrain.heights_m + height_m * t)
+    return terrain.raised(height_m * smooth(1.0 - terrain.distance(Point(centre)) / radius_m))
 
 
-def _smooth(t: Floats) -> Floats:
+def smooth(t: Floats) -> Floats:
+    """Ease from 0 to 1, with level ends."""
+    t = np.clip(t, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)

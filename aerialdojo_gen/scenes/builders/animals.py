@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import limb, vec
-from aerialdojo_gen.scenes.mesh import Mesh, rotated, rotation, stretched, translated
+from aerialdojo_gen.scenes.mesh import Mesh, posed, rotated, rotation, stretched, translated
 from aerialdojo_gen.scenes.shapes import cone, sphere
 
 Parts = list[tuple[str, Mesh]]
@@ -82,7 +82,7 @@ def bird(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         ("beak", translated(beak, vec(0.56 * long, 0.0, 0.29 * long))),
     ]
     high = leg + 0.16 * long
-    out = [(role, translated(rotated(one, rotation(0.0, pitch, 0.0)), vec(0.0, 0.0, high))) for role, one in parts]
+    out = [(role, posed(one, rotation(0.0, pitch, 0.0), vec(0.0, 0.0, high))) for role, one in parts]
     for side in (-1.0, 1.0):
         foot = vec(0.03 * long, side * 0.07 * long, 0.0)
         out.append(("legs", limb([foot, foot + vec(-0.03 * long, 0.0, high)], [0.022 * long, 0.03 * long], 4)))

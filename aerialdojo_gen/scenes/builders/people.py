@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import limb, vec
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, stretched, translated
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, stretched, translated
 from aerialdojo_gen.scenes.shapes import box, lathe, sphere
 
 Parts = list[tuple[str, Mesh]]
@@ -28,9 +28,7 @@ def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0}.get(posture, 0.0)
     hip_m = {_SIT: 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
     upper = _upper(rng, params, posture, lean_deg)
-    out = [
-        (role, translated(rotated(body, rotation(0.0, lean_deg, 0.0)), vec(0.0, 0.0, hip_m))) for role, body in upper
-    ]
+    out = [(role, posed(body, rotation(0.0, lean_deg, 0.0), vec(0.0, 0.0, hip_m))) for role, body in upper]
     out += _legs(rng, params, posture, hip_m)
     grown = params["height"] / _BODY_M
     return [(role, stretched(body, np.full(3, grown))) for role, body in out]
@@ -82,7 +80,7 @@ def _head(params: Mapping[str, float], z: float) -> Parts:
     hair = round(params["hair"])
     if hair:
         cap = sphere(radii=(0.105, 0.088, 0.122), half=True, subdivisions=0)
-        parts.append(("hair", translated(rotated(cap, rotation(0.0, -24.0, 0.0)), vec(-0.013, 0.0, 0.008))))
+        parts.append(("hair", posed(cap, rotation(0.0, -24.0, 0.0), vec(-0.013, 0.0, 0.008))))
         back = sphere(radii=(0.062, 0.082, 0.1 if hair == 1 else 0.185))
         parts.append(("hair", translated(back, vec(-0.055, 0.0, -0.01 if hair == 1 else -0.1))))
         if hair == 3:
@@ -163,7 +161,7 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
             translated(sphere(radii=(0.135, 0.05, 0.085), half=True, subdivisions=0), vec(0.055, 0, 0)),
             limb([(-0.01, 0, 0.02), (-0.01, 0, 0.11)], [0.052, 0.05], 5),
         ])  # fmt: skip
-        out.append(("shoes", translated(rotated(shoe, rotation(0.0, toe, 0.0)), ankle - vec(0.0, 0.0, _ANKLE))))
+        out.append(("shoes", posed(shoe, rotation(0.0, toe, 0.0), ankle - vec(0.0, 0.0, _ANKLE))))
     if params["skirt"] and posture != _SIT:
         skirt = limb(
             [(0, 0, _KNEE + 0.02), (0, 0, hip_m - 0.02), (0, 0, hip_m + 0.12)], [0.26, 0.185 * stout, 0.15], 12

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.kit.rubble import Breadth
 from aerialdojo_gen.scenes.kit.ruins import Extent
 from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
 from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
@@ -100,7 +100,7 @@ def _sheet(hall: Hall, quad: tuple[np.ndarray, ...], rng: np.random.Generator) -
             yaw = math.degrees(math.atan2((b - a)[1], (b - a)[0]))
             body = translated(box(size=[width, 0.04, 2.2]), (width / 2, 0, -2.2))
             turn = rotation(float(rng.uniform(-35, 35)), float(rng.uniform(-12, 12)), yaw)
-            return [translated(rotated(body, turn), top)]
+            return [posed(body, turn, top)]
         return []
     normal = np.cross(b - a, d - a)
     normal /= max(float(norm(normal)), 1e-9)
@@ -156,7 +156,7 @@ def burst_tank(
             )
             turn = rotation(0.0, float(rng.uniform(-25, 30)), float(np.degrees(mid)))
             edge = (radius_m * float(np.cos(mid)), radius_m * float(np.sin(mid)), max(top, 0.9) * 0.95)
-            parts.append(("rust", translated(rotated(plate, turn), edge)))
+            parts.append(("rust", posed(plate, turn, edge)))
     for band in (0.35, 0.65, 0.95):
         arc = [toward + np.radians(d) for d in np.linspace(70, 290, 12)]
         ring = [

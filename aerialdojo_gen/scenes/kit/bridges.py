@@ -13,6 +13,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
+from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
@@ -55,8 +56,8 @@ def bridge_deck(
     return [
         (girder, merge([*below, *cross])),
         ("asphalt", slab(road, -0.35, 0.0)),
-        ("concrete", merge([slab(p, -0.35, -0.05) for p in polygons_of(under)])),
-        (pavement, merge([slab(p, -0.05, FOOTWAY_M) for p in polygons_of(ways)])),
+        ("concrete", plates(under, -0.35, -0.05)),
+        (pavement, plates(ways, -0.05, FOOTWAY_M)),
         ("marking", merge(marks)),
     ]
 

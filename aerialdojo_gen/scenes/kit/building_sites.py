@@ -178,6 +178,5 @@ def raft_foundation(
         site.add(None, "raft_wall", wall)
         site.occupy(line.buffer(0.5, cap_style="flat"), top - 0.2, top + 3.8)
     site.add(None, "foundation", parts)
-    for x, y in columns:
-        site.occupy(rectangle(x - 0.35, y - 0.35, x + 0.35, y + 0.35), top - 0.2, top + 1.6)
+    site.occupy_about(columns, 0.35, top - 0.2, top + 1.6)
     return top

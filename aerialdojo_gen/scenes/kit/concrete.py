@@ -5,7 +5,6 @@ Things may stand on the slabs, whose floor stays free between the columns.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,17 +17,17 @@ from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, plates, posts, rim
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, stairs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg, stairs
+from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.site import Site
 
 SLAB_M = 0.28
-_Box = tuple[Number, Number, Number, Number]
 _Step = Annotated[Number, Field(ge=0.2)]
 
 
@@ -89,7 +88,7 @@ def _beams(slab: Slab, ys: Sequence[float]) -> Mesh:
 
 @site_builder
 def slab_props(
-    site: Site, *, boxes: list[_Box], z: tuple[Number, Number], spacing_m: _Step = 1.8,
+    site: Site, *, boxes: list[Box], z: tuple[Number, Number], spacing_m: _Step = 1.8,
     panel: Material = "planks:#c8a468",
 ) -> None:  # fmt: skip
     """Prop fresh slabs between two heights: rows of thin props under beams and panels; they take their ground."""
@@ -110,7 +109,7 @@ def slab_props(
 
 @site_builder
 def stair_core(
-    site: Site, *, box: _Box, z: tuple[Number, Number], floors: list[Number], concrete: Material = "concrete:#b5b2aa"
+    site: Site, *, box: Box, z: tuple[Number, Number], floors: list[Number], concrete: Material = "concrete:#b5b2aa"
 ) -> None:
     """Put up a stair and lift core between two heights: a door to the south on every floor, bars on top."""
     (x0, y0, x1, y1), (z0, top), middle = box, z, (box[2] - box[0]) / 2
@@ -190,10 +189,9 @@ def scaffold(
         for j in range(lifts):
             p, q = (us[k], us[k + 1]) if j % 2 else (us[k + 1], us[k])
             braces.append(((p, depth_m, high * j / lifts), (q, depth_m, high * (j + 1) / lifts)))
-    turn = rotation(0.0, 0.0, math.degrees(math.atan2(b[1] - a[1], b[0] - a[0])))
     raw: Parts = [("metal", merge([*steel, bars(braces, 0.05)])), ("planks:#b08d58", merge(decks))]
     raw += [] if net is None else [(net, merge(nets))]
-    parts = [(material, translated(rotated(body, turn), (*a, z[0]))) for material, body in raw]
+    parts = Frame(*a, leg(a, b)[1]).parts(raw, z[0])
     area = LineString(line).buffer(depth_m, cap_style="flat", single_sided=True)
     site.add(None, "scaffold", parts, footprint=area)
 

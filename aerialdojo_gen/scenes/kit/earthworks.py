@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -12,11 +11,10 @@ from shapely.geometry import LineString
 
 from aerialdojo_gen.scenes.kit import ground_builder
 from aerialdojo_gen.scenes.kit.landforms import grid
-from aerialdojo_gen.scenes.plans.values import Area, Number
+from aerialdojo_gen.scenes.plans.values import Area, Number, Point3
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
-_Point3 = tuple[Number, Number, Number]
 _Steps = Annotated[list[tuple[Number, Number]], Field(min_length=2, max_length=100)]
 
 
@@ -33,32 +31,26 @@ def level_grid(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field
 def ground_profile(_site: Site, terrain: Terrain, *, points: _Steps, axis: Literal["x", "y"] = "x") -> Terrain:
     """Raise the ground by a profile along an axis: (distance along it, height), linear in between."""
     along, heights = np.array(points, dtype=np.float64).T
-    return replace(terrain, heights_m=terrain.heights_m + np.interp(grid(terrain)["xy".index(axis)], along, heights))
+    return terrain.raised(np.interp(grid(terrain)["xy".index(axis)], along, heights))
 
 
 @ground_builder
 def terraces(_site: Site, terrain: Terrain, *, area: Area, steps: _Steps) -> Terrain:
     """Raise or sink an area by how far inside its outline: (inside, height), linear in between; a pit or a heap."""
-    xy = terrain.corners()[:, :2]
-    inside = np.where(shapely.contains_xy(area, *xy.T), shapely.distance(area.boundary, shapely.points(xy)), 0.0)
     d, h = np.array(steps, dtype=np.float64).T
-    return replace(terrain, heights_m=terrain.heights_m + np.interp(inside, d, h).reshape(terrain.heights_m.shape))
+    return terrain.raised(np.interp(terrain.inside(area), d, h))
 
 
 @ground_builder
 def earth_ramp(
-    _site: Site, terrain: Terrain, *, start: _Point3, end: _Point3, width_m: Number,
+    _site: Site, terrain: Terrain, *, start: Point3, end: Point3, width_m: Number,
     blend_m: Annotated[Number, Field(gt=0)] = 2.0,
 ) -> Terrain:  # fmt: skip
     """Lay a straight ramp into the ground from one point to another, with slopes beside it."""
     line = LineString([start[:2], end[:2]])
-    points = shapely.points(terrain.corners()[:, :2])
-    shape = terrain.heights_m.shape
-    t = (line.project(points) / line.length).reshape(shape)
-    away = np.asarray(shapely.distance(line.buffer(width_m / 2, cap_style="flat"), points)).reshape(shape)
-    share = np.clip(1.0 - away / blend_m, 0.0, 1.0)
-    ramp = start[2] + (end[2] - start[2]) * t
-    return replace(terrain, heights_m=terrain.heights_m * (1.0 - share) + ramp * share)
+    away = terrain.distance(line.buffer(width_m / 2, cap_style="flat"))
+    t = line.project(shapely.points(terrain.corners()[:, :2])).reshape(away.shape) / line.length
+    return terrain.blended(start[2] + (end[2] - start[2]) * t, np.clip(1.0 - away / blend_m, 0.0, 1.0))
 
 
 @ground_builder
@@ -67,4 +59,4 @@ def rough_area(site: Site, terrain: Terrain, *, area: Area, height_m: Number, st
     xy = terrain.corners()[:, :2]
     inside = shapely.contains_xy(area, *xy.T).reshape(terrain.heights_m.shape)
     bumps = site.rng_for(stream).uniform(-1.0, 1.0, size=terrain.heights_m.shape) * height_m
-    return replace(terrain, heights_m=terrain.heights_m + np.where(inside, bumps, 0.0))
+    return terrain.raised(np.where(inside, bumps, 0.0))

@@ -12,11 +12,11 @@ from shapely.geometry import LineString, Polygon
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.ground import ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
-from aerialdojo_gen.scenes.kit.landforms import grid, smooth
+from aerialdojo_gen.scenes.kit.landforms import grid
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Material, Number
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.terrain import Terrain, smooth
 
 
 @dataclass(frozen=True)

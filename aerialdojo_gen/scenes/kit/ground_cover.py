@@ -10,7 +10,7 @@ from shapely.geometry import LineString
 
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import blob
-from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
 _Radius = Annotated[Number, Field(ge=0.1)]
@@ -20,7 +20,7 @@ _Radius = Annotated[Number, Field(ge=0.1)]
 def paint_patches(
     site: Site, *, materials: Annotated[list[Material], Field(min_length=1)],
     count: Annotated[int, Field(ge=0, le=1000)], radius_m: tuple[_Radius, _Radius], seed: int = 0,
-    ragged: Number = 0.55, stream: str = "patches", box: tuple[Number, Number, Number, Number] | None = None,
+    ragged: Number = 0.55, stream: str = "patches", box: Box | None = None,
     skip: Annotated[int, Field(ge=0, le=1000)] = 0,
 ) -> None:  # fmt: skip
     """Paint patches about the site, or a box of it, of the materials in turn.

@@ -14,16 +14,15 @@ from pydantic import Field
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof, wall_with_openings
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.steelwork import bars, plates, posts
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.plans.values import Box, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import extrude
 from aerialdojo_gen.scenes.site import Site
 
-_Box = tuple[Number, Number, Number, Number]
 _Opening = tuple[Number, Number, Number, Number]
 _Side = Literal["s", "n", "w", "e"]
 _T = 0.15
@@ -43,7 +42,7 @@ class HallRoof:
 
 @site_builder
 def hall(
-    site: Site, *, category: str, box: _Box, eaves_m: Number, wall: Material, roof: HallRoof,
+    site: Site, *, category: str, box: Box, eaves_m: Number, wall: Material, roof: HallRoof,
     gates: dict[_Side, list[_Opening]] = {},  # noqa: B006
     base: Material = "brick:#8a4f40", name: str = "", sign_side: _Side = "s", letter_m: Number = 1.2,
 ) -> float:  # fmt: skip
@@ -83,7 +82,7 @@ def hall(
 
 
 @site_builder
-def overhead_crane(site: Site, *, box: _Box, at_x: Number, z_m: Number, colour: Material = "#e0a92a") -> None:
+def overhead_crane(site: Site, *, box: Box, at_x: Number, z_m: Number, colour: Material = "#e0a92a") -> None:
     """Hang a travelling crane in a hall: runways on columns along x, a bridge at `at_x`, a hoist and its hook."""
     x0, _, x1, _ = box
     ys = (box[1] + 1.0, box[3] - 1.0)
@@ -100,13 +99,12 @@ def overhead_crane(site: Site, *, box: _Box, at_x: Number, z_m: Number, colour: 
         (colour, block(at_x - 0.3, y - 0.2, at_x + 0.3, y + 0.2, z_m - 2.5, z_m - 2.0)),
     ]
     site.add(None, "overhead_crane", parts)
-    for x, y in feet:
-        site.occupy(rectangle(x - 0.3, y - 0.3, x + 0.3, y + 0.3), 0.0, z_m)
+    site.occupy_about(feet, 0.3, 0.0, z_m)
 
 
 @site_builder
 def shed_on_posts(
-    site: Site, *, box: _Box, eaves_m: Number, rise_m: Number, roof: Material,
+    site: Site, *, box: Box, eaves_m: Number, rise_m: Number, roof: Material,
     post_m: Annotated[Number, Field(ge=0.5)] = 5.0, on: Number = 0.0, post: Material = "wood",
 ) -> float:  # fmt: skip
     """Put up a gable roof on posts without walls, about `post_m` apart; gives the height of its eaves."""
@@ -122,8 +120,7 @@ def shed_on_posts(
     ties = across + along if x1 - x0 >= y1 - y0 else along + across
     cover = pitched_roof(rectangle(*box), top, rise_m, roof, roof, overhang_m=0.5)[:1]
     site.add(None, "shed", [*cover, (post, posts(feet, on, top, 0.24)), (post, bars(ties, 0.22))])
-    for x, y in feet:
-        site.occupy(rectangle(x - 0.2, y - 0.2, x + 0.2, y + 0.2), on, top)
+    site.occupy_about(feet, 0.2, on, top)
     return top
 
 
@@ -177,7 +174,7 @@ def _windows(side: str, a: tuple[float, float], length: float, eaves: float, ope
     return [(material, merge(bodies)) for material, bodies in pairs if bodies]
 
 
-def _saw_roof(box: _Box, z: float, wall: str, roof: HallRoof) -> Parts:
+def _saw_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
     x0, y0, x1, y1 = box
     wide, rise, out = (y1 - y0) / roof.teeth, roof.rise_m, 0.35
     sheets, panes, gables, beams = [], [], [], []
@@ -193,19 +190,18 @@ def _saw_roof(box: _Box, z: float, wall: str, roof: HallRoof) -> Parts:
             ("steel", merge(beams))]  # fmt: skip
 
 
-def _flat_roof(box: _Box, z: float, wall: str, roof: HallRoof) -> Parts:
+def _flat_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
     x0, y0, x1, y1 = box
     plan = rectangle(*box)
-    ring = plan.difference(plan.buffer(-0.3, join_style="mitre"))
     parts: Parts = [(roof.material, block(x0 + 0.02, y0 + 0.02, x1 - 0.02, y1 - 0.02, z - 0.3, z)),
-                    ("concrete", plates(ring, z, z + roof.parapet_m))]  # fmt: skip
+                    ("concrete", plates(edge_strip(plan, 0.3), z, z + roof.parapet_m))]  # fmt: skip
     for k in range(roof.lights):
         x, y = x0 + (x1 - x0) * (k + 0.5) / roof.lights, (y0 + y1) / 2
         parts.append(("glass:#a9c0cc", block(x - 1.0, y - 2.6, x + 1.0, y + 2.6, z, z + 0.5)))
     return parts
 
 
-def _gable_roof(box: _Box, z: float, wall: str, roof: HallRoof) -> Parts:
+def _gable_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
     x0, y0, x1, y1 = box
     sheet = pitched_roof(rectangle(*box), z, roof.rise_m, wall, roof.material, overhang_m=0.5)[:1]
     across, ends = (across_x, (x0, x1)) if x1 - x0 >= y1 - y0 else (_across_y, (y0, y1))

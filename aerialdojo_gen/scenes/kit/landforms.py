@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain
+from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain, smooth
 
 # Smoothing a way takes the square of its length.
 _LONGEST_M = 3000.0
@@ -32,7 +32,7 @@ def rolling_ground(
     """Make rolling ground by noise of a seed, the plan's by default, in place of what was there or `over` it."""
     seed = site.head.seed if seed is None else seed
     rolling = rolling_terrain(site.head.size_m, cell_m, seed, height_m, wavelength_m, octaves)
-    return replace(rolling, heights_m=terrain.heights_m + rolling.heights_m) if over else rolling
+    return rolling.raised(terrain.heights_m) if over else rolling
 
 
 @ground_builder
@@ -42,12 +42,11 @@ def hillside_steps(
 ) -> Terrain:  # fmt: skip
     """Let the ground rise northwards in steps (y, rise): steep up to `half_m` from the middle, soft beyond."""
     x, y = grid(terrain)
-    heights = terrain.heights_m
     run = run_m[0] + (run_m[1] - run_m[0]) * np.clip((np.abs(x) - half_m) / soft_m, 0.0, 1.0)
     for at, rise in steps:
         t = np.clip((y - at + run / 2 - 0.1) / run, 0.0, 1.0)
-        heights = heights + rise * t * t * (3.0 - 2.0 * t)
-    return replace(terrain, heights_m=heights)
+        terrain = terrain.raised(rise * t * t * (3.0 - 2.0 * t))
+    return terrain
 
 
 @ground_builder
@@ -57,11 +56,9 @@ def round_levels(
 ) -> Terrain:  # fmt: skip
     """Level discs (x, y, radius, height), one after the other, with a slope about each back to the old ground."""
     x, y = grid(terrain)
-    heights = terrain.heights_m
     for u, v, radius, to_m in discs:
-        t = smooth(1.0 - (np.hypot(x - u, y - v) - radius) / blend_m)
-        heights = heights * (1.0 - t) + to_m * t
-    return replace(terrain, heights_m=heights)
+        terrain = terrain.blended(to_m, smooth(1.0 - (np.hypot(x - u, y - v) - radius) / blend_m))
+    return terrain
 
 
 @ground_builder
@@ -70,9 +67,7 @@ def level_about(
     blend_m: Annotated[Number, Field(gt=0)],
 ) -> Terrain:  # fmt: skip
     """Level an area and `reach_m` about it, with a slope back to the old ground."""
-    away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
-    t = smooth(1.0 - (away - reach_m) / blend_m)
-    return replace(terrain, heights_m=terrain.heights_m * (1.0 - t) + to_m * t)
+    return terrain.blended(to_m, smooth(1.0 - (terrain.distance(area) - reach_m) / blend_m))
 
 
 @ground_builder
@@ -81,8 +76,7 @@ def bank_about(
     fade_x: tuple[Number, Number],
 ) -> Terrain:  # fmt: skip
     """Raise a bank about an area, which rises between two distances from it, and comes up between two x."""
-    away = shapely.distance(area, shapely.points(terrain.corners()[:, :2])).reshape(terrain.heights_m.shape)
-    t, fade = between(away, start_m, end_m), between(grid(terrain)[0], *fade_x)
+    t, fade = between(terrain.distance(area), start_m, end_m), between(grid(terrain)[0], *fade_x)
     return replace(terrain, heights_m=np.maximum(terrain.heights_m, to_m * t * fade))
 
 
@@ -196,10 +190,8 @@ def bank_scree(
     _site: Site, terrain: Terrain, *, areas: list[Area], rise_m: Number, reach_m: Annotated[Number, Field(gt=0)]
 ) -> Terrain:
     """Let the ground rise towards the feet of rocks."""
-    places = shapely.points(terrain.corners()[:, :2])
     for area in areas:
-        t = np.clip(1.0 - shapely.distance(area, places) / reach_m, 0.0, 1.0) ** 2
-        terrain = replace(terrain, heights_m=terrain.heights_m + rise_m * t.reshape(terrain.heights_m.shape))
+        terrain = terrain.raised(rise_m * np.clip(1.0 - terrain.distance(area) / reach_m, 0.0, 1.0) ** 2)
     return terrain
 
 
@@ -219,12 +211,6 @@ def grid(terrain: Terrain) -> tuple[Floats, Floats]:
     """Give x and y of the terrain's corners, metres, in the shape of its heights."""
     xy = terrain.corners().reshape(*terrain.heights_m.shape, 3)
     return xy[..., 0], xy[..., 1]
-
-
-def smooth(t: Floats) -> Floats:
-    """Ease from 0 to 1, with level ends."""
-    t = np.clip(t, 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
 
 
 def between(t: Floats, start: float, end: float) -> Floats:

@@ -13,7 +13,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, deck, railing, stairs
-from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, sphere
@@ -117,7 +117,7 @@ def washing_lines(
             width, drop = float(rng.uniform(0.45, 0.95)), float(rng.uniform(0.6, 1.1))
             t = (at + width / 2) / length
             middle = (x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, z_m - 1.4 * t * (1 - t) - drop)
-            cloth = translated(rotated(box(size=(width, 0.03, drop)), rotation(0.0, 0.0, yaw)), middle)
+            cloth = posed(box(size=(width, 0.03, drop)), rotation(0.0, 0.0, yaw), middle)
             parts.append((cloths[int(rng.integers(len(cloths)))], cloth))
             at += width + float(rng.uniform(0.1, 0.4))
         site.add(None, "washing_line", parts)

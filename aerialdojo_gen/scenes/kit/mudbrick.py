@@ -17,7 +17,7 @@ from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.mesh import Mesh, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, posed, rotated, rotation
 from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
@@ -59,7 +59,7 @@ def _mudbrick_house(site: Site, house: MudbrickHouse) -> float:
     front = depth / 2 + 0.02
 
     def put(body: Mesh, u: float, v: float, up: float) -> Mesh:
-        return translated(rotated(body, rotation(0.0, 0.0, yaw_deg)), (*frame.at(u, v), z + up))
+        return posed(body, rotation(0.0, 0.0, yaw_deg), (*frame.at(u, v), z + up))
 
     door = float(rng.choice(["-1", "1"])) * 0.18 * width
     paint = str(rng.choice(["planks:#6a4a30", "planks:#2f6a78", "planks:#7a3c2c"]))
@@ -120,7 +120,7 @@ def _crumbling_wall(site: Site, wall: CrumblingWall, material: str, rng: np.rand
         outline = [(0.0, 0.0), (length, 0.0), (length, crest[-1][1]), *crest[::-1]]
         body = profile(points=outline, width=wall.thickness_m)
         yaw = math.degrees(math.atan2(by - ay, bx - ax))
-        parts.append((material, translated(rotated(body, rotation(0.0, 0.0, yaw)), (ax, ay, foot))))
+        parts.append((material, posed(body, rotation(0.0, 0.0, yaw), (ax, ay, foot))))
     area = LineString(wall.line).buffer(wall.thickness_m / 2 + 0.2, cap_style="flat")
     site.add(None, "ruin_wall", parts, footprint=area)
 

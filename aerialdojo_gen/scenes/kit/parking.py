@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, deck, letters, parapet, ramp, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
-from aerialdojo_gen.scenes.plans.values import At, Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Box, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
 # What people come in, and how often.
@@ -32,7 +32,6 @@ _Share = Annotated[Number, Field(ge=0, le=1)]
 _Count = Annotated[int, Field(ge=1, le=200)]
 _Levels = Annotated[int, Field(ge=2, le=3)]
 _Row = tuple[Number, Number, Number, _Count]
-_Box = tuple[Number, Number, Number, Number]
 # How much the proportions of vehicles differ beside their designs, as a share: 0 in scenes that were drawn before.
 _Differ = Annotated[Number, Field(ge=0, le=0.1)]
 _Weights = Annotated[dict[str, Annotated[float, Field(gt=0)]], Field(min_length=1)]
@@ -102,7 +101,7 @@ def park_cars(
 
 @site_builder
 def parking_deck(
-    site: Site, *, box: _Box, levels: _Levels = 3, level_m: Number = 3.7,
+    site: Site, *, box: Box, levels: _Levels = 3, level_m: Number = 3.7,
     wall: Material = "concrete:#c9c2b4", floor: Material = "concrete:#8f8d88", band: Material = "#2f8f8b",
     tower: Material = "tiles:#2f8f8b", phrase: str = "",
 ) -> float:  # fmt: skip
@@ -137,7 +136,7 @@ def parking_deck(
 
 @site_builder
 def deck_cars(
-    site: Site, *, box: _Box, levels: _Levels = 3, level_m: Number = 3.7, occupancy: _Share,
+    site: Site, *, box: Box, levels: _Levels = 3, level_m: Number = 3.7, occupancy: _Share,
     vehicles: _Weights = VEHICLES, differ: _Differ = 0.0,
 ) -> None:  # fmt: skip
     """Park vehicles in a share of the bays of a parking deck, which has the same `box` and levels."""

@@ -9,17 +9,16 @@ import numpy as np
 from pydantic import Field
 from shapely.geometry import LineString
 
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.steelwork import Point3, bars, guard_rails, plates, posts, rim
+from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, plates, posts, rim
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, stairs
 from aerialdojo_gen.scenes.mesh import merge, translated
-from aerialdojo_gen.scenes.plans.values import Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Box, Line, Material, Number, Point3
 from aerialdojo_gen.scenes.shapes import lathe
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 
-_Box = tuple[Number, Number, Number, Number]
 # Of the pipes: to the left of the middle, above the bearing, radius
 _PIPES = (
     (-0.8, 0.36, 0.26), (-0.15, 0.28, 0.18), (0.7, 0.44, 0.34),
@@ -56,19 +55,18 @@ def pipe_bridge(
         path = [(x, y, z_m + up) for x, y in LineString(line).offset_curve(side, join_style="mitre").coords]
         parts.append((pipes[k % len(pipes)], sweep(path=path, radius=radius, sides=8)))
     site.add(None, "pipe_bridge", parts)
-    for x, y in feet:
-        site.occupy(rectangle(x - 0.35, y - 0.35, x + 0.35, y + 0.35), 0.0, z_m)
+    site.occupy_about(feet, 0.35, 0.0, z_m)
 
 
 @site_builder
 def bund(
-    site: Site, *, box: _Box, height_m: Number = 0.9, floor: Material = "concrete:#a7a297",
+    site: Site, *, box: Box, height_m: Number = 0.9, floor: Material = "concrete:#a7a297",
     wall: Material = "concrete:#8e8a80",
 ) -> None:  # fmt: skip
     """Wall a tank farm in, and pave it; steps lead over the wall on the south side."""
     plan = rectangle(*box)
     site.paint(plan, floor)
-    ring = plan.difference(plan.buffer(-0.3, join_style="mitre"))
+    ring = edge_strip(plan, 0.3)
     x, y = (box[0] + box[2]) / 2, box[1]
     steps = [block(x - 0.7, y - 0.4 * k, x + 0.7, y + 0.3 + 0.4 * k, 0.0, height_m - 0.3 * k) for k in (1, 2)]
     parts: Parts = [(wall, plates(ring, 0.0, height_m)), ("marking_yellow", merge(steps))]
@@ -77,7 +75,7 @@ def bund(
 
 @site_builder
 def process_tower(
-    site: Site, *, box: _Box, levels: Annotated[list[Number], Field(min_length=1, max_length=20)],
+    site: Site, *, box: Box, levels: Annotated[list[Number], Field(min_length=1, max_length=20)],
     vessels: list[tuple[Number, Number, Number, Number, Material]], steel: Material = "#5f7f8f",
     floor: Material = "sheet_metal:#7d8488",
 ) -> None:  # fmt: skip
@@ -112,8 +110,7 @@ def process_tower(
         parts += _vessel(x, y, r, top, material)
         site.occupy(rectangle(x - r - 0.1, y - r - 0.1, x + r + 0.1, y + r + 0.1), 0.0, top)
     site.add(None, "process_structure", parts)
-    for x, y in feet:
-        site.occupy(rectangle(x - 0.25, y - 0.25, x + 0.25, y + 0.25), 0.0, levels[-1])
+    site.occupy_about(feet, 0.25, 0.0, levels[-1])
     site.occupy(rectangle(x0 - 1.6, y0 - 0.8, x0 - 0.3, y1 + 0.8), 0.0, levels[-1] + 1.0)
 
 

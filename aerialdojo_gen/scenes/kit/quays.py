@@ -19,13 +19,11 @@ from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, leg, rail_legs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3
 from aerialdojo_gen.scenes.shapes import box, crown, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
-
-_Point3 = tuple[Number, Number, Number]
 
 
 @site_builder
@@ -53,10 +51,10 @@ def fenders(site: Site, *, edges: list[Line], spacing_m: Number = 7.0) -> None:
             if k % 4 == 2:
                 parts = [translated(box(size=(0.08, 0.08, 2.2)), (0.06, v, 0.0)) for v in (-0.25, 0.25)]
                 parts += [translated(box(size=(0.06, 0.5, 0.06)), (0.06, 0.0, 0.2 + 0.35 * j)) for j in range(6)]
-                rungs.append(translated(rotated(merge(parts), turn), (a.x, a.y, 0.0)))
+                rungs.append(posed(merge(parts), turn, (a.x, a.y, 0.0)))
             else:
                 tyre = rotated(cylinder(radius=0.55, height=0.3, segments=10), rotation(0.0, 90.0, 0.0))
-                tyres.append(translated(rotated(translated(tyre, (0.02, 0.0, 1.0)), turn), (a.x, a.y, 0.0)))
+                tyres.append(posed(translated(tyre, (0.02, 0.0, 1.0)), turn, (a.x, a.y, 0.0)))
     parts_of: Parts = [("rubber", merge(tyres))]
     if rungs:
         parts_of.append(("marking_yellow", merge(rungs)))
@@ -65,7 +63,7 @@ def fenders(site: Site, *, edges: list[Line], spacing_m: Number = 7.0) -> None:
 
 @site_builder
 def mooring_lines(
-    site: Site, *, ropes: list[tuple[_Point3, _Point3]], sag_m: Number = 0.3, material: Material = "#c9a96a"
+    site: Site, *, ropes: list[tuple[Point3, Point3]], sag_m: Number = 0.3, material: Material = "#c9a96a"
 ) -> None:
     """Stretch ropes from ships to the quay, each from a point to another, with a sag below the lower one."""
     bodies = []
@@ -191,13 +189,13 @@ def bars(path: Sequence[Point], z_m: float, material: str = "#f1f0ea", height_m:
         for share, thick in ((0.35, 0.04), (0.68, 0.04), (1.0, 0.09)):
             bar = rotated(box(size=(length, thick, thick)), turn)
             bodies.append(translated(bar, (*middle, z_m + share * height_m - thick)))
-        bodies += [translated(rotated(box(size=(0.08, 0.08, height_m)), turn), (*spot, z_m)) for spot in spots]
+        bodies += [posed(box(size=(0.08, 0.08, height_m)), turn, (*spot, z_m)) for spot in spots]
     return [(material, merge(bodies))]
 
 
 @site_builder
 def sea_wall(
-    site: Site, *, box: tuple[Number, Number, Number, Number], z: tuple[Number, Number],
+    site: Site, *, box: Box, z: tuple[Number, Number],
     wall: Material = "blocks:#a79f92", cap: Material = "concrete", rail: Material | None = "#e8ecec",
     gates: list[tuple[Number, Number]] = [],  # noqa: B006
 ) -> None:  # fmt: skip

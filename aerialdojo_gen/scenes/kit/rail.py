@@ -16,12 +16,13 @@ from pydantic import Field
 from shapely.geometry import LineString
 
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.shapes import cylinder
 from aerialdojo_gen.scenes.shapes_extruded import sweep
@@ -32,7 +33,6 @@ RAIL_M = 0.56
 _GAUGE_M = 1.44
 _SLEEPER_M = (0.26, 2.4, 0.2)
 _SPACING_M = 0.7
-_Box = tuple[Number, Number, Number, Number]
 
 
 @site_builder
@@ -64,7 +64,7 @@ def _track(line: Sequence[Point], on: float, clear: Area | None, sleeper: str, r
     ties = []
     for pose in along(line, _SPACING_M, start_m=0.2, end_m=0.2):
         if clear is None or not shapely.contains_xy(clear, pose.x, pose.y):
-            ties.append(translated(rotated(tie, rotation(0.0, 0.0, pose.yaw_deg)), (pose.x, pose.y, 0.0)))
+            ties.append(posed(tie, rotation(0.0, 0.0, pose.yaw_deg), (pose.x, pose.y, 0.0)))
     rails = []
     for side in (-1, 1):
         run = middle.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
@@ -82,17 +82,15 @@ def light_tracks(site: Site, *, lines: list[Line], gauge_m: Number = 1.5, bed: M
         parts: Parts = []
         for a, b in pairwise(line):
             length, yaw_deg = leg(a, b)
-            turn = rotation(0.0, 0.0, yaw_deg)
             rail = cuboid(size=[length, 0.08, 0.16])
             rails = [translated(rail, (length / 2, s * gauge_m / 2, 0.0)) for s in (-1, 1)]
             ties = [translated(cuboid(size=[0.25, 2.5, 0.06]), (s, 0.0, 0.0)) for s in np.arange(0.6, length, 1.2)]
-            for material, body in (("rust", merge(rails)), ("wood:#5b4634", merge(ties))):
-                parts.append((material, translated(rotated(body, turn), (*a, z))))
+            parts += Frame(*a, yaw_deg).parts([("rust", merge(rails)), ("wood:#5b4634", merge(ties))], z)
         site.add(None, "railway_track", parts)
 
 
 @site_builder
-def rail_platform(site: Site, *, box: _Box, top_m: Number, floor: Material, foot_m: Number = 0.0) -> None:
+def rail_platform(site: Site, *, box: Box, top_m: Number, floor: Material, foot_m: Number = 0.0) -> None:
     """Build a platform with a coping and a yellow line along both edges that run along x."""
     (x0, y0, x1, y1), z0, z1 = box, foot_m, top_m
     parts: Parts = [("blocks:#8f8a82", block(x0, y0, x1, y1, z0, z1 - 0.2))]
@@ -107,7 +105,7 @@ def rail_platform(site: Site, *, box: _Box, top_m: Number, floor: Material, foot
 
 @part_builder
 def butterfly_roof(
-    *, box: _Box, z_m: Number, foot_m: Number, roof: Material, frame: Material,
+    *, box: Box, z_m: Number, foot_m: Number, roof: Material, frame: Material,
     spacing_m: Annotated[Number, Field(ge=0.5)] = 8.0, rows: Sequence[Number] = (),
 ) -> Parts:  # fmt: skip
     """Make a platform's roof that falls to a gutter in its middle, on posts in `rows` (y, metres)."""
@@ -183,7 +181,7 @@ def overhead_wires(site: Site, *, x0: Number, x1: Number, tracks: list[Number], 
 
 
 @part_builder
-def footbridge_roof(*, box: _Box, on: Number, roof: Material, frame: Material) -> Parts:
+def footbridge_roof(*, box: Box, on: Number, roof: Material, frame: Material) -> Parts:
     """Make a light roof on posts over a footbridge that runs along y."""
     (x0, y0, x1, y1), floor_m = box, on
     posts = [block(x - 0.07, y - 0.07, x + 0.07, y + 0.07, floor_m, floor_m + 2.7)

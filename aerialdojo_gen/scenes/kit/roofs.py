@@ -12,10 +12,10 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof
 from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh
-from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.plans.values import Box, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import triangulate
 
 # Of a rectangle around it that a plan must fill, for a ridge from gable to gable.
@@ -28,7 +28,7 @@ PARAPET_M, _PARAPET_THICK_M = 0.45, 0.3
 
 @part_builder
 def gable_roof(
-    box: tuple[Number, Number, Number, Number], z: Number, rise_m: Number, wall: Material, roof: Material,
+    box: Box, z: Number, rise_m: Number, wall: Material, roof: Material,
     hip: bool = False, overhang_m: Number = 0.4,
 ) -> Parts:  # fmt: skip
     """Make a gable or hip roof over a rectangle, the ridge along its longer side."""
@@ -54,7 +54,7 @@ def _flat(plan: Polygon, top_m: float, roofing: str) -> Parts:
     # The lid's sides must not lie in the walls' plane, where both would flicker.
     lid = plan.buffer(-0.02, join_style="mitre")
     level = top_m - PARAPET_M
-    rim = plan.difference(plan.buffer(-_PARAPET_THICK_M, join_style="mitre")).buffer(-0.004, join_style="mitre")
+    rim = edge_strip(plan, _PARAPET_THICK_M).buffer(-0.004, join_style="mitre")
     parts = [(roofing, slab(p, level - 0.25, level)) for p in polygons_of(lid)]
     return parts + [("concrete", slab(p, level - 0.05, top_m)) for p in polygons_of(rim)]
 

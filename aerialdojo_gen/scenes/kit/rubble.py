@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -17,6 +16,7 @@ from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import atan2, power
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.kit.natural_ground import noise_around
 from aerialdojo_gen.scenes.kit.wreckage import Parts, bars, chunk, tilted_plate
 from aerialdojo_gen.scenes.mesh import translated
 from aerialdojo_gen.scenes.model import Instance
@@ -40,7 +40,7 @@ def fault(_site: Site, terrain: Terrain, path: Line, drop_m: Number, width_m: Br
     along, away = ahead - behind, corners - behind
     right = along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] < 0.0
     t = np.clip(0.5 + np.where(right, distance, -distance) / width_m, 0.0, 1.0)
-    return replace(terrain, heights_m=terrain.heights_m - drop_m * t.reshape(terrain.heights_m.shape))
+    return terrain.raised(-drop_m * t)
 
 
 @ground_builder
@@ -53,29 +53,25 @@ def rises(
     for start, end, height in stations:
         t = np.clip((corners - start) / max(end - start, 0.1), 0.0, 1.0)
         rise += height * t * t * (3.0 - 2.0 * t)
-    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+    return terrain.raised(rise)
 
 
 @ground_builder
 def crater(site: Site, terrain: Terrain, at: At, radius_m: Breadth, depth_m: Number, rim_m: Number) -> Terrain:
     """Blast a crater: a bowl of `radius_m` to its crest, thrown-up earth `rim_m` high that runs out at twice that."""
     corners = terrain.corners()[:, :2] - at
-    noise = OpenSimplex(seed=site.head.seed)
-    angle = atan2(corners[:, 1], corners[:, 0])
-    wave = np.array([noise.noise2(1.5 * float(np.cos(a)), 1.5 * float(np.sin(a))) for a in angle])
+    wave = noise_around(site.head.seed, atan2(corners[:, 1], corners[:, 0]), 1.5)
     r = np.hypot(corners[:, 0], corners[:, 1]) / (radius_m * (1.0 + 0.14 * wave))
     bowl = -depth_m + (depth_m + rim_m) * power(np.clip(r, 0.0, 1.0), 2.2)
     slope = rim_m * np.clip(2.0 - r, 0.0, 1.0) ** 2
-    change = np.where(r < 1.0, bowl, slope).reshape(terrain.heights_m.shape)
-    return replace(terrain, heights_m=terrain.heights_m + change)
+    return terrain.raised(np.where(r < 1.0, bowl, slope))
 
 
 @ground_builder
 def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int) -> Terrain:
     """Pile rubble over an area: steep at its border, lumpy on top."""
     corners = terrain.corners()[:, :2]
-    points = shapely.points(corners)
-    inside = np.where(shapely.contains_xy(area, *corners.T), shapely.distance(area.boundary, points), 0.0)
+    inside = terrain.inside(area).ravel()
     reach = max(float(inside.max()), 0.1)
     noise = OpenSimplex(seed=seed)
     lumps = np.array(
@@ -83,7 +79,7 @@ def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int)
     )
     t = power(np.clip(inside / reach, 0.0, 1.0), 0.8)
     rise = height_m * t * (1.0 + 0.35 * lumps)
-    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+    return terrain.raised(rise)
 
 
 @site_builder

@@ -33,7 +33,7 @@ from aerialdojo_gen.scenes.kit.wreckage import (
     torn_wall,
 )
 from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes import box
@@ -76,7 +76,7 @@ def put_up(
         # It tips over its front edge and digs in there.
         edge = np.array([0.0, wreck.depth_m / 2, 0.0])
         turn = rotation(wreck.lean_deg, 0.0, 0.0)
-        parts = [(m, translated(rotated(translated(b, edge), turn), -edge)) for m, b in parts]
+        parts = [(m, posed(translated(b, edge), turn, -edge)) for m, b in parts]
     footprint = wreck.frame.area(remains(wreck.plan, 0.5, wreck.bites))
     return site.add(node, category, wreck.frame.parts(parts, base_m), footprint=footprint)
 
@@ -195,7 +195,7 @@ def _windows(
     length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
     along = (np.array(b) - a) / length
     out = np.array([along[1], -along[0]])
-    yaw = math.degrees(math.atan2(along[1], along[0]))
+    turn = rotation(0.0, 0.0, math.degrees(math.atan2(along[1], along[0])))
     panes, trims, plumes = [], [], []
     for u0, u1, sill, head in openings:
         at = np.array(a) + along * (u0 + u1) / 2
@@ -206,14 +206,14 @@ def _windows(
         w = u1 - u0
         if sill > 0.1:
             edge = at + out * (style.wall_m / 2 + 0.03)
-            trims.append(_posed(box(size=[w + 0.24, 0.16, 0.1]), yaw, (*edge, sill - 0.1)))
+            trims.append(posed(box(size=[w + 0.24, 0.16, 0.1]), turn, (*edge, sill - 0.1)))
         if draws[0] < style.panes:
-            panes.append(_posed(box(size=[w, 0.05, head - sill]), yaw, (*at, sill)))
-            trims.append(_posed(box(size=[0.07, 0.1, head - sill]), yaw, (*at, sill)))
+            panes.append(posed(box(size=[w, 0.05, head - sill]), turn, (*at, sill)))
+            trims.append(posed(box(size=[0.07, 0.1, head - sill]), turn, (*at, sill)))
         if draws[1] < style.soot:
             face = at + out * (style.wall_m / 2 + 0.012)
             plume = box(size=[w * 1.05, 0.02, 0.9 + w * 0.3], taper=(0.55, 1.0))
-            plumes.append(_posed(plume, yaw, (*face, head + 0.01)))
+            plumes.append(posed(plume, turn, (*face, head + 0.01)))
     found = (("window", panes), (style.band, trims), ("#2a2827", plumes))
     return [(m, merge(bodies)) for m, bodies in found if bodies]
 
@@ -320,10 +320,6 @@ def _balconies(wreck: Wreck, rng: np.random.Generator) -> Parts:
             panels.append(block(x - 1.5, y - 1.3, x + 1.5, y - 1.22, z, z + 0.95))
             panels += [block(u, y - 1.22, u + 0.07, y, z, z + 0.95) for u in (x - 1.5, x + 1.43)]
     return [("concrete", merge(floors)), (style.band, merge(panels))] if floors else []
-
-
-def _posed(body: Mesh, yaw_deg: float, at: tuple[float, ...]) -> Mesh:
-    return translated(rotated(body, rotation(0.0, 0.0, yaw_deg)), at)
 
 
 @dataclass(frozen=True)

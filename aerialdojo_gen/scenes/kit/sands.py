@@ -44,7 +44,7 @@ def dunes(
     fall = np.clip((s01 - _WINDWARD) / (1.0 - _WINDWARD), 0.0, 1.0)
     ridge = rise * (1.0 - fall * fall * (3.0 - 2.0 * fall))
     high = height_m * (0.75 + 0.4 * swell) * ridge
-    return replace(ground, heights_m=ground.heights_m + high.reshape(ground.heights_m.shape))
+    return ground.raised(high)
 
 
 @ground_builder

@@ -7,10 +7,10 @@ from shapely.geometry import Polygon
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar_buildings import facade
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, canopy, letters, parapet
-from aerialdojo_gen.scenes.plans.values import Area, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Box, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -29,7 +29,7 @@ def shopping_hall(
     tile = site.catalogue.materials.tile_m
     low, top = outline.difference(passages), 2 * storey_m
     edge = outline.buffer(0.18, join_style="mitre").difference(outline)
-    coping = outline.buffer(0.12, join_style="mitre").difference(outline.buffer(-0.32, join_style="mitre"))
+    coping = edge_strip(outline, 0.32, 0.12)
     parts: Parts = [(wall, facade(piece, 0.0, storey_m, tile(wall))) for piece in polygons_of(low)]
     parts.append((upper_wall, facade(outline, storey_m, top, tile(upper_wall))))
     parts.append((cornice, slab(edge, storey_m - 0.2, storey_m + 0.1)))
@@ -43,7 +43,7 @@ def shopping_hall(
 
 @site_builder
 def anchor_store(
-    site: Site, *, node: str, box: tuple[Number, Number, Number, Number], height_m: Number, sign: str, wall: Material,
+    site: Site, *, node: str, box: Box, height_m: Number, sign: str, wall: Material,
     glass: Material = "curtain_wall", trim: Material = "#f0ebdf",
 ) -> float:  # fmt: skip
     """Put up a department store, its name and door to the south; gives the height of its roof, metres.

@@ -14,8 +14,8 @@ from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import blob
-from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Material, Number
+from aerialdojo_gen.scenes.mesh import merge, posed, rotation
+from aerialdojo_gen.scenes.plans.values import Area, Box, Material, Number
 from aerialdojo_gen.scenes.shapes import crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -63,7 +63,7 @@ class Patches:
     material: Material
     count: Annotated[int, Field(ge=0, le=1000)]
     radius_m: tuple[Number, Number]
-    box: tuple[Number, Number, Number, Number]  # Where their middles are drawn
+    box: Box  # Where their middles are drawn
     within: Area
     ragged: Number = 0.5
     seed: int = 0  # Of the first one's outline
@@ -124,7 +124,7 @@ def strew_rocks(
             continue
         rock = crown(radii=[r, r * float(rng.uniform(0.7, 1.0)), r * flat], noise=0.3, subdivisions=1,
                      seed=int(rng.integers(1, 60)))  # fmt: skip
-        bodies.append(translated(rotated(rock, rotation(0.0, 0.0, yaw)), (x, y, z + 0.15 * r)))
+        bodies.append(posed(rock, rotation(0.0, 0.0, yaw), (x, y, z + 0.15 * r)))
         plans.append(shapely.Point(x, y).buffer(r, quad_segs=3))
     if bodies:
         site.add(None, category, [(material, merge(bodies))], footprint=shapely.union_all(plans))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -34,15 +33,15 @@ def profile_slope(
     z = np.interp(y, [p[0] for p in profile], [p[1] for p in profile])
     z = gaussian_filter1d(z, smooth_m / float(y[1] - y[0]), mode="nearest")
     rise = np.interp(corners[:, 1], y, z) + lean * corners[:, 0]
-    return replace(terrain, heights_m=terrain.heights_m + rise.reshape(terrain.heights_m.shape))
+    return terrain.raised(rise)
 
 
 @ground_builder
 def banks_beside(_site: Site, terrain: Terrain, *, line: Line, width_m: Number, height_m: Number) -> Terrain:
     """Pile snow along both sides of a way, where ploughs and groomers leave it."""
-    d = shapely.distance(LineString(line), shapely.points(terrain.corners()[:, :2]))
+    d = terrain.distance(LineString(line))
     bump = exp(-(((d - width_m / 2 - 1.4) / 1.1) ** 2))
-    return replace(terrain, heights_m=terrain.heights_m + height_m * bump.reshape(terrain.heights_m.shape))
+    return terrain.raised(height_m * bump)
 
 
 @ground_builder
@@ -51,11 +50,10 @@ def moguls(
 ) -> Terrain:
     """Cover an area with the bumps that turning skis leave."""
     x, y = terrain.corners()[:, :2].T
-    inside = shapely.distance(area.boundary, shapely.points(x, y)) * shapely.contains_xy(area, x, y)
-    fade = np.clip(inside / 2.0, 0.0, 1.0)
+    fade = np.clip(terrain.inside(area).ravel() / 2.0, 0.0, 1.0)
     k = 2 * np.pi / pitch_m
     bump = 0.5 + 0.5 * np.sin(k * x + 0.8 * np.sin(k * y / 2)) * np.sin(k * y)
-    return replace(terrain, heights_m=terrain.heights_m + (height_m * fade * bump).reshape(terrain.heights_m.shape))
+    return terrain.raised(height_m * fade * bump)
 
 
 @site_builder

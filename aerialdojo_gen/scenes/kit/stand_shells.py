@@ -13,6 +13,7 @@ from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
 from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.kit import part_builder
 from aerialdojo_gen.scenes.kit.stands import QUARTER, Tier, passage
+from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
 from aerialdojo_gen.scenes.mesh import merge
 from aerialdojo_gen.scenes.plans.values import Areas, At, Material, Number
@@ -71,7 +72,7 @@ def stand_platforms(*, areas: Areas, z: tuple[Number, Number], floor: Material, 
     for area in areas:
         inner = area.buffer(-0.12, join_style="mitre")
         rims = [slab(p, z[1], z[1] + 0.12) for p in polygons_of(area.difference(inner))]
-        parts += [(floor, merge([slab(p, *z) for p in polygons_of(area)])), (rim, merge(rims))]
+        parts += [(floor, plates(area, *z)), (rim, merge(rims))]
     return parts
 
 

@@ -10,17 +10,16 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, leg, rail_legs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, translated
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number, Point3
 from aerialdojo_gen.scenes.shapes import box
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
-
-Point3 = tuple[Number, Number, Number]
 
 
 @part_builder
@@ -76,9 +75,8 @@ def conveyor_gallery(
     at = [length * (k + 0.5) / n for k in range(n)]
     panes = [translated(box(size=[1.3, wide_m + 0.1, 0.7]), (u, 0.0, rise * u / length + high_m * 0.5)) for u in at]
     lid = sweep(path=[(0.0, 0.0, high_m + 0.1), (length, 0.0, rise + high_m + 0.1)], section=(wide_m + 0.3, 0.16))
-    turn = rotation(0.0, 0.0, yaw_deg)
     raw: Parts = [(wall, tube), ("glass:#7f95a0", merge(panes)), ("iron", lid)]
-    parts: Parts = [(material, translated(rotated(body, turn), start)) for material, body in raw]
+    parts = Frame(xa, ya, yaw_deg).parts(raw, za)
     for t in legs:
         x, y = xa + (xb - xa) * t, ya + (yb - ya) * t
         foot = site.ground_z(x, y)
@@ -100,8 +98,8 @@ def guard_rails(
             if length < 0.4:
                 continue
             for level in (0.52, 1.04):
-                steel.append(translated(rotated(box(size=[length, 0.06, 0.06]), turn), (*middle, z_m + level)))
-            boards.append(translated(rotated(box(size=[length, 0.04, 0.2]), turn), (*middle, z_m)))
+                steel.append(posed(box(size=[length, 0.06, 0.06]), turn, (*middle, z_m + level)))
+            boards.append(posed(box(size=[length, 0.04, 0.2]), turn, (*middle, z_m)))
             steel += [translated(box(size=[0.07, 0.07, 1.1]), (*spot, z_m)) for spot in spots]
     parts: Parts = [(material, merge(steel))] if steel else []
     return [*parts, (toe, merge(boards))] if toe is not None and boards else parts

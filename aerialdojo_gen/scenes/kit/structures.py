@@ -17,11 +17,11 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.lettering import text
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import profile
 from aerialdojo_gen.scenes.site import Site
@@ -76,12 +76,12 @@ def railing(
     posts, panes, rails = [], [], []
     for length, turn, middle, spots in rail_legs(path, 2.0):
         if pane is None:
-            bars = [_posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)]
+            bars = [posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)]
             rails += bars
         else:
-            panes.append(_posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
-        rails.append(_posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
-        posts += [_posed(box(size=[0.08, 0.08, height_m]), turn, (*spot, z_m)) for spot in spots]
+            panes.append(posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
+        rails.append(posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
+        posts += [posed(box(size=[0.08, 0.08, height_m]), turn, (*spot, z_m)) for spot in spots]
     body = (frame, merge(posts + rails))
     return [body] if pane is None else [(pane, merge(panes)), body]
 
@@ -125,8 +125,7 @@ def stairs(
     for k in range(0, count, 4):
         at = (going * (k + 0.5), step * (k + 1))
         side += [translated(box(size=[0.06, 0.06, 1.0]), (at[0], s * (width_m / 2 + 0.05), at[1])) for s in (-1, 1)]
-    turn = rotation(0.0, 0.0, yaw_deg)
-    return [(m, _posed(merge(b), turn, (*foot, z_m))) for m, b in ((tread, treads), (stringer, side))]
+    return Frame(*foot, yaw_deg).parts([(tread, merge(treads)), (stringer, merge(side))], z_m)
 
 
 @site_builder
@@ -144,7 +143,7 @@ def flights(
 
 @part_builder
 def canopy(
-    box: tuple[Number, Number, Number, Number], z_m: Number, *, roof: Material, post: Material = "chrome",
+    box: Box, z_m: Number, *, roof: Material, post: Material = "chrome",
     posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: _Spacing = 6.0, foot_m: Number = 0.0,
 ) -> Parts:  # fmt: skip
     """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, in rows or one by one."""
@@ -159,16 +158,15 @@ def canopy(
 def ramp(a: Point, b: Point, z0_m: float, z1_m: float, width_m: float, *, floor: str, wall: str) -> Parts:
     """Make a straight ramp of a car park from `a` up to `b` with low walls on both sides."""
     (length, yaw_deg), rise = leg(a, b), z1_m - z0_m
-    turn = rotation(0.0, 0.0, yaw_deg)
     way = profile(points=[(0.0, -0.02), (length, rise - 0.3), (length, rise), (0.0, 0.01)], width=width_m)
     edge = [(0.0, 0.0), (length, rise - 0.3), (length, rise + 0.9), (0.0, 0.9)]
     sides = [translated(profile(points=edge, width=0.2), (0.0, s * (width_m / 2 + 0.1), 0.0)) for s in (-1, 1)]
-    return [(floor, _posed(way, turn, (*a, z0_m))), (wall, _posed(merge(sides), turn, (*a, z0_m)))]
+    return Frame(*a, yaw_deg).parts([(floor, way), (wall, merge(sides))], z0_m)
 
 
 def parapet(plan: BaseGeometry, z_m: float, height_m: float = 1.0, gaps: Sequence[BaseGeometry] = ()) -> Mesh:
     """Make a low wall along a plan's edge on a floor at `z_m`, open where it meets `gaps`."""
-    band = plan.difference(plan.buffer(-0.2, join_style="mitre"))
+    band = edge_strip(plan, 0.2)
     for gap in gaps:
         band = band.difference(gap)
     return merge([slab(p, z_m, z_m + height_m) for p in getattr(band, "geoms", [band]) if p.area > 1e-6])
@@ -195,7 +193,7 @@ def letters(
     line: str, height_m: float, at: tuple[float, float, float], yaw_deg: float, depth_m: float = 0.12
 ) -> Mesh:
     """Write on a wall: bottom middle `at` a point of its face, metres, read by whoever looks against `yaw_deg`."""
-    return _posed(text(text=line, height=height_m, depth=depth_m), rotation(0.0, 0.0, yaw_deg), at)
+    return posed(text(text=line, height=height_m, depth=depth_m), rotation(0.0, 0.0, yaw_deg), at)
 
 
 def spaced(a: Point, b: Point, spacing_m: float) -> list[Point]:
@@ -208,7 +206,3 @@ def spaced(a: Point, b: Point, spacing_m: float) -> list[Point]:
 def _in_rows(rows: Sequence[Sequence[Point]], spacing_m: float) -> list[Point]:
     """List points along every leg of lines, about `spacing_m` apart."""
     return [point for row in rows for a, b in pairwise(row) for point in spaced(a, b, spacing_m)]
-
-
-def _posed(body: Mesh, turn: np.ndarray, at: tuple[float, float, float]) -> Mesh:
-    return translated(rotated(body, turn), at)

@@ -11,14 +11,14 @@ from pydantic import Field
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.halls import across_x
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts, rim, trestle
 from aerialdojo_gen.scenes.kit.structures import Parts, block
 from aerialdojo_gen.scenes.mesh import Mesh, merge
-from aerialdojo_gen.scenes.plans.values import At, Bodies, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.plans.values import At, Bodies, Box, Material, Number
+from aerialdojo_gen.scenes.shapes_extruded import upright
 from aerialdojo_gen.scenes.site import Site
 
 _SIDES = (-2.4, 2.4)
@@ -40,7 +40,7 @@ def stone_viaduct(
     for middle, radius, spring in arches:
         upper = rectangle(middle - 9, spring, middle + 9, spring + 9)
         ring = _circle(middle, spring, radius + 0.6).difference(_circle(middle, spring, radius))
-        rings.append(upright(ring.intersection(upper), 5.3))
+        rings.append(upright(polygons_of(ring.intersection(upper)), 5.3))
         for x in (middle - radius - 0.35, middle + radius + 0.35):
             rings.append(block(x - 0.5, -2.7, x + 0.5, 2.7, spring - 0.45, spring))
     walls = [block(x0 - 1.5, s - 0.2, x1 + 1.5, s + 0.2, 0.0, 1.25) for s in _SIDES]
@@ -90,7 +90,7 @@ def bridge_piers(
 
 @site_builder
 def falsework(
-    site: Site, *, box: tuple[Number, Number, Number, Number], top_m: Number,
+    site: Site, *, box: Box, top_m: Number,
     towers: tuple[list[Number], list[Number]], beams: list[Number], extra: Bodies = [],  # noqa: B006
 ) -> None:  # fmt: skip
     """Carry a platform on trestles that stand on the ground, every x with every y, and on beams (y) along x."""
@@ -124,14 +124,4 @@ def arcade(
     for middle, radius, spring in arches:
         face = face.difference(rectangle(middle - radius, z0 - 1.0, middle + radius, spring))
         face = face.difference(shapely.Point(middle, spring).buffer(radius, quad_segs=8))
-    return upright(face, width_m, y)
-
-
-def upright(face: BaseGeometry, width_m: float, y: float = 0.0) -> Mesh:
-    """Extrude a side view, polygons of (x, z) in metres, along y, centred on `y`."""
-    bodies = []
-    for piece in getattr(face, "geoms", [face]):
-        flat = extrude(piece, width_m)
-        u, v, w = flat.vertices.T
-        bodies.append(Mesh(np.column_stack([u, y + width_m / 2 - w, v]), flat.faces))
-    return merge(bodies)
+    return upright(polygons_of(face), width_m, y)

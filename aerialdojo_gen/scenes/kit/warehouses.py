@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from shapely.geometry import Polygon
 
 from aerialdojo_gen.scenes.grammar_buildings import pitched_roof
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, columns, letters
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.mesh import merge
+from aerialdojo_gen.scenes.plans.values import Box, Material, Number
 from aerialdojo_gen.scenes.site import Site
-
-_Box = tuple[Number, Number, Number, Number]
 
 
 @site_builder
 def warehouse(
-    site: Site, *, box: _Box, height_m: Number, wall: Material, roof: Material, doors: Material, name: str = "",
+    site: Site, *, box: Box, height_m: Number, wall: Material, roof: Material, doors: Material, name: str = "",
     lettering: Material = "#f1f0ea", facing_deg: Number = -90.0, ridge_m: Number = 0.0, category: str = "warehouse",
     on: Number = 0.0,
 ) -> float:  # fmt: skip
@@ -31,12 +29,12 @@ def warehouse(
     x0, y0, x1, y1 = box
     plan, top = rectangle(*box), on + height_m
     parts: Parts = [(wall, block(*box, on, top - 0.02)),
-                    ("concrete", _rim(plan, 0.06, 0.0, on, on + 0.9))]  # fmt: skip
+                    ("concrete", slab(edge_strip(plan, 0.02, 0.06), on, on + 0.9))]  # fmt: skip
     if ridge_m:
         parts += pitched_roof(plan, top - 0.02, ridge_m, wall, roof, overhang_m=0.5)
     else:
         parts += [(roof, block(x0 + 0.05, y0 + 0.05, x1 - 0.05, y1 - 0.05, top - 0.02, top)),
-                  ("sheet_metal:#6e757c", _rim(plan, 0.12, 0.25, top - 0.4, top + 0.3))]  # fmt: skip
+                  ("sheet_metal:#6e757c", slab(edge_strip(plan, 0.25, 0.12), top - 0.4, top + 0.3))]  # fmt: skip
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
     along_x = facing_deg % 180.0 == 90.0
     out, wide = ((y1 - y0) / 2, x1 - x0) if along_x else ((x1 - x0) / 2, y1 - y0)
@@ -51,20 +49,19 @@ def warehouse(
                                         for s in (-2.0, 2.0)])))  # fmt: skip
     panes = [block(out, v - 0.9, out + 0.06, v + 0.9, height_m - 1.5, height_m - 0.7)
              for v in np.arange(-wide / 2 + 2.0, wide / 2 - 1.5, 3.0)]  # fmt: skip
-    turn = rotation(0.0, 0.0, facing_deg)
     if name:
         panes = panes[:1] + panes[-1:]
         sign = letters(name, 0.9, (out + 0.02, 0.0, height_m - 1.6), 0.0, 0.08)
         local.append((lettering, sign))
     if panes:
         local.append(("window", merge(panes)))
-    parts += [(m, translated(rotated(b, turn), (*middle, on))) for m, b in local]
+    parts += Frame(*middle, facing_deg).parts(local, on)
     site.add(None, category, parts, footprint=plan)
     return top
 
 
 @site_builder
-def roof_on_columns(site: Site, *, box: _Box, height_m: Number, roof: Material, on: Number = 0.0) -> float:
+def roof_on_columns(site: Site, *, box: Box, height_m: Number, roof: Material, on: Number = 0.0) -> float:
     """Put up a roof on columns that one can fly under; gives the height of its top."""
     x0, y0, x1, y1 = box
     nx, ny = max(round((x1 - x0) / 8.0), 1), max(round((y1 - y0) / 8.0), 1)
@@ -81,8 +78,3 @@ def roof_on_columns(site: Site, *, box: _Box, height_m: Number, roof: Material, 
     for x, y in posts:
         site.occupy(rectangle(x - 0.3, y - 0.3, x + 0.3, y + 0.3))
     return on + height_m + 0.25
-
-
-def _rim(plan: Polygon, out_m: float, in_m: float, z0: float, z1: float) -> Mesh:
-    ring = plan.buffer(out_m, join_style="mitre").difference(plan.buffer(-max(in_m, 0.02), join_style="mitre"))
-    return slab(ring, z0, z1)

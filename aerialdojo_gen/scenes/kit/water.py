@@ -17,14 +17,15 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house, window_parts
-from aerialdojo_gen.scenes.grammar_scatter import poisson_disc, slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle, ribbon
+from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import blob
+from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
@@ -100,7 +101,7 @@ def flooded_house(site: Site, at: At, yaw_deg: Number, style: HouseStyle) -> Non
 
 @site_builder
 def flat_house(
-    site: Site, box: tuple[Number, Number, Number, Number], *, storeys: int, wall: Material, name: str = "",
+    site: Site, box: Box, *, storeys: int, wall: Material, name: str = "",
     facing_deg: Number = -90.0, trim: Material = "#f2efe6", roof: Material = "gravel", door: Material = "wood",
     parapet_m: Number = 0.35,
 ) -> float:  # fmt: skip
@@ -110,36 +111,23 @@ def flat_house(
     """
     x0, y0, x1, y1 = box
     plan, top = rectangle(x0, y0, x1, y1), storeys * 3.1 - DEPTH_M + 0.3
-    rim = plan.buffer(0.12, join_style="mitre").difference(plan.buffer(-0.25, join_style="mitre"))
     parts: Parts = [
         (wall, block(x0, y0, x1, y1, -DEPTH_M, top - 0.02)),
         (roof, block(x0 + 0.05, y0 + 0.05, x1 - 0.05, y1 - 0.05, top - 0.02, top)),
-        ("concrete", merge([slab(p, top - 0.3, top + parapet_m) for p in polygons_of(rim)])),
-        (site.material("stain", "mud:#8a7152"), _band(
-            plan.buffer(0.03, join_style="mitre").difference(plan.buffer(-0.02, join_style="mitre")))),
+        ("concrete", plates(edge_strip(plan, 0.25, 0.12), top - 0.3, top + parapet_m)),
+        (site.material("stain", "mud:#8a7152"), _band(edge_strip(plan, 0.02, 0.03))),
     ]  # fmt: skip
     middle = ((x0 + x1) / 2, (y0 + y1) / 2)
     for yaw in (0.0, 90.0, 180.0, 270.0):
-        along_x = yaw in (90.0, 270.0)
-        out = (y1 - y0 if along_x else x1 - x0) / 2
-        wide = x1 - x0 if along_x else y1 - y0
-        count = max(int((wide - 1.0) // 2.6), 1)
+        out, middles = _windows_of(box, yaw)
         for storey in range(storeys):
-            for k in range(count):
-                v = (k - (count - 1) / 2) * (wide - 1.0) / count
-                if storey == 0 and yaw == facing_deg % 360.0 and k == count // 2:
-                    continue
-                opening = window_parts(1.5, 1.4, trim)
-                z = storey * 3.1 - DEPTH_M + 1.25
-                turn = rotation(0.0, 0.0, yaw)
-                parts += [(m, translated(rotated(translated(b, (out, v, z)), turn), (*middle, 0.0)))
-                          for m, b in opening]  # fmt: skip
-    along_x = facing_deg % 180.0 == 90.0
-    out = (y1 - y0 if along_x else x1 - x0) / 2
-    wide = x1 - x0 if along_x else y1 - y0
-    count = max(int((wide - 1.0) // 2.6), 1)
-    v = (count // 2 - (count - 1) / 2) * (wide - 1.0) / count
-    frame = Frame(*middle, facing_deg)
+            z = storey * 3.1 - DEPTH_M + 1.25
+            for k, v in enumerate(middles):
+                if storey or yaw != facing_deg % 360.0 or k != len(middles) // 2:
+                    opening = [(m, translated(b, (out, v, z))) for m, b in window_parts(1.5, 1.4, trim)]
+                    parts += Frame(*middle, yaw).parts(opening)
+    out, middles = _windows_of(box, facing_deg)
+    frame, v = Frame(*middle, facing_deg), middles[len(middles) // 2]
     panel = block(out, v - 0.6, out + 0.1, v + 0.6, 0.2 - DEPTH_M, 2.5 - DEPTH_M)
     hood = block(out, v - 1.0, out + 0.9, v + 1.0, 2.75 - DEPTH_M, 2.9 - DEPTH_M)
     parts += frame.parts([(door, panel), (trim, hood)])
@@ -148,6 +136,14 @@ def flat_house(
         parts.append((site.material("lettering", "#3a332c"), letters(name, 0.5, at, facing_deg, 0.06)))
     site.add(None, "flat_house", parts, footprint=plan)
     return top
+
+
+def _windows_of(box: tuple[float, float, float, float], yaw_deg: float) -> tuple[float, list[float]]:
+    """Give how far from its middle a side of a house is, and where its windows stand along it."""
+    x0, y0, x1, y1 = box
+    deep, wide = (y1 - y0, x1 - x0) if yaw_deg % 180.0 == 90.0 else (x1 - x0, y1 - y0)
+    count = max(int((wide - 1.0) // 2.6), 1)
+    return deep / 2, [(k - (count - 1) / 2) * (wide - 1.0) / count for k in range(count)]
 
 
 @site_builder
@@ -187,4 +183,4 @@ def wires(site: Site, heads: list[tuple[Number, Number, Number]], sag_m: Number 
 
 def _band(area: BaseGeometry) -> Mesh:
     """Make the strip of dirt that the water left on walls."""
-    return merge([slab(p, -0.1, 0.35) for p in polygons_of(area)])
+    return plates(area, -0.1, 0.35)

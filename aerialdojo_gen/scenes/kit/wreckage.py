@@ -16,12 +16,13 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.scenes.grammar_buildings import opened
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Number
 from aerialdojo_gen.scenes.shapes import box, crown
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep, upright
 
 Parts = list[tuple[str, Mesh]]
 XY = tuple[float, float]
@@ -100,23 +101,15 @@ def torn_wall(
     (from, to, sill, head). None where nothing stands.
     """
     top = face.bounds[3]
-    for u0, u1, sill, head in openings:
-        face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
+    face = opened(face, openings)
     for bite in bites:
         face = face.difference(bite.tear(a, b, top, rng))
     yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
-    bodies = []
     # Tears and openings that all but touch leave slivers that cannot be triangulated.
-    for piece in polygons_of(shapely.set_precision(face, _GRID_M)):
-        if piece.area < _CRUMB_M2:
-            continue
-        flat = extrude(piece, thickness_m)
-        u, v, w = flat.vertices.T
-        # (u, v, w) becomes (x, z, -y): the wall stands on y = 0 and its pattern is projected anew.
-        bodies.append(Mesh(np.column_stack([u, thickness_m / 2 - w, v]), flat.faces))
-    if not bodies:
+    pieces = [p for p in polygons_of(shapely.set_precision(face, _GRID_M)) if p.area >= _CRUMB_M2]
+    if not pieces:
         return None
-    return translated(rotated(merge(bodies), rotation(0.0, 0.0, yaw)), (*a, 0.0))
+    return posed(upright(pieces, thickness_m), rotation(0.0, 0.0, yaw), (*a, 0.0))
 
 
 def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh | None:
@@ -171,7 +164,7 @@ def hanging_slab(at: XY, top_m: float, yaw_deg: float, rng: np.random.Generator,
     )  # fmt: skip
     plate = translated(extrude(ragged, 0.22), (0, 0, -0.22))
     turn = rotation(0.0, float(rng.uniform(48, 78)), yaw_deg)
-    return translated(rotated(plate, turn), (*at, top_m))
+    return posed(plate, turn, (*at, top_m))
 
 
 def tilted_plate(
@@ -184,7 +177,7 @@ def tilted_plate(
     right = [(x * float(rng.uniform(0.82, 1.08)), float(v)) for v in side]
     left = [(-x * float(rng.uniform(0.82, 1.08)), float(v)) for v in side[::-1]]
     plate = translated(extrude(Polygon([*right, *left]), thickness_m), (0, 0, -thickness_m))
-    return translated(rotated(plate, rotation(tilt_deg[0], tilt_deg[1], yaw_deg)), at)
+    return posed(plate, rotation(tilt_deg[0], tilt_deg[1], yaw_deg), at)
 
 
 def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
@@ -203,4 +196,4 @@ def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
     }
     body = box(size=sizes[kind], taper=(float(rng.uniform(0.8, 1.0)), 1.0))
     tilt = (float(rng.uniform(-28, 28)), float(rng.uniform(-24, 24)), float(rng.uniform(0, 360)))
-    return translated(rotated(body, rotation(*tilt)), (0, 0, -0.03))
+    return posed(body, rotation(*tilt), (0, 0, -0.03))

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import Field
-from shapely.affinity import rotate, translate
 
+from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Parts, block, columns
-from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import cone
 from aerialdojo_gen.scenes.site import Site
@@ -46,13 +46,12 @@ def container_stacks(site: Site, *, stacks: list[Stack], yaw_deg: Number = 0.0, 
                     for end, out in ((u, -1), (u + LONG_M, 1)):
                         a, b = sorted((end, end + out * 0.03))
                         dark += [block(a, v + s, b, v + s + 0.07, w + 0.1, w + 2.4) for s in (0.35, 0.95, 1.42, 2.0)]
-        turn = rotation(0.0, 0.0, yaw_deg)
         made = [*((f"corrugated:{c}", m) for c, m in sorted(bodies.items())), ("#c9ccce", dark)]
-        parts: Parts = [(name, translated(rotated(merge(m), turn), (*stack.at, on))) for name, m in made]
+        frame = Frame(*stack.at, yaw_deg)
         length = len(stack.tiers) * (LONG_M + 0.5) - 0.5
         width = max(len(bay) for bay in stack.tiers) * (WIDE_M + 0.12) - 0.12
-        plan = translate(rotate(rectangle(0, 0, length, width), yaw_deg, origin=(0, 0)), *stack.at)
-        site.add(None, "container_stack", parts, footprint=plan)
+        parts = frame.parts([(name, merge(m)) for name, m in made], on)
+        site.add(None, "container_stack", parts, footprint=frame.area(rectangle(0, 0, length, width)))
 
 
 @site_builder

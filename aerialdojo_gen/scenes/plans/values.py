@@ -337,6 +337,10 @@ Formula = Annotated[
 """An expression over arrays, such as ``"2*eased(inland, 12, 26)*(1 + 0.8*noise)"``; see `evaluate_arrays`."""
 At = Annotated[Point, PlainValidator(lambda value, info: names_of(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
 """A point ``[x, y]``, metres."""
+Box = tuple[Number, Number, Number, Number]
+"""An axis-parallel rectangle ``[x0, y0, x1, y1]``, metres."""
+Point3 = tuple[Number, Number, Number]
+"""A point ``[x, y, z]``, metres."""
 Line = Annotated[
     list[Point],
     PlainValidator(lambda value, info: names_of(info).line(value)),
