@@ -5,25 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import fcl
 import numpy as np
 import pytest
+from support.layout_checks import ASSETS, catalogue, props_of, touching
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.model import Scene
 
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 RECIPE = ASSETS / "scenes" / "U_Mall_0.toml"
-URBAN = ("vehicles", "street", "retail", "park", "signs", "shopfronts", "landmarks_urban")
-HUNG = {"shop_sign", "wall_banner", "wall_clock", "storefront", "dock_door"}
-
-
-@pytest.fixture(scope="module")
-def catalogue() -> Catalogue:
-    return load_catalogue(ASSETS)
 
 
 @pytest.fixture(scope="module")
@@ -36,33 +27,13 @@ def world(mall: Scene) -> CollisionWorld:
     return CollisionWorld(mall)
 
 
-def props(scene: Scene, catalogue: Catalogue) -> list[Instance]:
-    return [i for i in scene.instances if i.category in catalogue]
+def test_every_prop_says_where_it_stands(mall: Scene) -> None:
+    for i in props_of(mall):
+        assert i.attributes.get("place", "").strip() or catalogue()[i.category].kind == "life", i.node
 
 
-def test_every_prop_says_where_it_stands(mall: Scene, catalogue: Catalogue) -> None:
-    for i in props(mall, catalogue):
-        assert i.attributes.get("place", "").strip() or catalogue[i.category].kind == "life", i.node
-
-
-def test_props_do_not_stand_in_each_other(mall: Scene, catalogue: Catalogue) -> None:
-    owners: dict[int, Instance] = {}
-    bodies = []
-    for i in props(mall, catalogue):
-        if catalogue[i.category].kind == "building":
-            continue
-        model = fcl.BVHModel()
-        model.beginModel(len(i.vertices), len(i.faces))
-        model.addSubModel(i.vertices, i.faces)
-        model.endModel()
-        owners[id(model)] = i
-        bodies.append(fcl.CollisionObject(model))
-    manager = fcl.DynamicAABBTreeCollisionManager()
-    manager.registerObjects(bodies)
-    manager.setup()
-    found = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=10_000))
-    manager.collide(found, fcl.defaultCollisionCallback)
-    pairs = {tuple(sorted(owners[id(g)].node for g in (c.o1, c.o2))) for c in found.result.contacts}
+def test_props_do_not_stand_in_each_other(mall: Scene) -> None:
+    pairs = touching(i for i in props_of(mall) if catalogue()[i.category].kind != "building")
     # Hedges run on from block to block, and trees grow out of them.
     assert [p for p in sorted(pairs) if not any("hedge" in n for n in p)] == []
 
@@ -99,8 +70,8 @@ def test_walls_and_floors_stop_it(world: CollisionWorld, p: tuple[float, ...], q
     assert world.segment_in_collision(np.array(p), np.array(q), 0.25)
 
 
-def test_a_thing_that_the_catalogue_lacks_is_named(tmp_path: Path, catalogue: Catalogue) -> None:
+def test_a_thing_that_the_catalogue_lacks_is_named(tmp_path: Path) -> None:
     recipe = tmp_path / "U_Mall_9.toml"
     recipe.write_text(RECIPE.read_text().replace('["ice_cream_cart"', '["ice_cream_card"', 1))
     with pytest.raises(AssetError, match=r"ice_cream_card.*ice_cream_cart"):
-        build_scene(recipe, catalogue)
+        build_scene(recipe, catalogue())

@@ -1,25 +1,22 @@
 """Deserts and snowfields: each stands up to a look from close by."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, each_scene, props_of
+from support.layout_checks import blank_site, each_scene, props_of
 
 from aerialdojo_gen.scenes.kit.layered_rocks import Rock, layered_rocks
 from aerialdojo_gen.scenes.kit.mudbrick import MudbrickHouse, mudbrick_houses
 from aerialdojo_gen.scenes.kit.sands import dunes, stepped_valley
 from aerialdojo_gen.scenes.kit.snow import banks_beside, moguls, profile_slope
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
+blank = partial(blank_site, "N_T_0", seed=3)
 SCENES = [f"N_{kind}_{k}" for kind in ("Desert", "Snowfield") for k in (0, 1)]
 of_each_scene = each_scene(SCENES)
 FLAT = rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0)
-
-
-def blank(size: float = 60.0) -> Site:
-    return Site("N_T_0", SceneHead(seed=3, size_m=(size, size), ceiling_m=20), catalogue())
 
 
 @of_each_scene

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, each_scene
+from support.layout_checks import blank_site, catalogue, distances, each_scene
 
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 
 SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_0", "N_Forest_1"]
@@ -19,11 +16,10 @@ of_each_scene = each_scene(SCENES)
 @of_each_scene
 def test_boulders_touch_the_ground(scene_of, name):
     scene = scene_of(name)
-    ground = RayCaster(Scene(name, (scene["ground"],), scene.materials, scene.bounds))
+    ground = Scene(name, (scene["ground"],), scene.materials, scene.bounds)
     for boulder in (i for i in scene.instances if i.category == "boulder"):
         v = boulder.vertices
-        origins = np.column_stack([v[:, :2], np.full(len(v), 60.0)])
-        depth, _ = ground.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(v), 1)))
+        depth = distances(ground, np.column_stack([v[:, :2], np.full(len(v), 60.0)]), (0.0, 0.0, -1.0))
         above = v[:, 2] - (60.0 - depth)
         assert above.min() < 0.0 < above.max(), boulder.node
 
@@ -38,7 +34,7 @@ def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
 
 
 def test_mountains_rise_to_their_crests_and_show_rock_where_they_are_steep():
-    site = Site("N_T_0", SceneHead(seed=3, size_m=(60, 60), ceiling_m=20), catalogue())
+    site = blank_site("N_T_0", seed=3)
     ridge = Ridge([(0.0, 10.0, 20.0)], 25.0, hollow=1.0)
     flat = flat_terrain((60, 60))
     plain = massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=0.0, rough_m=0.0)

@@ -1,52 +1,43 @@
 """Bridges and rail corridors: each stands up to a look from close by."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from support.layout_checks import catalogue, each_scene, props_of
+from support.layout_checks import blank_site, distances, each_scene, props_of
 
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.grammar_scatter import s_curve
 from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
 from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
-from aerialdojo_gen.scenes.kit.viaducts import arcade, upright
+from aerialdojo_gen.scenes.kit.viaducts import arcade
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.shapes_extruded import upright
 
+blank = partial(blank_site, "I_T_0")
 ROLLING = ("locomotive", "steam_locomotive", "passenger_carriage", "freight_wagon", "tank_wagon", "handcar")
-
-
-def blank() -> Site:
-    return Site("I_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
 
 
 @each_scene(["I_RailCorridor_0", "I_RailCorridor_1"])
 def test_wheels_stand_on_rails(scene_of, name):
     scene = scene_of(name)
     tracks = tuple(i for i in scene.instances if i.category == "track")
-    cast = RayCaster(Scene(name, tracks, scene.materials, scene.bounds))
+    rails = Scene(name, tracks, scene.materials, scene.bounds)
     stock = [i for i in props_of(scene) if i.category in ROLLING]
     assert len(stock) >= 6
     for car in stock:
         low = car.vertices[car.vertices[:, 2] < RAIL_M + 0.02]
-        distance, _ = cast.first_hit(low + np.array([0.0, 0.0, 0.3]), np.tile([0.0, 0.0, -1.0], (len(low), 1)))
-        on = np.abs(distance - 0.3) < 0.05
+        on = np.abs(distances(rails, low + np.array([0.0, 0.0, 0.3]), (0.0, 0.0, -1.0)) - 0.3) < 0.05
         assert on.mean() > 0.3, car.node
 
 
 @each_scene(["I_Bridge_0", "I_Bridge_1"])
 def test_one_can_fly_under_the_bridge_and_not_through_its_road(scene_of, name):
     scene = scene_of(name)
-    cast = RayCaster(scene)
     x = np.linspace(-12.0, 12.0, 13)
-    down, _ = cast.first_hit(
-        np.column_stack([x, np.full(13, 0.3), np.full(13, 0.5)]), np.tile([0.0, 0.0, -1.0], (13, 1))
-    )
-    assert (down < 0.6).all()
+    assert (distances(scene, [(u, 0.3, 0.5) for u in x], (0.0, 0.0, -1.0)) < 0.6).all()
     # From one side to the other, well below the deck and above the water.
-    start = np.column_stack([x, np.full(13, -7.0), np.full(13, -6.0)])
-    across, _ = cast.first_hit(start, np.tile([0.0, 1.0, 0.0], (13, 1)))
+    across = distances(scene, [(u, -7.0, -6.0) for u in x], (0.0, 1.0, 0.0))
     assert (across > 14.0).sum() >= 5
 
 
@@ -81,7 +72,7 @@ def test_arcades_open_where_their_arches_are():
 
 
 def test_upright_faces_stand_where_they_are_drawn():
-    body = upright(Polygon([(0, 0), (2, 0), (2, 1), (0, 1)]), 0.5, y=3.0)
+    body = upright([Polygon([(0, 0), (2, 0), (2, 1), (0, 1)])], 0.5, y_m=3.0)
     assert body.vertices.min(axis=0) == pytest.approx((0.0, 2.75, 0.0))
     assert body.vertices.max(axis=0) == pytest.approx((2.0, 3.25, 1.0))
 
@@ -93,7 +84,6 @@ def test_parapets_are_open_at_their_gaps():
     assert sum(len(m.faces) for _, m in gapped) != sum(len(m.faces) for _, m in whole)
     site = blank()
     site.add("deck", "bridge_deck", [*bridge_deck(**ends, road_m=3.0), *gapped])
-    cast = RayCaster(site.scene())
-    far, _ = cast.first_hit(np.array([[0.0, 0.0, 0.7], [5.0, 0.0, 0.7]]), np.tile([0.0, 1.0, 0.0], (2, 1)))
+    far = distances(site.scene(), [(0.0, 0.0, 0.7), (5.0, 0.0, 0.7)], (0.0, 1.0, 0.0))
     assert far[0] > 10.0
     assert far[1] < 4.6

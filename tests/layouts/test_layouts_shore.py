@@ -1,9 +1,12 @@
 """Islands and coasts: the sea is level, boats float, piers can be flown under, and things stand as they should."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import shapely
 from support import layout_checks as look
+from support.layout_checks import blank_site
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.expressions import eased
@@ -12,9 +15,8 @@ from aerialdojo_gen.scenes.kit.natural_ground import ragged_outline
 from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
 from aerialdojo_gen.scenes.kit.shores import steep_area
 from aerialdojo_gen.scenes.kit.structures import flights
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
 
+blank = partial(blank_site, "N_T_0")
 SCENES = [f"N_{kind}_{k}" for kind in ("Island", "Coast") for k in (0, 1)]
 BOATS = ("fishing_boat", "rowing_boat", "sailboat", "motor_yacht", "tugboat", "buoy")
 of_each_scene = look.each_scene(SCENES)
@@ -25,17 +27,10 @@ def test_boats_lie_on_the_level_sea(scene_of, name):
     scene = scene_of(name)
     boats = [i for i in look.props_of(scene) if i.category in BOATS]
     ground = look.Scene(name, (scene["ground"],), scene.materials, scene.bounds)
-    cast = RayCaster(ground)
     assert len(boats) >= 4
-    for boat in boats:
-        middle = boat.bounds.mean(axis=0)
-        distance, _ = cast.first_hit(np.array([[middle[0], middle[1], 60.0]]), np.array([[0.0, 0.0, -1.0]]))
-        assert abs(60.0 - float(distance[0])) < 0.15, boat.node
-        assert boat.bounds[0, 2] < 0.1
-
-
-def blank() -> Site:
-    return Site("N_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), look.catalogue())
+    above = [(*boat.bounds.mean(axis=0)[:2], 60.0) for boat in boats]
+    np.testing.assert_allclose(look.distances(ground, above, (0.0, 0.0, -1.0)), 60.0, atol=0.15)
+    assert max(boat.bounds[0, 2] for boat in boats) < 0.1
 
 
 def test_coastlines_are_natural_and_always_the_same():
@@ -68,13 +63,10 @@ def test_steep_ground_is_found():
 def test_piers_bear_above_and_are_open_below():
     site = blank()
     pier(site, at=(-15.0, 0.0), yaw_deg=0.0, length_m=30.0, width_m=5.0, z=4.0, bay_m=5.0, rail="iron")
-    cast = RayCaster(site.scene())
-    down, along = np.array([[0.0, 0.0, -1.0]]), np.array([[1.0, 0.0, 0.0]])
-    for x in (-12.0, 0.3, 14.0):
-        distance, _ = cast.first_hit(np.array([[x, 0.4, 9.0]]), down)
-        assert 9.0 - float(distance[0]) == pytest.approx(4.0, abs=0.01)
-    distance, _ = cast.first_hit(np.array([[-20.0, 1.2, 1.2]]), along)
-    assert float(distance[0]) > 30.0
+    scene = site.scene()
+    down = look.distances(scene, [(x, 0.4, 9.0) for x in (-12.0, 0.3, 14.0)], (0.0, 0.0, -1.0))
+    assert 9.0 - down == pytest.approx([4.0] * 3, abs=0.01)
+    assert look.distances(scene, [(-20.0, 1.2, 1.2)], (1.0, 0.0, 0.0))[0] > 30.0
 
 
 def test_walls_groynes_and_steps_bar_the_way():

@@ -1,11 +1,12 @@
 """Parking lots, neighbourhoods, alleys and communities: each stands up to a look from close by."""
 
 from collections import Counter
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from support.layout_checks import catalogue
+from support.layout_checks import blank_site, catalogue
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -14,12 +15,8 @@ from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
 from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
 
-
-def blank() -> Site:
-    return Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=20), catalogue())
+blank = partial(blank_site, "U_T_0")
 
 
 def test_frames_agree_with_turned_coordinates():

@@ -1,25 +1,21 @@
 """Factories and construction sites: each stands up to a look from close by, and structure bears what is on it."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import shapely
-from support.layout_checks import catalogue, each_scene, props_of
+from support.layout_checks import blank_site, catalogue, distances, each_scene, props_of
 
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
 from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
 
+blank = partial(blank_site, "U_T_0")
 SCENES = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
 of_each_scene = each_scene(SCENES)
-
-
-def blank(size: float = 60.0) -> Site:
-    return Site("U_T_0", SceneHead(size_m=(size, size), ceiling_m=20), catalogue())
 
 
 @of_each_scene
@@ -36,11 +32,9 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
     void = rectangle(-2, -2, 2, 2)
     grid = [-7.0, 0.0, 7.0]
     concrete_frame(site, xs=grid, ys=grid, slabs=[Slab(plan, 3.6, void), Slab(plan, 7.2)])
-    cast = RayCaster(site.scene())
-    down = np.array([[0.0, 0.0, -1.0]])
-    assert cast.first_hit(np.array([[4.0, 4.0, 5.0]]), down)[0][0] == pytest.approx(1.4)
-    assert cast.first_hit(np.array([[1.0, 1.5, 5.0]]), down)[0][0] == pytest.approx(5.0)
-    across, _ = cast.first_hit(np.array([[-20.0, 3.5, 1.8], [-20.0, 3.5, 4.67]]), np.tile([1.0, 0.0, 0.0], (2, 1)))
+    scene = site.scene()
+    assert distances(scene, [(4.0, 4.0, 5.0), (1.0, 1.5, 5.0)], (0.0, 0.0, -1.0)) == pytest.approx([1.4, 5.0])
+    across = distances(scene, [(-20.0, 3.5, 1.8), (-20.0, 3.5, 4.67)], (1.0, 0.0, 0.0))
     assert across[0] > 30.0
     assert across[1] == pytest.approx(12.1, abs=0.3)
     assert not site.is_free(7.0, 7.0, 0.2)
@@ -65,9 +59,8 @@ def test_halls_are_entered_by_their_gates_alone():
     gates = {"s": [(8.0, 12.0, 0.0, 4.0)]}
     box = (-10.0, -6.0, 10.0, 6.0)
     hall(site, category="hall", box=box, eaves_m=5.0, wall="brick", roof=HallRoof("gravel"), gates=gates)
-    cast = RayCaster(site.scene())
-    north = np.tile([0.0, 1.0, 0.0], (3, 1))
-    distance, _ = cast.first_hit(np.array([[0.0, -12.0, 1.8], [-6.0, -12.0, 1.8], [6.0, -12.0, 1.0]]), north)
+    feet = [(0.0, -12.0, 1.8), (-6.0, -12.0, 1.8), (6.0, -12.0, 1.0)]
+    distance = distances(site.scene(), feet, (0.0, 1.0, 0.0))
     assert distance[0] > 17.0
     assert (distance[1:] < 6.2).all()
     assert site.is_free(0.0, 0.0, 2.0)

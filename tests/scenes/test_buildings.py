@@ -1,7 +1,5 @@
 """Buildings from a plan: whole windows, closed roofs, openings that one can fly through."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
@@ -10,16 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.affinity import rotate, translate
 from shapely.geometry import Point, Polygon
+from support.layout_checks import blank_site, distances
 
-from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.grammar_buildings import before_walls, building, facade, pitched_roof, wall_with_openings
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
-from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.site import Site
-
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 
 
 @given(st.floats(5, 40), st.floats(5, 40), st.integers(1, 6), st.floats(0, 360))
@@ -59,20 +52,19 @@ def test_pitched_roofs_are_closed_and_as_high_as_asked(length, width, turn, hip)
 @pytest.mark.parametrize("roof_kind", ["flat", "gable", "hip"])
 @pytest.mark.parametrize("parapet", [0.0, 0.6])
 def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
-    site = Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    site = blank_site("U_T_0", ceiling_m=30)
     plan = rotate(rectangle(-8, -5, 8, 5), 20)
     house = building(site, plan, wall="facade_brick", roof="roof_tiles", roof_kind=roof_kind, parapet_m=parapet)
     assert not site.is_free(0, 0, 0.5)
     inside = np.array([(x, y) for x in np.arange(-9, 9, 0.37) for y in np.arange(-9, 9, 0.37)])
     inside = inside[shapely.contains_xy(plan.buffer(-0.03), inside[:, 0], inside[:, 1])]
     origins = np.column_stack([inside, np.full(len(inside), 1.0)])
-    distance, _ = RayCaster(site.scene()).first_hit(origins, np.tile([0.0, 0.0, 1.0], (len(inside), 1)))
-    assert np.isfinite(distance).all()
+    assert np.isfinite(distances(site.scene(), origins, (0.0, 0.0, 1.0))).all()
     assert house.bounds[0, 2] == 0.0
 
 
 def test_openings_let_rays_through_and_walls_do_not():
-    site = Site("U_T_0", SceneHead(size_m=(60, 60), ceiling_m=30), load_catalogue(ASSETS))
+    site = blank_site("U_T_0", ceiling_m=30)
     openings = [(2.0, 4.0, 0.0, 2.5), (6.0, 7.0, 1.0, 2.0)]
     wall = wall_with_openings((0, 0), (6, 8), 0.0, 4.0, openings, 0.4)
     site.add(None, "wall", [("brick", wall)])
@@ -81,7 +73,7 @@ def test_openings_let_rays_through_and_walls_do_not():
     rng = np.random.default_rng(0)
     u, v = rng.uniform(0.01, 9.99, 500), rng.uniform(0.01, 3.99, 500)
     origins = u[:, None] * along + v[:, None] * np.array([0, 0, 1.0]) + 3 * across
-    distance, _ = RayCaster(site.scene()).first_hit(origins, np.tile(-across, (500, 1)))
+    distance = distances(site.scene(), origins, -across)
     hit = distance < 4.0
     free = np.zeros(500, dtype=bool)
     for u0, u1, sill, head in openings:

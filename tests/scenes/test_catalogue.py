@@ -195,9 +195,3 @@ def test_sign_text_speaks_of_attributes(assets):
         for w in ("I", "WWW")
     ]
     assert widths[1] > 4 * widths[0]
-
-
-def test_254_categories_load(assets):
-    body = MAILBOX
-    (assets / "props" / "many.toml").write_text("".join(body.replace("mailbox", f"box_{k}") for k in range(253)))
-    assert len(load_catalogue(assets)) == 254

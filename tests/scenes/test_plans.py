@@ -1,7 +1,6 @@
 """Plans: what a scene's TOML says is built in its order, or named in one line."""
 
 import json
-import re
 import tomllib
 from pathlib import Path
 
@@ -171,10 +170,8 @@ def test_things_are_strewn_by_a_field_made_of_others(tmp_path, catalogue):
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        (
-            {"make": "strew", "of": "fern", "area": "yard", "spacing_m": 2, "limit": 9, "density": {"reach_m": 2}},
-            "'strew': density .*a field has one of patches, near",
-        ),
+        ({"make": "strew", "of": "fern", "area": "yard", "spacing_m": 2, "limit": 9, "density": {"reach_m": 2}},
+         "'strew': density .*a field has one of patches, near"),
         ({"paint": "yrd", "material": "mud"}, r"site\[0\] \(paint\): .*no area 'yrd'.*yard"),
         ({"paint": "yard", "material": "mudd"}, r"site\[0\] \(paint\): .*unknown material 'mudd'.*mud"),
         ({"paint": {"disc": [0, 0, 3], "minus": {"disc": [0, 0, 9]}}, "material": "mud"}, "the area is empty"),
@@ -182,54 +179,30 @@ def test_things_are_strewn_by_a_field_made_of_others(tmp_path, catalogue):
         ({"paint": {"blob": [0, 0, 3]}, "material": "mud"}, r"blob is \[x, y, radius, seed\] or"),
         ({"paint": ["yard", "yrd"], "material": "mud"}, "no area 'yrd'"),
         ({"make": "flat_hose"}, r"site\[0\] \(make\): no site builder 'flat_hose'.*flat_house"),
-        (
-            {
-                "make": "scorch_rays",
-                "at": [0, 0],
-                "radius_m": 4,
-                "count": 0,
-                "reach": [2, 3],
-                "spread": [0.1, 0.2],
-                "material": "asphalt",
-            },
-            "'scorch_rays': .*count",
-        ),
-        (
-            {
-                "make": "torn_yard_wall",
-                "brick": "brick",
-                "hole": {"x": 0, "y": 0, "foot_m": 1, "head_m": 2},
-                "runs": [[[0, 0], [5, 0], [5, 5]]],
-            },
-            "'torn_yard_wall': .*runs",
-        ),
+        ({"make": "scorch_rays", "at": [0, 0], "radius_m": 4, "count": 0, "reach": [2, 3], "spread": [0.1, 0.2],
+          "material": "asphalt"},
+         "'scorch_rays': .*count"),
+        ({"make": "torn_yard_wall", "brick": "brick", "hole": {"x": 0, "y": 0, "foot_m": 1, "head_m": 2},
+          "runs": [[[0, 0], [5, 0], [5, 5]]]},
+         "'torn_yard_wall': .*runs"),
         ({"make": "wires", "headz": []}, r"site\[0\] \(make\) 'wires': .*unknown key 'headz'"),
         ({"make": "wires", "heads": [[0, 0]]}, r"site\[0\] \(make\) 'wires': .*heads"),
         ({"make": "wires", "heads": [[0, 0, 5], [9, 0, 5]], "as": "top"}, "returns no height"),
         ({"parts": [{"shape": "block", "role": "wood", "corners": [0, 0, 1], "z": [0, 1]}], "node": "a"}, "corners"),
         ({"parts": [{"shape": "blok", "role": "wood"}], "node": "a"}, "unknown shape 'blok'.*block"),
-        (
-            {
-                "make": "building",
-                "outline": [0, 0, 4, 4],
-                "wall": "wood",
-                "roof": "thatch",
-                "extra": [{"shape": "blok", "role": "wood"}],
-            },
-            "'building': .*extra.*unknown shape 'blok'.*block",
-        ),
+        ({"make": "building", "outline": [0, 0, 4, 4], "wall": "wood", "roof": "thatch",
+          "extra": [{"shape": "blok", "role": "wood"}]},
+         "'building': .*extra.*unknown shape 'blok'.*block"),
         ({"place": [["tracter", 0, 0]]}, "unknown category 'tracter'.*tractor"),
         ({"place": [["tractor", 0]]}, "a thing is"),
         ({"place": [["tractor", "loft + x", 0]]}, "unknown parameter 'x'"),
         ({"place": [["tractor", 300, 0]], "fit": "must"}, "no room for tractor"),
         ({"pattern": {"of": ["oak_tree"]}}, "a pattern has one of"),
-        (
-            {"place": [{"what": "bench", "at": [0, 0], "count": 1001}]},
-            "count = 1001: Input should be less than or equal",
-        ),
+        ({"place": [{"what": "bench", "at": [0, 0], "count": 1001}]},
+         "count = 1001: Input should be less than or equal"),
         ({"note": "nothing"}, "an entry has one of paint, make, parts, place, pattern"),
     ],
-)
+)  # fmt: skip
 def test_what_is_wrong_is_named_in_one_line(tmp_path, catalogue, entry, message):
     with pytest.raises(AssetError, match=message) as error:
         build(tmp_path, catalogue, {**YARD, "site": [entry]})
@@ -367,17 +340,3 @@ def test_a_stand_without_one_front_edge_is_refused(tmp_path, catalogue, core):
     tier = {"core": core, "front_m": -0.5, "rows": 3, "z_m": 1}
     with pytest.raises(AssetError, match=r"site\[0\] \(make\) 'stand': tier .*must enclose one area"):
         build(tmp_path, catalogue, {**HEAD, "site": [{"make": "stand", "tier": tier, "seats": ["#ffffff"]}]})
-
-
-def test_there_is_one_way_to_place_a_thing():
-    """Of the placers that there were, none is to come back: what stands somewhere is a `Placement`."""
-    retired = (
-        r"\b(try_place|place_along|place_near|place_wild|furnish|set_out|settle_on|deal|put)\(\s*site\b|\.try_place\("
-    )
-    found = {}
-    for path in sorted((ASSETS.parent / "aerialdojo_gen").rglob("*.py")):
-        text = path.read_text()
-        if re.search(retired, text):
-            found[path.name] = re.findall(retired, text)
-    assert found == {}
-    assert not (ASSETS.parent / "aerialdojo_gen/scenes/layouts").exists()

@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes import checks
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.recipe import SceneHead
+from aerialdojo_gen.scenes.site import Site
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 # Scenes that `make test` builds, two of each family; `make nightly` builds all 42.
@@ -52,6 +56,17 @@ def catalogue() -> Catalogue:
     return load_catalogue(ASSETS)
 
 
+def blank_site(name: str, size_m: float = 60.0, ceiling_m: float = 20.0, seed: int = 0) -> Site:
+    """A square site on level ground, with the catalogue that ships."""
+    return Site(name, SceneHead(seed=seed, size_m=(size_m, size_m), ceiling_m=ceiling_m), catalogue())
+
+
+def distances(scene: Scene, origins: ArrayLike, way: ArrayLike) -> NDArray[np.float64]:
+    """How far rays from points fly in one direction before they hit something; infinite where they do not."""
+    points = np.asarray(origins, dtype=np.float64)
+    return RayCaster(scene).first_hit(points, np.tile(np.asarray(way, dtype=np.float64), (len(points), 1)))[0]
+
+
 def recipe_of(name: str) -> Path:
     """A recipe waits among the drafts until its scene is annotated."""
     return next(p for folder in ("scenes", "drafts") if (p := ASSETS / folder / f"{name}.toml").exists())
@@ -83,6 +98,14 @@ def floating(
 
 def clashes(scene: Scene, share: float = 0.2, bearers: Collection[str] = ()) -> list[tuple[str, str]]:
     return checks.clashes(scene, catalogue(), share, bearers)
+
+
+def touching(things: Iterable[Instance]) -> set[tuple[str, str]]:
+    """Pairs of things whose meshes run into one another."""
+    manager = trimesh.collision.CollisionManager()
+    for thing in things:
+        manager.add_object(thing.node, trimesh.Trimesh(thing.vertices, thing.faces, process=False))
+    return set(manager.in_collision_internal(return_names=True)[1])
 
 
 def walled_in(scene: Scene, structure: Collection[str]) -> list[str]:
