@@ -9,7 +9,7 @@ from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, stee
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.terrain import flat_terrain
 
-SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_0", "N_Forest_1"]
+SCENES = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
 of_each_scene = each_scene(SCENES)
 
 
@@ -24,7 +24,6 @@ def test_boulders_touch_the_ground(scene_of, name):
         assert above.min() < 0.0 < above.max(), boulder.node
 
 
-@pytest.mark.nightly
 def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
     scene = scene_of("N_Mountain_0")
     ground, cross = scene["ground"], scene["summit_cross_000"]

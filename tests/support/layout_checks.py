@@ -23,7 +23,7 @@ from aerialdojo_gen.scenes.site import Site
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 # Scenes that `make test` builds, two of each family; `make nightly` builds all 42.
 DAILY = {
-    "D_Flood_0", "D_Flood_1", "I_Harbor_0", "I_Bridge_1", "N_Snowfield_0", "N_Forest_0", "U_Mall_0", "U_Stadium_0",
+    "D_Flood_0", "D_Flood_1", "I_Harbor_0", "I_Bridge_1", "N_Mountain_0", "N_Forest_0", "U_Mall_0", "U_Stadium_0",
 }  # fmt: skip
 
 
