@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+
+from aerialdojo_gen.imports.raw import RawNode
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -87,6 +89,17 @@ def cut(vertices: Floats, faces: Ints, region: Region) -> Pieces:
     for normal, offset in region.planes:
         pieces = _clip_by_plane(pieces, body, closed, normal, offset)
     return pieces
+
+
+def clip_node(body: RawNode, region: Region) -> RawNode:
+    """Clip a node to a region of the plan; may have no faces."""
+    pieces = cut(body.vertices, body.faces, region)
+    n = len(pieces.source)
+    # Face attributes come from the source; corner attributes are interpolated.
+    kept = body.select_faces(pieces.source)
+    if kept.corners is not None:
+        kept = replace(kept, corners=np.einsum("kij,kjc->kic", pieces.weights, kept.corners).astype(np.float32))
+    return kept.with_vertices(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
 def _select(pieces: Pieces, rows: NDArray[np.bool_] | Ints) -> Pieces:

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
-from aerialdojo_gen.imports.cutting import Region, connected_bodies, unique_rows
+from aerialdojo_gen.imports.cutting import Region, clip_node, connected_bodies, unique_rows
 from aerialdojo_gen.imports.forms import FORMS, colour_of, form_of, grown, is_unnamed, material_shares, size_words
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
-from aerialdojo_gen.imports.raw import RawNode, clip_node, merge_nodes, sort_by_position
+from aerialdojo_gen.imports.raw import RawNode, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.imports.surfaces import (
     SKY,

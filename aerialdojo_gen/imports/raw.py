@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.imports.cutting import Region, cut
 
 GREY = (168, 164, 156)
 
@@ -73,17 +72,6 @@ def extract_faces(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) ->
     """Extract faces as a node with only the vertices they need."""
     used, faces = np.unique(body.faces[rows], return_inverse=True)
     return body.select_faces(rows).with_vertices(body.vertices[used], faces.reshape(-1, 3))
-
-
-def clip_node(body: RawNode, region: Region) -> RawNode:
-    """Clip a node to a region of the plan; may have no faces."""
-    pieces = cut(body.vertices, body.faces, region)
-    n = len(pieces.source)
-    # Face attributes come from the source; corner attributes are interpolated.
-    kept = body.select_faces(pieces.source)
-    if kept.corners is not None:
-        kept = replace(kept, corners=np.einsum("kij,kjc->kic", pieces.weights, kept.corners).astype(np.float32))
-    return kept.with_vertices(pieces.corners.reshape(-1, 3), np.arange(3 * n).reshape(n, 3))
 
 
 def default_colours(n: int) -> NDArray[np.uint8]:

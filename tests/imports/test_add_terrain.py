@@ -11,7 +11,6 @@ from support import maps
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
@@ -36,32 +35,18 @@ def added(hill, tmp_path_factory):
     return add_terrain("Hill", hill, tmp_path_factory.mktemp("mine"), ReliefOptions(water_m=98.5, snow_m=113.0))
 
 
-def ground_heights(scene, places):
-    """What a plumb line meets of the ground, metres."""
-    from aerialdojo_gen.scenes.model import Scene
-
-    ground = Scene("ground", (scene["ground"],), scene.materials, scene.bounds)
-    origins = np.column_stack([places, np.full(len(places), 500.0)])
-    hit, _ = RayCaster(ground).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(places), 1)))
-    return 500.0 - hit
-
-
 def test_the_ground_is_the_models_by_interpolation(added):
     at = np.arange(-60.0, 60.1, 2.0)
     reference = RegularGridInterpolator((at, at), maps.heights(2.0, 60.0)[::-1])
     rng = np.random.default_rng(3)
     places = rng.uniform(-59.5, 59.5, size=(600, 2))
-    z = ground_heights(added.scene, places)
-    origin = read_dem_origin(added)
+    z = maps.ground_z(added.scene, places)
+    origin = maps.origin_z(added)
     # A cell is two flat triangles here and a bent sheet there: they part by a quarter of its bend at the most.
     assert np.abs(z + origin - reference(places[:, ::-1])).max() < 0.06
     # On the model's own points there is nothing between them but the rounding to a centimetre.
     corners = np.array([(x, y) for x in at[5:-5:7] for y in at[5:-5:7]])
-    assert np.abs(ground_heights(added.scene, corners) + origin - reference(corners[:, ::-1])).max() < 0.006
-
-
-def read_dem_origin(place):
-    return maps.plan_of(place)["origin"]["z_m"]
+    assert np.abs(maps.ground_z(added.scene, corners) + origin - reference(corners[:, ::-1])).max() < 0.006
 
 
 def test_nobody_flies_below_the_relief(added):
@@ -69,7 +54,7 @@ def test_nobody_flies_below_the_relief(added):
     rng = np.random.default_rng(8)
     low, high = added.scene.bounds
     p = rng.uniform([*low[:2] + 1, low[2]], [*high[:2] - 1, high[2]], size=(4000, 3))
-    over = p[:, 2] + read_dem_origin(added) - maps.hill(p[:, 0], p[:, 1])
+    over = p[:, 2] + maps.origin_z(added) - maps.hill(p[:, 0], p[:, 1])
     reached = np.array([grid.reachable(x) for x in p])
     assert (over < -0.3).sum() > 300
     assert not reached[over < -0.1].any()
@@ -82,18 +67,18 @@ def test_it_is_painted_by_slope_and_height_and_grows_what_such_ground_has(added)
     materials = {part.material.split(":")[0] for part in scene["ground"].parts}
     assert {"meadow", "rock", "snow"} & materials >= {"meadow", "snow"}
     snow = [part for part in scene["ground"].parts if part.material == "snow"]
-    lowest = min(float(part.vertices[:, 2].min()) for part in snow) + read_dem_origin(added)
+    lowest = min(float(part.vertices[:, 2].min()) for part in snow) + maps.origin_z(added)
     assert lowest > 113.0 - 3.0
     water = [i for i in scene.instances if i.category == "water_surface"]
     assert len(water) == 1
-    assert water[0].bounds[1, 2] + read_dem_origin(added) == pytest.approx(98.5, abs=0.011)
+    assert water[0].bounds[1, 2] + maps.origin_z(added) == pytest.approx(98.5, abs=0.011)
     # Trees and stones stand on the ground, none in the water.
     things = [i for i in scene.instances if i.category not in ("ground", "water_surface")]
     assert len(things) > 15
     feet = np.array([i.centroid[:2] for i in things])
-    z = ground_heights(scene, feet)
+    z = maps.ground_z(scene, feet)
     assert all(i.bounds[0, 2] <= h + 1.0 and i.bounds[1, 2] > h for i, h in zip(things, z, strict=True))
-    assert (z + read_dem_origin(added) > 98.0).all()
+    assert (z + maps.origin_z(added) > 98.0).all()
 
 
 def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
@@ -114,7 +99,7 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
     assets = home() / "scene_assets"
     assert table in scene_sources(ProjectPaths(tmp_path, assets, table.parent, tmp_path), "Hill")
     # An ESRI ASCII grid, that this program reads as any other one.
-    assert np.abs(read_dem(table).heights_m + read_dem_origin(place) - maps.heights(2.0, 60.0)).max() < 0.0051
+    assert np.abs(read_dem(table).heights_m + maps.origin_z(place) - maps.heights(2.0, 60.0)).max() < 0.0051
     text = table.read_text()
     head, first, rest = text.split("\n", 6)[:5], text.split("\n", 6)[5], text.split("\n", 6)[6]
     faults = {
@@ -164,8 +149,8 @@ def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):
     )
     two = add_terrain("Metres", metres, tmp_path / "mine", ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True))
     places = np.random.default_rng(2).uniform(-39, 39, size=(100, 2))
-    za = ground_heights(one.scene, places) + read_dem_origin(one)
-    zb = ground_heights(two.scene, places) + read_dem_origin(two)
+    za = maps.ground_z(one.scene, places) + maps.origin_z(one)
+    zb = maps.ground_z(two.scene, places) + maps.origin_z(two)
     assert np.abs(za - zb).max() < 0.03
     assert one.scene.attribution == "A survey"
 
@@ -179,7 +164,7 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
     place = add_terrain("Hole", path, tmp_path / "mine", ReliefOptions(bare=True))
     assert any("16 of 3,721 heights" in line for line in place.notes)
     known = maps.heights(2.0, 60.0)
-    found = ground_heights(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + read_dem_origin(place)
+    found = maps.ground_z(place.scene, np.array([[2 * 21 - 60.0, 60.0 - 2 * 11]]))[0] + maps.origin_z(place)
     assert known[9:15, 19:25].min() - 0.02 <= found <= known[9:15, 19:25].max() + 0.02
 
 

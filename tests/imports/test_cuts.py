@@ -12,22 +12,18 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from support.command_line import said
+from support.foreign import raw, read_here
 from support.hills import hills, standing, write_hills
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
 from aerialdojo_gen.imports.import_mesh import MeshOptions, SourceMesh, import_mesh
-from aerialdojo_gen.imports.listing import guess
-from aerialdojo_gen.imports.raw import RawNode, default_colours
+from aerialdojo_gen.imports.listing import describe_mesh, guess
+from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.recipe import load_imported
-
-
-def raw(mesh: trimesh.Trimesh, name: str = "", up: str = "z") -> RawNode:
-    v = np.asarray(mesh.vertices)
-    v = np.column_stack([v[:, 0], v[:, 2], -v[:, 1]]) if up == "y" else v
-    return RawNode(name, v, np.asarray(mesh.faces, dtype=np.int64), default_colours(len(mesh.faces)))
 
 
 def city(seed: int = 0, streets: int = 6, up: str = "z") -> list[RawNode]:
@@ -39,7 +35,10 @@ def city(seed: int = 0, streets: int = 6, up: str = "z") -> list[RawNode]:
             size = rng.uniform([8, 8, 5], [18, 18, 25])
             at = np.array([30 * i + 15, 30 * j + 15])
             bodies.append(trimesh.creation.box(bounds=[[*(at - size[:2] / 2), 0], [*(at + size[:2] / 2), size[2]]]))
-    return [raw(trimesh.util.concatenate(bodies), up=up)]
+    soup = trimesh.util.concatenate(bodies)
+    if up == "y":
+        soup.vertices = np.column_stack([soup.vertices[:, 0], soup.vertices[:, 2], -soup.vertices[:, 1]])
+    return [raw(soup)]
 
 
 def outside(region: Region, xy: np.ndarray) -> float:
@@ -173,23 +172,20 @@ def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
 
 
 @pytest.mark.parametrize("wide_m", [51.0, 90.0, 150.0, 250.0, 900.0])
-def test_a_file_in_centimetres_is_not_taken_for_one_in_inches(tmp_path, capsys, wide_m):
+def test_a_file_in_centimetres_is_not_taken_for_one_in_inches(wide_m):
     """Between 50 and 157 m wide it was, as 250 m are the usual width."""
     box = trimesh.creation.box((100 * wide_m, 60 * wide_m, 1500.0))
-    box.export(tmp_path / "hall.stl")
-    code, out, err = said(capsys, "add-scene", "Hall", tmp_path / "hall.stl", "--list")
-    assert code == 0, err
+    out = "\n".join(describe_mesh([raw(box)], None, None, Naming(), None))
     size = f"{wide_m:.3g} by {0.6 * wide_m:.3g} by 15 m (x, y, z)"
     assert f"scale: 0.01 if its unit is centimetres: {size}\n" in out
     inches = re.search(r"^ +or: 0\.0254 if its unit is inches: ([0-9,]+) by", out, re.MULTILINE)
     assert float(inches[1].replace(",", "")) == pytest.approx(254 * wide_m / 100, abs=0.5)
 
 
-def test_what_is_in_no_unit_has_its_size_in_plain_digits(tmp_path, capsys):
+def test_what_is_in_no_unit_has_its_size_in_plain_digits(tmp_path):
     text = "\n".join(f"v {x} {y} {z}" for x, y, z in [(0, 0, 0), (12e6, 0, 0), (12e6, 12e6, 0), (9, 9, 2.84e6)])
     (tmp_path / "no names.obj").write_text(f"{text}\nf 1 2 3\nf 1 2 4\nf 2 3 4\n")
-    code, out, err = said(capsys, "add-scene", "A", tmp_path / "no names.obj", "--list", "--scale", "0.001")
-    assert code == 0, err
+    out = "\n".join(describe_mesh(read_here(tmp_path / "no names.obj"), None, 0.001, Naming(), None))
     assert "scale: 0.001 as given: 12,000 by 12,000 by 2,840 m (x, y, z)\n" in out
     assert re.search(r"densest about x -?\d+, y -?\d+ \(\d of 3 triangles\)", out)
     assert re.search(r"^- +- +3 ", out, re.MULTILINE)  # the only node, without a name
@@ -245,12 +241,11 @@ def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_pat
     # Metres of a map: millions.
     nodes = city(streets=4)
     mesh = trimesh.Trimesh(nodes[0].vertices + np.array([4.1e5, 6.6e6, 12.0]), nodes[0].faces, process=False)
-    mesh.export(tmp_path / "city.ply", vertex_normal=False)
+    mesh.export(tmp_path / "city.glb")
     place = SourceMesh.of([nodes[0].with_vertices(np.asarray(mesh.vertices))], MeshOptions())
     assert place.low == pytest.approx([4.1e5 - 5, 6.6e6 - 5, 11.0])
-    added = add_scene(
-        "Far", tmp_path / "city.ply", tmp_path / "mine", MeshOptions(crop_m=(410060.0, 6600060.0, 40.0))
-    )
+    options = MeshOptions(crop_m=(410060.0, 6600060.0, 40.0))
+    added = add_scene("Far", tmp_path / "city.glb", tmp_path / "mine", options)
     recipe = load_imported(tmp_path / "mine/scenes/Far.toml")
     assert recipe.origin_m == added.repairs.origin_m
     assert recipe.origin_m[1] == pytest.approx(6600060.0, abs=1.0)

@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+from support.foreign import raw
+from support.handmade import box
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
@@ -15,15 +17,12 @@ from aerialdojo_gen.rendering.world import RenderWorld
 CAMERA = Camera(256, 256, 90.0)
 
 
-def raw_box(low, high, colour=(120, 130, 100), name="Yard") -> RawNode:
-    body = trimesh.creation.box(bounds=[low, high])
-    colours = np.tile(np.array(colour, np.uint8), (len(body.faces), 1))
-    return RawNode(name, np.asarray(body.vertices), np.asarray(body.faces, np.int64), colours)
-
-
 @pytest.mark.parametrize("renderer", [GlRenderer, RenderWorld, RayRenderer])
 def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(renderer):
-    nodes = [raw_box((-2, 8, 0), (2, 12, 3), (200, 40, 40), "Shed"), raw_box((-30, -30, -1), (30, 30, 0))]
+    nodes = [
+        raw(box((-2, 8, 0), (2, 12, 3)), "Shed", (200, 40, 40)),
+        raw(box((-30, -30, -1), (30, 30, 0)), "Yard", (120, 130, 100)),
+    ]
     ball = trimesh.creation.icosphere(3, 300.0)
     halves = np.where(ball.triangles_center[:, :1] > 0, [[40, 90, 200]], [[230, 170, 90]]).astype(np.uint8)
     sky = RawNode("SkyDome", np.asarray(ball.vertices), np.asarray(ball.faces, np.int64), halves)

@@ -5,10 +5,10 @@ import pytest
 import trimesh
 from PIL import Image
 from support import foreign, maps
+from support.interchange import collada, fbx
 
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import LocalFrame
-from aerialdojo_gen.imports.files import read_into, unpack_nodes
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 
 # A tetrahedron, x east, y north, z up: four edges of different lengths meet in a corner, so that no mirror image and
@@ -17,63 +17,17 @@ CORNERS = np.array([[0.0, 0, 0], [30, 0, 0], [0, 20, 0], [0, 0, 10]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 # In a file whose y points up, x points east and so z south: right-handed as all of these formats are.
 IN_FILE = {"z": CORNERS, "y": np.column_stack([CORNERS[:, 0], CORNERS[:, 2], -CORNERS[:, 1]])}
-_COLLADA = """<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit name="meter" meter="1"/><up_axis>{up}_UP</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="pa" count="12">{vertices}</float_array><technique_common>
-<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
-<param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
-</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="w"><node id="Body" name="Body"><instance_geometry url="#g"/></node>
-</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene></COLLADA>
-"""
-_FBX = """; FBX 7.4.0 project file
-FBXHeaderExtension:  {{
-	FBXHeaderVersion: 1003
-	FBXVersion: 7400
-}}
-Objects:  {{
-	Geometry: 1, "Geometry::", "Mesh" {{
-		Vertices: *12 {{
-			a: {vertices}
-		}}
-		PolygonVertexIndex: *12 {{
-			a: {faces}
-		}}
-		GeometryVersion: 124
-	}}
-	Model: 2, "Model::Body", "Mesh" {{
-		Version: 232
-	}}
-}}
-Connections:  {{
-	C: "OO",2,0
-	C: "OO",1,2
-}}
-"""
 
 
 def write(path, vertices, up):
-    numbers = vertices.ravel().tolist()
     if path.suffix == ".dae":
-        flat = " ".join(map(str, FACES.ravel()))
-        path.write_text(_COLLADA.format(up=up.upper(), vertices=" ".join(map(str, numbers)), faces=flat))
+        path.write_text(collada(vertices, FACES, up=up))
     elif path.suffix == ".fbx":
-        flat = ",".join(f"{a},{b},{-c - 1}" for a, b, c in FACES)
-        path.write_text(_FBX.format(vertices=",".join(map(str, numbers)), faces=flat))
+        path.write_text(fbx(vertices, FACES))
     elif path.suffix == ".3ds":
         path.write_bytes(foreign.three_ds([("body", trimesh.Trimesh(vertices, FACES, process=False))], (9, 9, 9)))
     else:
         trimesh.Scene(trimesh.Trimesh(vertices, FACES, process=False)).export(path)
-
-
-def read(path):
-    out = path.with_name("nodes.npz")
-    assert read_into(path, out) == ""
-    return unpack_nodes(out)
 
 
 def corners_of(scene):
@@ -92,7 +46,9 @@ def corners_of(scene):
 )
 def test_an_import_is_turned_and_never_mirrored(tmp_path, suffix, up):
     write(tmp_path / f"body{suffix}", IN_FILE[up], up)
-    scene, _ = import_mesh("Body", read(tmp_path / f"body{suffix}"), MeshOptions(up="y" if suffix == ".dae" else up))
+    scene, _ = import_mesh(
+        "Body", foreign.read_here(tmp_path / f"body{suffix}"), MeshOptions(up="y" if suffix == ".dae" else up)
+    )
     corners, mesh = corners_of(scene)
     np.testing.assert_allclose(corners, CORNERS[[0, 3, 2, 1]], atol=2e-3)
     assert mesh.volume == pytest.approx(30 * 20 * 10 / 6, rel=1e-3)
@@ -110,7 +66,7 @@ def test_a_picture_on_a_wall_is_read_from_left_to_right(tmp_path, suffix, up):
     visual = trimesh.visual.TextureVisuals(uv=uv, image=Image.fromarray(letter))
     mesh = trimesh.Trimesh(wall, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
     trimesh.Scene(mesh).export(tmp_path / f"wall{suffix}")
-    scene, _ = import_mesh("Wall", read(tmp_path / f"wall{suffix}"), MeshOptions(up=up))
+    scene, _ = import_mesh("Wall", foreign.read_here(tmp_path / f"wall{suffix}"), MeshOptions(up=up))
     (body,) = [i for i in scene.instances if i.category != "ground"]
     seen = {}
     for part in body.parts:

@@ -17,11 +17,9 @@ from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.forms import form_of, grown, is_unnamed
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import Naming, words_in
-from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.store.shards import read_scene
 
@@ -131,7 +129,6 @@ def test_a_single_thing_is_no_scene_to_search(place, capsys):
     out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5))), "Alone")
     code, _, err = said(capsys, *pasted(out, "next: "))
     assert code == 1
-    print(err)
     assert "nothing in it can be drafted" in err
     assert "ask for" not in err
     assert not list((place / "our scenes/annotations").iterdir())
@@ -195,10 +192,8 @@ def test_drafts_are_true_or_silent(place, capsys):
 
 def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     crates = [(f"Crate.{k}", box(2, 2, 2), (60.0 + 2.4 * (k % 3), 2.4 * (k // 3), 1.0)) for k in range(9)]
-    nodes = []
-    for name, body, place in (("Tower", box(5, 5, 20), (0, 0, 10)), *crates):
-        faces = np.asarray(body.faces, np.int64)
-        nodes.append(RawNode(name, np.asarray(body.vertices) + place, faces, default_colours(len(faces))))
+    bodies = (("Tower", box(5, 5, 20), (0, 0, 10)), *crates)
+    nodes = [foreign.raw(body.apply_translation(place), name) for name, body, place in bodies]
     adopted, _ = import_mesh("Stack", nodes)
     vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
     drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), DraftOptions(max_per_category=30))
@@ -290,7 +285,7 @@ def test_pieces_of_a_merged_mesh_are_put_together_and_named_by_their_materials(t
     (tmp_path / "merged.obj").write_text("\n".join(lines))
     told = [f"newmtl {m}\nKd {paint}" for (m, *_), paint in zip(pieces, paints, strict=True)]
     (tmp_path / "m.mtl").write_text("\n".join(told))
-    scene, _ = import_mesh("Merged", read_mesh(tmp_path / "merged.obj"))
+    scene, _ = import_mesh("Merged", foreign.read_here(tmp_path / "merged.obj"))
     looks = [(i.category, i.attributes.get("material", ""), i.attributes["colour"]) for i in scene.instances]
     assert sorted(looks) == [
         ("ball", "", "purple"), ("car", "", "blue"), ("house", "", "white"), ("slab", "", "grey"),

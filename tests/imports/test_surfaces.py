@@ -1,7 +1,5 @@
 """What is solid, ground or sky is decided at the import, stored with the scene, and soups are taken apart."""
 
-import struct
-import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -9,16 +7,12 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support import foreign
-from support.command_line import said
-from support.hills import hills, standing, write_hills
+from support.foreign import raw
+from support.hills import hills, standing
 
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground
-from aerialdojo_gen.imports.command import add_scene
-from aerialdojo_gen.imports.files import read_mesh
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.naming import Naming, NodeName, Row
 from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, empty_corners
@@ -27,15 +21,6 @@ from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
-
-
-def raw(mesh: trimesh.Trimesh, name: str = "", colour: tuple[int, int, int] | None = None) -> RawNode:
-    colours = (
-        default_colours(len(mesh.faces))
-        if colour is None
-        else np.tile(np.array(colour, np.uint8), (len(mesh.faces), 1))
-    )
-    return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), colours)
 
 
 def dome(kind: str, radius: float = 300.0) -> trimesh.Trimesh:
@@ -216,66 +201,6 @@ def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
         write_glb(scene, folder / "x.glb")
         made.append(((folder / "x.glb").read_bytes(), repairs))
     assert made[0] == made[1]
-
-
-def locked_zip(path) -> None:
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("m.obj", "v 0 0 0\n")
-    data = bytearray(path.read_bytes())
-    struct.pack_into("<H", data, 6, 1)
-    path.write_bytes(data)
-
-
-BAD = [
-    ("a.glb", b"", r"is empty \(0 bytes\)"),
-    ("a.obj", b"\0" * 5000, "begins with zeros alone"),
-    ("a.glb", b"\x1f\x8b\x08" + b"x" * 40, "compressed by gzip: unpack it first"),
-    ("a.obj", b"PK\x03\x04\x14\0\0\0" + b"x" * 40, "is a ZIP archive: unpack it"),
-    ("a.obj", None, "is an encrypted ZIP archive: unpack it with its password"),
-    ("a.ply", b"glTF\x02\0\0\0" + b"x" * 40, r"is a GLB file by its content: rename it to a\.glb"),
-    ("a.glb", b"ply\nformat ascii 1.0\nend_header\n", r"is a PLY file by its content: rename it to a\.ply"),
-    ("a.glb", b"<!DOCTYPE html><html>sign in</html>", "is a web page"),
-    ("a.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n", "Git LFS pointer.*git lfs pull"),
-    ("a.stl", b"BLENDER-v300" + b"\0" * 40, "is a Blender file: export it as GLB"),
-    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "points and no faces"),
-    ("a.glb", foreign.glb(b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'),
-     r"is compressed \(KHR_draco_mesh_compression\): export it without compression"),
-    ("a.obj", b"v nan nan nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "empty or degenerate|no triangle"),
-    ("a.dwg", b"AC1032", "meshes are read from"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "content", "message"), BAD)
-def test_bad_files_are_one_line_with_the_mend_and_leave_nothing(tmp_path, capsys, name, content, message):
-    path = tmp_path / name
-    if content is None:
-        locked_zip(path)
-    else:
-        path.write_bytes(content)
-    with pytest.raises(AssetError, match=message) as error:
-        add_scene("Odd", path, tmp_path / "mine", MeshOptions())
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
-    assert sorted(p.name for p in tmp_path.iterdir()) == [name]
-    code, _, err = said(capsys, "add-scene", "Odd", path, "--list")
-    assert code == 1
-    assert err.count("\n") == 1
-
-
-def test_a_file_of_ten_gigabytes_is_not_opened(tmp_path):
-    path = tmp_path / "huge.obj"
-    with path.open("wb") as file:
-        file.truncate(10 << 30)
-    with pytest.raises(AssetError, match=r"huge\.obj: 10240 MiB, the maximum is 1024: simplify or split the mesh"):
-        read_mesh(path)
-
-
-def test_a_cut_glb_is_named(tmp_path):
-    whole = write_hills(hills(1, cells=10), [], tmp_path / "hills.glb").read_bytes()
-    for end in (10, 30, len(whole) // 2, len(whole) - 40):
-        (tmp_path / "cut.glb").write_bytes(whole[:end])
-        with pytest.raises(AssetError, match=r"cut\.glb: "):
-            read_mesh(tmp_path / "cut.glb")
 
 
 def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():

@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 import trimesh
 from support import textured
+from support.foreign import read_here
+from support.interchange import collada, fbx
 
 from aerialdojo_gen.annotations.appearance import colour_shares, unsupported_colours
-from aerialdojo_gen.base.errors import AssetError, UsageError
+from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.pictures import image_size
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose
-from aerialdojo_gen.imports.files import read_into, read_mesh, unpack_nodes
+from aerialdojo_gen.imports.files import read_into
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.pictures import SourceMaterial, decode_surfaces
-from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.gl import GlRenderer
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
@@ -30,11 +31,6 @@ from aerialdojo_gen.studio.web.payload import scene_payload
 
 RENDERERS = (GlRenderer, RenderWorld, RayRenderer)
 CAMERA = Camera(256, 256, 90.0)
-
-
-def nodes_of(path: Path, out: Path, texture_px: int = 8192) -> list[RawNode]:
-    assert read_into(path, out, texture_px) == ""
-    return unpack_nodes(out)
 
 
 def stored(scene: Scene, path: Path) -> Scene:
@@ -50,7 +46,7 @@ def thing(scene: Scene, category: str):
 @pytest.fixture(scope="module")
 def yard(tmp_path_factory) -> Scene:
     folder = tmp_path_factory.mktemp("yard")
-    nodes = nodes_of(textured.yard(folder / "yard.glb"), folder / "nodes.npz")
+    nodes = read_here(textured.yard(folder / "yard.glb"))
     return stored(import_mesh("Yard", nodes, MeshOptions(light="sun"))[0], folder / "scene.glb")
 
 
@@ -63,7 +59,7 @@ def board(tmp_path_factory) -> Scene:
     out.node("Wall", textured.WALL, textured.WALL_FACES, paint, textured.WALL_UV)
     ground = np.array([[-30.0, -30, 0], [30, -30, 0], [30, 30, 0], [-30, 30, 0]])
     out.node("Ground", ground, textured.WALL_FACES, out.material(factor=[0.2, 0.25, 0.15, 1]))
-    nodes = nodes_of(out.write(folder / "board.glb"), folder / "nodes.npz")
+    nodes = read_here(out.write(folder / "board.glb"))
     return stored(import_mesh("Board", nodes, MeshOptions(light="baked"))[0], folder / "scene.glb")
 
 
@@ -170,30 +166,26 @@ def test_a_scene_comes_back_from_its_file_to_the_bit_and_twice_the_same(tmp_path
     digests = set()
     for k in range(2):
         path = textured.yard(tmp_path / f"{k}.glb")
-        scene, _ = import_mesh("Yard", nodes_of(path, tmp_path / f"{k}.npz"), MeshOptions(light="auto"))
+        scene, _ = import_mesh("Yard", read_here(path), MeshOptions(light="auto"))
         back = stored(scene, tmp_path / f"scene{k}.glb")
         digests.add(hashlib.sha256((tmp_path / f"scene{k}.glb").read_bytes()).hexdigest())
         write_glb(back, tmp_path / "again.glb")
         assert (tmp_path / "again.glb").read_bytes() == (tmp_path / f"scene{k}.glb").read_bytes()
         for one, other in zip(scene.instances, back.instances, strict=True):
             for a, b in zip(one.parts, other.parts, strict=True):
-                np.testing.assert_array_equal(a.uv, b.uv)
-                assert (a.colours is None) == (b.colours is None)
-                if a.colours is not None and b.colours is not None:
-                    np.testing.assert_array_equal(a.colours, b.colours)
+                assert np.array_equal(a.uv, b.uv)
+                assert np.array_equal(a.colours, b.colours)  # None is itself
         for name, material in scene.materials.items():
             if material.texture is not None:
-                mine, theirs = material.texture, back.materials[name].texture
-                if material.mask is not None:
-                    np.testing.assert_array_equal(material.mask, back.materials[name].mask)
-                np.testing.assert_array_equal(mine, theirs)
+                assert np.array_equal(material.texture, back.materials[name].texture)
+                assert np.array_equal(material.mask, back.materials[name].mask)
     assert len(digests) == 1
     assert scene_payload(back) == scene_payload(back)
 
 
 def test_a_scan_keeps_its_jpeg_and_is_drawn_as_it_is(tmp_path):
     path = textured.scan(tmp_path / "scan.obj")
-    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, repairs = import_mesh("Scan", read_here(path))
     (material,) = [m for m in scene.materials.values() if m.texture is not None]
     assert material.jpeg == (tmp_path / "scan.jpg").read_bytes()
     assert material.unlit
@@ -212,7 +204,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
     exif = b"Exif\0\0" + tiff
     turned = turned[:2] + b"\xff\xe1" + (2 + len(exif)).to_bytes(2, "big") + exif + turned[2:]
     (tmp_path / "scan.jpg").write_bytes(turned)
-    scene, _ = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Scan", read_here(path))
     (mine,) = [m.texture for m in scene.materials.values() if m.texture is not None]
     (theirs,) = [m.texture for m in stored(scene, tmp_path / "s.glb").materials.values() if m.texture is not None]
     assert mine.shape == (64, 128, 3)
@@ -223,7 +215,7 @@ def test_a_scans_jpeg_is_taken_as_it_is_stored_however_the_camera_was_held(tmp_p
 def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, monkeypatch):
     """Scenes come from the Hub too: neither may a file of another kind pass for a small PNG."""
     path = textured.scan(tmp_path / "scan.obj", cells=8, texture_px=64)
-    scene, _ = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Scan", read_here(path))
     write_glb(scene, tmp_path / "s.glb")
     whole, jpeg = (tmp_path / "s.glb").read_bytes(), (tmp_path / "scan.jpg").read_bytes()
     if kind == "jpeg":
@@ -245,7 +237,7 @@ def test_a_scene_that_asks_for_gigabytes_of_pixels_is_refused(kind, tmp_path, mo
 
 def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):
     path = textured.scan(tmp_path / "scan.obj", texture_px=512)
-    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz", texture_px=128))
+    scene, repairs = import_mesh("Scan", read_here(path, texture_px=128))
     (material,) = [m for m in scene.materials.values() if m.texture is not None]
     assert material.texture is not None
     assert material.texture.shape == (128, 128, 3)
@@ -255,45 +247,31 @@ def test_textures_keep_to_their_budget_and_it_is_told(tmp_path):
 def test_a_missing_texture_is_told(tmp_path):
     path = textured.scan(tmp_path / "scan.obj")
     (tmp_path / "scan.jpg").unlink()
-    scene, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    scene, repairs = import_mesh("Scan", read_here(path))
     assert all(m.texture is None for m in scene.materials.values())
     assert any("scan.jpg" in line for line in repairs.lines)
     path.with_suffix(".mtl").unlink()
-    _, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    _, repairs = import_mesh("Scan", read_here(path))
     assert any("scan.mtl" in line for line in repairs.lines)
 
 
 def test_an_object_of_several_materials_has_all_of_them(tmp_path):
-    lines = [
-        "mtllib m.mtl",
-        "o Wall",
-        "v -4 0 0",
-        "v 4 0 0",
-        "v 4 0 8",
-        "v -4 0 8",
-        "vt 0 0",
-        "vt 1 0",
-        "vt 1 1",
-        "vt 0 1",
-    ]
-    lines += ["usemtl one", "f 1/1 2/2 3/3", "usemtl two", "f 1/1 3/3 4/4"]
-    (tmp_path / "wall.obj").write_text("\n".join(lines))
+    corners = "v -4 0 0\nv 4 0 0\nv 4 0 8\nv -4 0 8\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    faces = "usemtl one\nf 1/1 2/2 3/3\nusemtl two\nf 1/1 3/3 4/4\n"
+    (tmp_path / "wall.obj").write_text(f"mtllib m.mtl\no Wall\n{corners}{faces}")
     (tmp_path / "m.mtl").write_text("newmtl one\nmap_Kd a.png\nnewmtl two\nKd 0 1 0\n")
     (tmp_path / "a.png").write_bytes(textured.picture_file(textured.checkerboard()))
-    (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
+    (node,) = read_here(tmp_path / "wall.obj")
     assert node.name == "Wall"
     assert node.surface is not None
     shown = [node.surfaces[k] for k in node.surface]
     assert sorted((s.texture is not None, s.colour) for s in shown)[0] == (False, (0, 255, 0))
-    # An object stays one where its materials are not there, or are not told apart.
-    for told in ("newmtl one\nKd 0 1 0\n", ""):
-        (tmp_path / "m.mtl").write_text(told)
-        (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
-        assert (node.name, len(node.faces)) == ("Wall", 2)
-    (tmp_path / "m.mtl").unlink()
-    (node,) = nodes_of(tmp_path / "wall.obj", tmp_path / "nodes.npz")
-    assert (node.name, len(node.faces)) == ("Wall", 2)
     assert [s.texture is not None for s in shown].count(True) == 1
+    # An object stays one where its materials are not there, or are not told apart.
+    for told in ("newmtl one\nKd 0 1 0\n", "", None):
+        (tmp_path / "m.mtl").unlink() if told is None else (tmp_path / "m.mtl").write_text(told)
+        (node,) = read_here(tmp_path / "wall.obj")
+        assert (node.name, len(node.faces)) == ("Wall", 2)
 
 
 def test_files_elsewhere_are_not_read(tmp_path):
@@ -301,7 +279,7 @@ def test_files_elsewhere_are_not_read(tmp_path):
     path = textured.scan(tmp_path / "in" / "scan.obj")
     (tmp_path / "in" / "scan.jpg").rename(tmp_path / "scan.jpg")
     path.with_suffix(".mtl").write_text("newmtl atlas\nmap_Kd ../scan.jpg\n")
-    _, repairs = import_mesh("Scan", nodes_of(path, tmp_path / "nodes.npz"))
+    _, repairs = import_mesh("Scan", read_here(path))
     assert any("../scan.jpg is missing" in line for line in repairs.lines)
 
 
@@ -311,7 +289,7 @@ def test_ply_keeps_the_colours_of_its_vertices(tmp_path):
     paint = np.column_stack([255 * height, 80 * np.ones_like(height), 255 * (1 - height)])
     body.visual.vertex_colors = np.rint(paint).astype(np.uint8)
     body.export(tmp_path / "ball.ply")
-    scene, _ = import_mesh("Ball", nodes_of(tmp_path / "ball.ply", tmp_path / "nodes.npz"))
+    scene, _ = import_mesh("Ball", read_here(tmp_path / "ball.ply"))
     (part,) = next(i for i in scene.instances if i.category != "ground").parts
     assert part.colours is not None
     high = part.vertices[:, 2] / np.ptp(part.vertices[:, 2])
@@ -330,7 +308,7 @@ def test_gltf_says_more_than_plain_triangles(tmp_path):
     primitive["attributes"]["TEXCOORD_1"] = out.accessor(uv, normalized=True)
     primitive["mode"] = 5
     out.document["nodes"][0] |= {"scale": [-1, 1, 1]}
-    (node,) = nodes_of(out.write(tmp_path / "wall.glb"), tmp_path / "nodes.npz")
+    (node,) = read_here(out.write(tmp_path / "wall.glb"))
     assert len(node.faces) == 2
     assert node.corners is not None
     np.testing.assert_allclose(np.unique(node.corners[..., 0]), [0.5, 2.5], atol=1e-4)
@@ -365,121 +343,17 @@ def test_sizes_of_pictures_are_told_without_decoding():
         assert image_size(textured.picture_file(picture, suffix)) == (30, 20)
 
 
-def test_only_known_lights_are_taken(tmp_path):
-    nodes = read_mesh(textured.scan(tmp_path / "scan.obj", cells=8))
-    with pytest.raises(UsageError, match="--light 'moon'"):
-        import_mesh("Scan", nodes, MeshOptions(light="moon"))
-
-
-_DAE = """<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>
-<library_images><image id="i"><init_from>board.png</init_from></image></library_images>
-<library_effects><effect id="e"><profile_COMMON>
-<newparam sid="s"><surface type="2D"><init_from>i</init_from></surface></newparam>
-<newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam>
-<technique sid="c"><lambert><diffuse><texture texture="t" texcoord="UV"/></diffuse></lambert></technique>
-</profile_COMMON></effect></library_effects>
-<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="pa" count="12">-4 0 0 4 0 0 4 0 8 -4 0 8</float_array><technique_common>
-<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
-<param name="Z" type="float"/></accessor></technique_common></source>
-<source id="u"><float_array id="ua" count="8">0 0 1 0 1 1 0 1</float_array><technique_common>
-<accessor source="#ua" count="4" stride="2"><param name="S" type="float"/><param name="T" type="float"/></accessor>
-</technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="2" material="m"><input semantic="VERTEX" source="#v" offset="0"/>
-<input semantic="TEXCOORD" source="#u" offset="1" set="0"/><p>0 0 1 1 2 2 0 0 2 2 3 3</p></triangles>
-</mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="w"><node id="Wall" name="Wall"><translate>0 5 0</translate>
-<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="m" target="#m">
-<bind_vertex_input semantic="UV" input_semantic="TEXCOORD" input_set="0"/></instance_material></technique_common>
-</bind_material></instance_geometry></node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#w"/></scene></COLLADA>
-"""
-
-
-_FBX = """; FBX 7.4.0 project file
-FBXHeaderExtension:  {
-	FBXHeaderVersion: 1003
-	FBXVersion: 7400
-}
-Objects:  {
-	Geometry: 1, "Geometry::", "Mesh" {
-		Vertices: *12 {
-			a: -4,0,0,4,0,0,4,8,0,-4,8,0
-		}
-		PolygonVertexIndex: *4 {
-			a: 0,1,2,-4
-		}
-		GeometryVersion: 124
-		LayerElementUV: 0 {
-			Version: 101
-			Name: "UVMap"
-			MappingInformationType: "ByPolygonVertex"
-			ReferenceInformationType: "Direct"
-			UV: *8 {
-				a: 0,0,1,0,1,1,0,1
-			}
-		}
-		LayerElementMaterial: 0 {
-			Version: 101
-			Name: ""
-			MappingInformationType: "AllSame"
-			ReferenceInformationType: "IndexToDirect"
-			Materials: *1 {
-				a: 0
-			}
-		}
-		Layer: 0 {
-			Version: 100
-			LayerElement:  {
-				Type: "LayerElementUV"
-				TypedIndex: 0
-			}
-			LayerElement:  {
-				Type: "LayerElementMaterial"
-				TypedIndex: 0
-			}
-		}
-	}
-	Model: 2, "Model::Wall", "Mesh" {
-		Version: 232
-		Properties70:  {
-			P: "Lcl Translation", "Lcl Translation", "", "A",0,0,-5
-		}
-	}
-	Material: 3, "Material::Brick", "" {
-		Version: 102
-		ShadingModel: "phong"
-		Properties70:  {
-			P: "DiffuseColor", "Color", "", "A",1,1,1
-		}
-	}
-	Texture: 4, "Texture::Board", "" {
-		Type: "TextureVideoClip"
-		Version: 202
-		TextureName: "Texture::Board"
-		FileName: "C:\\scans\\board.png"
-		RelativeFilename: "board.png"
-	}
-}
-Connections:  {
-	C: "OO",2,0
-	C: "OO",1,2
-	C: "OO",3,2
-	C: "OP",4,3, "DiffuseColor"
-}
-"""
-
-
-@pytest.mark.parametrize(("suffix", "text"), [(".dae", _DAE), (".fbx", _FBX)])
-def test_interchange_files_bring_their_textures_and_places(tmp_path, suffix, text):
+@pytest.mark.parametrize("suffix", [".dae", ".fbx"])
+def test_interchange_files_bring_their_textures_and_places(tmp_path, suffix):
     (tmp_path / "board.png").write_bytes(textured.picture_file(textured.checkerboard()))
-    (tmp_path / f"wall{suffix}").write_text(text)
-    (node,) = nodes_of(tmp_path / f"wall{suffix}", tmp_path / "nodes.npz")
-    assert node.name == "Wall"
+    flat = textured.WALL[:, [0, 2, 1]]  # y up
+    text = {
+        ".dae": collada(textured.WALL, textured.WALL_FACES, textured.WALL_UV, move=(0, 5, 0)),
+        ".fbx": fbx(flat, textured.WALL_FACES, textured.WALL_UV, move=(0, 0, -5)),
+    }
+    (tmp_path / f"wall{suffix}").write_text(text[suffix])
+    (node,) = read_here(tmp_path / f"wall{suffix}")
+    assert node.name == "Body"
     # Whatever the file's axis, Assimp turns Collada y up.
     np.testing.assert_allclose(node.vertices[:, 2], -5.0)
     assert node.surface is not None

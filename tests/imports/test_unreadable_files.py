@@ -1,19 +1,23 @@
 """What is no file, and readers that die: one line that says what it is, at once."""
 
-import json
 import os
 import re
 import signal
 import socket
-import subprocess
-import sys
+import struct
+import threading
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import foreign, maps
 from support.command_line import said
+from support.hills import hills, write_hills
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.imports.files import read_into, read_mesh
 
 OBJ = "v 0 0 0\nv 30 0 0\nv 30 20 0\nv 0 20 0\nv 9 9 8\nf 1 2 3\nf 3 4 1\nf 1 2 5\nf 2 3 5\n"
 
@@ -99,14 +103,16 @@ def test_what_is_no_file_is_one_line_at_once(tmp_path, capsys, monkeypatch, verb
     assert not (tmp_path / "mine").exists()
 
 
-@pytest.mark.parametrize("count", [-1, -(2**40)])
-def test_a_negative_count_is_a_damaged_file(tmp_path, capsys, count):
-    document = json.loads(foreign.village().export(file_type="gltf")["model.gltf"])
-    document["accessors"][0]["count"] = count
-    (tmp_path / "a.glb").write_bytes(foreign.glb(json.dumps(document).encode()))
-    code, _, err = said(capsys, "add-scene", "Mine", tmp_path / "a.glb", "--list")
-    assert code == 1
-    assert err.endswith(f"is a damaged GLB file: an array of {count:,} numbers\n")
+def kill_child(module: str, number: int) -> None:
+    """Wait for a child of this process that runs a module, and send it a signal."""
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        for listed in Path("/proc/self/task").glob("*/children"):
+            for pid in listed.read_text().split():
+                if module in Path(f"/proc/{pid}/cmdline").read_text().split("\0"):
+                    os.kill(int(pid), number)
+                    return
+        time.sleep(0.005)
 
 
 @pytest.mark.kill
@@ -119,33 +125,84 @@ def test_a_negative_count_is_a_damaged_file(tmp_path, capsys, count):
         ("mesh", signal.SIGXCPU, "reading takes more than 300 s"),
     ],
 )
-def test_a_reader_that_is_killed_says_by_what(tmp_path, verb, number, words):
+def test_a_reader_that_is_killed_says_by_what(tmp_path, capsys, verb, number, words):
     path = tmp_path / "a.obj" if verb == "mesh" else maps.write_town(tmp_path / "a.osm.pbf")
     if verb == "mesh":
         path.write_text(OBJ)
     module = {"mesh": "aerialdojo_gen.imports.files", "map": "aerialdojo_gen.imports.osm"}[verb]
-    arguments = map(str, command(verb, path, tmp_path))
-    running = subprocess.Popen([sys.executable, "-m", "aerialdojo_gen.cli", *arguments], stderr=subprocess.PIPE)
-    os.kill(_child(running, module), number)
-    err = running.communicate(timeout=120)[1].decode()
-    assert running.returncode == 1
+    killer = threading.Thread(target=kill_child, args=(module, number))
+    killer.start()
+    code, _, err = said(capsys, *command(verb, path, tmp_path))
+    killer.join()
+    assert code == 1
     assert re.fullmatch(rf"error: {re.escape(str(path))}: {re.escape(words)}[^\n]*\n", err)
     assert not (tmp_path / "mine").exists()
 
 
-def _child(parent: subprocess.Popen, module: str) -> int:
-    """Wait for a child that runs a module; its id."""
-    while parent.poll() is None:
-        for pid in Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split():
-            if module in Path(f"/proc/{pid}/cmdline").read_text().split("\0"):
-                return int(pid)
-        time.sleep(0.005)
-    raise AssertionError(parent.stderr.read())
-
-
-def test_a_height_model_and_a_map_that_are_there_are_read(tmp_path, capsys):
+def test_a_height_model_that_is_there_is_read(tmp_path, capsys):
     """So that the refusals above are of what is no file."""
-    np.savez(tmp_path / "a.npz", heights_m=maps.heights(4.0, 60.0), cell_m=4.0)
+    np.savez(tmp_path / "a.npz", heights_m=maps.heights(4.0, 12.0), cell_m=4.0)
     code, out, err = said(capsys, *command("dem", tmp_path / "a.npz", tmp_path))
     assert code == 0, err
     assert out.startswith("Mine: ")
+
+
+def locked_zip(path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("m.obj", "v 0 0 0\n")
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<H", data, 6, 1)
+    path.write_bytes(data)
+
+
+BAD = [
+    ("a.glb", b"", r"is empty \(0 bytes\)"),
+    ("a.obj", b"\0" * 5000, "begins with zeros alone"),
+    ("a.glb", b"\x1f\x8b\x08" + b"x" * 40, "compressed by gzip: unpack it first"),
+    ("a.obj", b"PK\x03\x04\x14\0\0\0" + b"x" * 40, "is a ZIP archive: unpack it"),
+    ("a.obj", None, "is an encrypted ZIP archive: unpack it with its password"),
+    ("a.ply", b"glTF\x02\0\0\0" + b"x" * 40, r"is a GLB file by its content: rename it to a\.glb"),
+    ("a.glb", b"ply\nformat ascii 1.0\nend_header\n", r"is a PLY file by its content: rename it to a\.ply"),
+    ("a.glb", b"<!DOCTYPE html><html>sign in</html>", "is a web page"),
+    ("a.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n", "Git LFS pointer.*git lfs pull"),
+    ("a.stl", b"BLENDER-v300" + b"\0" * 40, "is a Blender file: export it as GLB"),
+    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "points and no faces"),
+    ("a.glb", foreign.glb(b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'),
+     r"is compressed \(KHR_draco_mesh_compression\): export it without compression"),
+    ("a.obj", b"v nan nan nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "empty or degenerate|no triangle"),
+    ("a.dwg", b"AC1032", "meshes are read from"),
+    ("a.glb", b"glTF", "not a GLB file"),
+    ("a.3ds", b"MM\xff\xff\xff\xff", "damaged 3DS"),
+    ("a.3ds", b"hello, this is text", "damaged 3DS"),
+    ("a.obj", b"# nothing\n", "a.obj"),
+    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n", "a.ply"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "message"), BAD)
+def test_bad_files_are_one_line_with_the_mend_and_leave_nothing(tmp_path, capsys, name, content, message):
+    path = tmp_path / name
+    if content is None:
+        locked_zip(path)
+    else:
+        path.write_bytes(content)
+    code, _, err = said(capsys, "add-scene", "Odd", path, "--up", "z", "--project", tmp_path / "mine")
+    assert code == 1
+    assert re.fullmatch(rf"error: {re.escape(str(path))}:? [^\n]*\n", err)
+    assert re.search(message, err)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [name]
+
+
+def test_a_file_of_ten_gigabytes_is_not_opened(tmp_path):
+    path = tmp_path / "huge.obj"
+    with path.open("wb") as file:
+        file.truncate(10 << 30)
+    with pytest.raises(AssetError, match=r"huge\.obj: 10240 MiB, the maximum is 1024: simplify or split the mesh"):
+        read_mesh(path)
+
+
+def test_a_cut_glb_is_named(tmp_path):
+    whole = write_hills(hills(1, cells=10), [], tmp_path / "hills.glb").read_bytes()
+    for end in (10, 30, len(whole) // 2, len(whole) - 40):
+        (tmp_path / "cut.glb").write_bytes(whole[:end])
+        assert read_into(tmp_path / "cut.glb", tmp_path / "nodes.npz")

@@ -57,10 +57,10 @@ size_px = 32
 validation_share = 0.0
 settings = []
 [model]
-channels = [16, 16, 32]
-features = 64
-word_features = 32
-hidden = 128
+channels = [8, 8, 16]
+features = 32
+word_features = 16
+hidden = 32
 [train]
 epochs = 6
 batch_steps = 64
@@ -71,6 +71,8 @@ looks = 16
 [dagger]
 rounds = 0
 """
+# A model that can learn eight trajectories by heart, or a map.
+LARGER = {"channels": (16, 16, 32), "features": 64, "word_features": 32, "hidden": 128}
 
 
 def recipe(**changed):
@@ -106,7 +108,7 @@ def test_a_short_training_fits_better_at_its_end(learned):
 
 @pytest.mark.nightly
 def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_path):
-    by_heart = recipe(train={"epochs": 80})
+    by_heart = recipe(model=LARGER, train={"epochs": 80})
     learned = train(smoke, by_heart, out=tmp_path / "out", cache=cache, device="cpu", workers=1)
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
     assert learned.imitation.is_file()
@@ -271,7 +273,7 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
     # Two trainings each: what one gains differs by seed, between 0.1 and 0.5 as measured.
     for looks, seed in [(0, 0), (0, 1), (300, 0), (300, 1)]:
         thorough = {"epochs": 12, "looks": 128, "batch_steps": 256}
-        own = recipe(seed=seed, data={"looks": looks, "limit": None}, train=thorough)
+        own = recipe(seed=seed, data={"looks": looks, "limit": None}, model=LARGER, train=thorough)
         done = train(smoke, own, out=tmp_path / f"{looks}-{seed}", cache=cache, device="cpu", workers=1)
         tensors, about, _ = checkpoints.read(done.policy)
         network = network_of(about, tensors, str(done.policy)).eval()

@@ -8,8 +8,25 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from aerialdojo_gen.imports.files import read_into, unpack_nodes
+from aerialdojo_gen.imports.raw import RawNode, default_colours
+
 # Red brick, yellow, white, grey, green and brown plaster: what the streets there look like.
 _PLASTER = ((170, 60, 45), (225, 200, 70), (245, 243, 238), (140, 140, 138), (110, 150, 105), (120, 85, 60))
+
+
+def read_here(path: Path, texture_px: int = 8192) -> list[RawNode]:
+    """Read a mesh file in this process, which is sooner than in one of its own."""
+    out = path.with_name(f"{path.name}.npz")
+    assert read_into(path, out, texture_px) == ""
+    return unpack_nodes(out)
+
+
+def raw(mesh: trimesh.Trimesh, name: str = "", colour: tuple[int, int, int] | None = None) -> RawNode:
+    """Make a node of a mesh, as a reader would."""
+    n = len(mesh.faces)
+    colours = default_colours(n) if colour is None else np.tile(np.array(colour, np.uint8), (n, 1))
+    return RawNode(name, np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), colours)
 
 
 def helsinki(path: Path) -> int:

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.earth import LocalFrame
+from aerialdojo_gen.scenes.model import Scene
 
 FRAME = LocalFrame(24.9, 60.2)
 HALF_M = 60.0
@@ -64,6 +66,11 @@ AREAS = [([(8, -18), (55, -18), (55, -55), (8, -55)], {"leisure": "park", "name"
 def plan_of(place) -> dict:
     """The plan that was written of a place."""
     return tomllib.loads(place.recipe.read_text(encoding="utf-8"))
+
+
+def origin_z(place) -> float:
+    """The height of the model that is z = 0 in a place."""
+    return plan_of(place)["origin"]["z_m"]
 
 
 def made_by(place, builder: str) -> dict:
@@ -125,6 +132,13 @@ def heights(cell_m: float, half_m: float) -> np.ndarray:
     at = np.arange(-half_m, half_m + 1e-9, cell_m)
     x, y = np.meshgrid(at, at[::-1])
     return hill(x, y)
+
+
+def ground_z(scene: Scene, places: np.ndarray) -> np.ndarray:
+    """What a plumb line meets of a scene's ground at places (n, 2), metres."""
+    ground = RayCaster(Scene("ground", (scene["ground"],), scene.materials, scene.bounds))
+    origins = np.column_stack([places, np.full(len(places), 500.0)])
+    return 500.0 - ground.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))[0]
 
 
 def write_geotiff(
