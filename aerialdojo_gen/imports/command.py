@@ -16,7 +16,6 @@ from aerialdojo_gen.imports.import_mesh import MeshOptions, Repairs, SourceMesh,
 from aerialdojo_gen.imports.listing import describe_mesh
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.tiles import make_tiles, tile_name
-from aerialdojo_gen.imports.toml_text import toml_value
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -109,8 +108,7 @@ def _prefix_errors(mesh: Path) -> Iterator[None]:
 def _write_scene(scene: Scene, repairs: Repairs, project: Path, recipe: str, text: str | None) -> AddedScene:
     """Write a scene into a project: the recipe last, so that an interrupted write leaves no scene."""
     name = scene.name
-    for folder in ("scenes", "annotations"):
-        make_folder(project / folder)
+    make_project(project)
     with atomic_file(project, f"scenes/{name}.glb") as path:
         write_glb(scene, path)
     with atomic_file(project, f"scenes/{name}.toml") as path:
@@ -118,7 +116,6 @@ def _write_scene(scene: Scene, repairs: Repairs, project: Path, recipe: str, tex
     if text is not None:
         with atomic_file(project, f"annotations/{name}.json") as path:
             path.write_text(text, encoding="utf-8")
-    write_pipeline(project)
     return AddedScene(scene, repairs, project / PIPELINE, project / "annotations" / f"{name}.json")
 
 
@@ -149,7 +146,8 @@ def _recipe(
     lines = [
         "# Made by add-scene; the mesh lies beside this file, repaired, in metres.",
         "[imported]",
-        f"source = {toml_value(source[0])}",
+        # TOML has all of JSON's escapes.
+        f"source = {json.dumps(source[0].replace(chr(127), ''), ensure_ascii=False)}",
         f'source_sha256 = "{source[1]}"',
         f'up = "{options.up}"',
         f"scale = {options.scale}",
@@ -162,8 +160,10 @@ def _recipe(
     return "\n".join(lines) + "\n"
 
 
-def write_pipeline(project: Path) -> None:
-    """Write the project's pipeline file, if it has none."""
+def make_project(project: Path) -> None:
+    """Make a project's folders and its pipeline file, where it has none."""
+    for folder in ("scenes", "annotations"):
+        make_folder(project / folder)
     if (project / PIPELINE).exists():
         return
     name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, check_free, write_pipeline
+from aerialdojo_gen.imports.command import PIPELINE, check_free, make_project
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
 from aerialdojo_gen.imports.map_plan import TownOptions, TownPlan, town_plan
@@ -21,7 +21,7 @@ from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 from aerialdojo_gen.scenes.plans.build import build_plan, build_site
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.site import MAX_NODES
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_file
 
 # Margin around the box: streets continue, and building parts may lie outside.
 _MARGIN_DEG = 0.0006
@@ -103,8 +103,7 @@ def _write_place(name: str, place: TownPlan | ReliefPlan, project: Path, notes: 
             raise AssetError(str(error).replace(f"{trial}", f"{name}.toml")) from None
     if placer.left_out:
         notes += (f"{placer.left_out:,} things left out: a scene has {MAX_NODES:,} instances at most",)
-    for inner in ("scenes", "annotations"):
-        make_folder(project / inner)
+    make_project(project)
     heights = f"scenes/{name}{HEIGHTS_SUFFIX}"
     if table is not None:
         with atomic_file(project, heights) as path:
@@ -113,7 +112,6 @@ def _write_place(name: str, place: TownPlan | ReliefPlan, project: Path, notes: 
         path.write_text(text, encoding="utf-8")
     for left in (f"scenes/{name}.glb", *([heights] if table is None else [])):
         (project / left).unlink(missing_ok=True)
-    write_pipeline(project)
     return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)
 
 

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, write_pipeline
+from aerialdojo_gen.imports.command import PIPELINE, make_project
 from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.worlds.kinds import type_names
 from aerialdojo_gen.scenes.worlds.make import make_world
 from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.root import open_root
 
 DRAWS = "draws.csv"
@@ -84,9 +84,7 @@ def vary(
         raise UsageError(f"{count(names, seeds):,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
     worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
     names_of = {world.name: k for k, world in enumerate(worlds)}
-    for inner in ("scenes", "annotations"):
-        make_folder(project / inner)
-    write_pipeline(project)
+    make_project(project)
     done: list[VariedWorld] = []
     work = [_Work(world, project, options) for world in worlds]
     try:

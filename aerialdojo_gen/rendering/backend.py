@@ -27,7 +27,7 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.casters import ray_caster
-from aerialdojo_gen.rendering.picture import Picture
+from aerialdojo_gen.rendering.picture import Closable, Picture
 from aerialdojo_gen.scenes.context import context_of, open_contexts
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -83,7 +83,7 @@ class Renderer(Protocol):
         ...
 
 
-class PyBulletRenderer:
+class PyBulletRenderer(Closable):
     """A scene in PyBullet's TinyRenderer; see `Renderer`."""
 
     name = "pybullet"
@@ -118,16 +118,6 @@ class PyBulletRenderer:
     def close(self) -> None:
         """Free the memory."""
         self._world.close()
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Free the memory."""
-        self.close()
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from aerialdojo_gen.rendering.gl_geometry import Kind, own_kinds
 from aerialdojo_gen.rendering.gl_target import clear_depth, read_picture
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import cloud_map, height_map, light_of, sun_view
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Closable, Picture
 from aerialdojo_gen.rendering.shading import SIDE
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
@@ -81,7 +80,7 @@ def device() -> str:
     return str(context().info["GL_RENDERER"])
 
 
-class GlRenderer:
+class GlRenderer(Closable):
     """A scene ready to be rendered by OpenGL; a context manager that frees its memory at its end.
 
     Parameters
@@ -334,16 +333,6 @@ class GlRenderer:
             if getattr(_thread, "context", None) is self._gl:
                 resource.release()
         self._arrays, self._targets, self._bodies = {}, {}, None
-
-    def __enter__(self) -> GlRenderer:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Free the renderer's memory."""
-        self.close()
 
 
 class _DrawSet:

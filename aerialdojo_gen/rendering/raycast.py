@@ -7,8 +7,6 @@ the horizon. A picture of 96 x 96 takes a tenth of the time of TinyRenderer, whi
 from __future__ import annotations
 
 from functools import lru_cache
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +18,7 @@ from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import NO_CLOUDS, HeightMap, Lighting, ShadowMap, light_of
-from aerialdojo_gen.rendering.picture import Picture
+from aerialdojo_gen.rendering.picture import Closable, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.texels import Backdrop, masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
@@ -31,7 +29,7 @@ Ints = NDArray[np.int32]
 _WIDE_M = 4.0
 
 
-class RayRenderer:
+class RayRenderer(Closable):
     """A renderer by ray casts, of both sides of triangles; see `aerialdojo_gen.rendering.backend.Renderer`."""
 
     name = "rays"
@@ -101,18 +99,6 @@ class RayRenderer:
         )
         self._backdrop.paint(rgb, surface.reshape(shape) < 0, camera, world_from_camera)
         return Picture(rgb, depth, owner.reshape(shape))
-
-    def close(self) -> None:
-        """Do nothing: the memory is Python's own."""
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Do nothing."""
 
 
 @lru_cache(maxsize=4)

@@ -6,7 +6,7 @@ import ctypes
 import os
 import sys
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import encode_png
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, cloud_map, height_map, light_of, sun_view
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Closable, Picture
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.rendering.texels import Backdrop, downscale
@@ -57,7 +57,7 @@ _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
 _LARGEST_ATLAS_PX = 2048
 
 
-class RenderWorld:
+class RenderWorld(Closable):
     """A scene ready to be rendered; a context manager that frees the renderer's memory at its end."""
 
     def __init__(self, scene: Scene) -> None:
@@ -146,16 +146,6 @@ class RenderWorld:
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
-
-    def __enter__(self) -> RenderWorld:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Free the renderer's memory."""
-        self.close()
 
 
 @njit(cache=True)

@@ -57,7 +57,7 @@ def brute(d, yaw, longest):
     return min(float(found.min()), *map(left, best))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(d=way, yaw=yaw, longest=st.sampled_from([1.0, 0.4, 2.5]))
 def test_it_is_the_least_that_any_approach_leaves_to_fly(d, yaw, longest):
     least = brute(np.array(d), yaw, longest)

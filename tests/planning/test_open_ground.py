@@ -8,6 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.flying import along, town
+from support.foreign import raw
 from support.handmade import box, instance
 from support.hills import Hills, hills, standing, write_hills
 from support.planting import Planted, check, poses
@@ -21,7 +22,6 @@ from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
-from aerialdojo_gen.imports.raw import RawNode, default_colours
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.scenes.model import Material, Scene
@@ -33,11 +33,7 @@ NAME = "Hills_0"
 def adopted(field: Hills, *things: trimesh.Trimesh, turned: bool = False) -> tuple[Scene, np.ndarray]:
     """The field as add-scene takes it in, and what to add to its places to be in the field's own frame."""
     bodies = [("Terrain", field.mesh(turned)), *((f"Thing.{k}", thing) for k, thing in enumerate(things))]
-    nodes = [
-        RawNode(n, np.asarray(m.vertices), np.asarray(m.faces, np.int64), default_colours(len(m.faces)))
-        for n, m in bodies
-    ]
-    scene, _ = import_mesh(NAME, nodes)
+    scene, _ = import_mesh(NAME, [raw(mesh, name) for name, mesh in bodies])
     return scene, shift_of(field, things)
 
 
@@ -131,9 +127,7 @@ def test_an_overhang_is_open_and_the_rock_above_it_is_not():
         [[i * n + j, i * n + j + 1, (i + 1) * n + j + 1, (i + 1) * n + j] for i in range(30) for j in range(6)]
     )
     sheet = trimesh.Trimesh(vertices, np.concatenate([cell[:, :3], cell[:, [0, 2, 3]]]), process=False)
-    scene, _ = import_mesh(
-        NAME, [RawNode("Cliff", vertices, np.asarray(sheet.faces, np.int64), default_colours(len(sheet.faces)))]
-    )
+    scene, _ = import_mesh(NAME, [raw(sheet, "Cliff")])
     shift = np.array([15.0, 15.0, 2.0])
     grid = ClearanceGrid.build(scene)
     assert grid.ground is not None
@@ -154,10 +148,8 @@ def test_a_canopy_over_level_ground_that_was_laid_is_not_the_ground():
     posts = [box((x - 0.2, y - 0.2, 0), (x + 0.2, y + 0.2, 4)) for x in (2, 10) for y in (2, 8)]
     halls = [box((20, 12 * k, 0), (34, 12 * k + 9, 6)) for k in range(3)]
     roof = trimesh.Trimesh([[0, 0, 4], [12, 0, 4], [12, 10, 4], [0, 10, 4]], [[0, 1, 2], [0, 2, 3]], process=False)
-    nodes = [RawNode(f"Body.{k}", np.asarray(m.vertices), np.asarray(m.faces, np.int64),
-                     default_colours(len(m.faces)))
-             for k, m in enumerate([*posts, *halls, roof])]  # fmt: skip
-    scene, repairs = import_mesh(NAME, nodes)
+    bodies = enumerate([*posts, *halls, roof])
+    scene, repairs = import_mesh(NAME, [raw(mesh, f"Body.{k}") for k, mesh in bodies])
     assert any("ground plane added" in line for line in repairs.lines)
     assert Ground.of(scene) is None
     assert open_ground(scene) is None

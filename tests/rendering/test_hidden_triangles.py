@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from support.flying import town
-from support.handmade import box, instance, scene
-from support.rendered import courtyard
+from support.rendered import boxes_and_a_wall, courtyard
 
 from aerialdojo_gen import GlRenderer
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
@@ -77,13 +76,7 @@ def test_what_tiles_say_is_drawn_is_at_least_as_near(width, height):
 
 def test_what_stands_behind_a_wall_is_not_drawn():
     """Two hundred boxes behind a wall are left out, and those on this side of it are not."""
-
-    def boxes(x):
-        return [instance(f"box_{x}_{k}", box((x, k % 40 - 20, k // 40), (x + 0.5, k % 40 - 19.5, k // 40 + 0.5)))
-                for k in range(200)]  # fmt: skip
-
-    wall = instance("wall", box((10, -80, 0), (10.5, 80, 60)))
-    world = scene(wall, *boxes(14), *boxes(-14), half=90.0, ceiling=70.0)
+    world = boxes_and_a_wall()
     camera = Camera(320, 320, 90.0)
     with GlRenderer(world) as renderer:
         poses = [view_pose((0.0, 0.0, 3.0), yaw, "front") for yaw in (0.0, np.pi)]

@@ -209,12 +209,22 @@ def fresh_choice():
     choose_renderer.cache_clear()
 
 
-def wrong_renderer(fault):
-    class Wrong(backend.PyBulletRenderer):
-        def render(self, camera, world_from_camera, instances=False):
-            return fault(super().render(camera, world_from_camera, instances))
+@pytest.fixture(scope="module")
+def probe():
+    with open_renderer(probe_scene(), "pybullet") as renderer:
+        yield renderer
 
-    return Wrong
+
+class Wrong:
+    """A renderer that does something to its pictures."""
+
+    name, device = "pybullet", "TinyRenderer"
+
+    def __init__(self, renderer, fault):
+        self._renderer, self._fault = renderer, fault
+
+    def render(self, camera, world_from_camera):
+        return self._fault(self._renderer.render(camera, world_from_camera))
 
 
 @pytest.mark.parametrize(
@@ -228,9 +238,9 @@ def wrong_renderer(fault):
         lambda p: replace(p, rgb=p.rgb[:, ::-1].copy()),
     ],
 )
-def test_a_renderer_that_draws_what_is_not_there_is_refused(fault):
-    with wrong_renderer(fault)(probe_scene()) as renderer, pytest.raises(RenderError, match="rejected: "):
-        check_renderer(renderer)
+def test_a_renderer_that_draws_what_is_not_there_is_refused(probe, fault):
+    with pytest.raises(RenderError, match="rejected: "):
+        check_renderer(Wrong(probe, fault))
 
 
 def test_auto_passes_over_what_does_not_work_and_says_so(monkeypatch, fresh_choice):

@@ -8,11 +8,10 @@ from support.handmade import box, instance
 from support.rendered import MATERIALS, block, courtyard
 
 from aerialdojo_gen.geometry.cameras import Camera, look_at_pose, project, view_pose
-from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.rendering.backend import scene_renderer
 from aerialdojo_gen.rendering.gallery import contact_sheet, look_at
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import RenderWorld, pybullet
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
@@ -39,19 +38,6 @@ def test_depth_of_a_wall_is_its_distance(world, view, distance):
     middle = depth[150:170, 150:170]
     assert middle == pytest.approx(np.full_like(middle, distance), abs=1e-3)
     assert depth[160, 40:280] == pytest.approx(np.full(240, distance), abs=1e-3)
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_depth_agrees_with_ray_casts_at_every_pixel(scene, world, view):
-    pose = view_pose((-1.0, 2.0, 3.1), 0.4, view)
-    depth = world.render(CAMERA, pose).depth_m.astype(np.float64)
-    rays = CAMERA.rays().reshape(-1, 3)
-    along, _ = RayCaster(scene).first_hit(pose[:3, 3], rays @ pose[:3, :3].T)
-    cast = (along / np.linalg.norm(rays, axis=1)).reshape(depth.shape)
-    assert np.isinf(cast).any() == (view != "down")
-    assert np.mean(np.isinf(cast) == np.isinf(depth)) > 0.9999
-    both = np.isfinite(cast) & np.isfinite(depth)
-    assert np.mean(np.abs(cast[both] - depth[both]) < 0.01) > 0.999
 
 
 def test_neighbouring_views_see_the_same_at_their_shared_edge(world):
@@ -119,22 +105,23 @@ def test_the_sky_is_the_scene_s_and_not_white(scene, world):
     assert np.ptp(picture.rgb[:100, 160].astype(int), axis=0).max() > 20
 
 
-def test_pictures_are_the_same_from_a_world_built_again(scene, world):
-    pose = view_pose((1, 1, 3), 2.0, "front")
-    first = world.render(CAMERA, pose)
-    with RenderWorld(scene) as again:
-        second = again.render(CAMERA, pose)
-    assert np.array_equal(first.rgb, second.rgb)
-    assert np.array_equal(first.depth_m, second.depth_m)
+def test_a_world_gives_its_client_back(scene):
+    """PyBullet has 1,024 clients at most: a renderer that keeps one would end a long run."""
+    with RenderWorld(Scene("small", scene.instances[:1], MATERIALS, scene.bounds)) as small:
+        client = small._client
+        assert pybullet.isConnected(client)
+    assert not pybullet.isConnected(client)
 
 
-@pytest.mark.slow
-def test_many_worlds_one_after_the_other(scene):
-    """PyBullet has 1,024 clients at most and once leaked meshes: a world must give back what it took."""
-    small = Scene("small", scene.instances[:1], MATERIALS, scene.bounds)
-    for _ in range(5):
-        with RenderWorld(small) as world:
-            assert np.isfinite(world.render(CAMERA, view_pose((0, 0, 3), 0, "down")).depth_m).all()
+def test_vertices_in_the_camera_s_own_plane_do_no_harm(scene):
+    """TinyRenderer divides by zero there; routes on whole metres meet such vertices often."""
+    curb = block("curb", (-24, -1, 0), (24, 1, 0.5), "blue")
+    with RenderWorld(Scene("long", (*scene.instances, curb), MATERIALS, scene.bounds)) as long:
+        for view in VIEWS:
+            for position in ((0.0, 0.0, 3.0), (0.0, 0.0, 0.75), (6.0, 0.0, 2.0), (-6.0, 3.0, 2.0)):
+                depth = long.render(CAMERA, view_pose(position, 0.0, view)).depth_m
+                assert not np.isnan(depth).any()
+                assert depth.min() > 0.1
 
 
 def test_previews_keep_the_latest_scene_and_sheets_hold_all_pictures(scene):
@@ -153,19 +140,6 @@ def test_previews_keep_the_latest_scene_and_sheets_hold_all_pictures(scene):
     assert found == 5
     with pytest.raises(ValueError, match="labels"):
         contact_sheet([image], ["a", "b"])
-
-
-@pytest.mark.parametrize("view", VIEWS)
-def test_vertices_in_the_camera_s_own_plane_do_no_harm(scene, view):
-    """TinyRenderer divides by zero there; routes on whole metres meet such vertices often."""
-    long = Scene(
-        "long", (*scene.instances, block("curb", (-24, -1, 0), (24, 1, 0.5), "blue")), MATERIALS, scene.bounds
-    )
-    with RenderWorld(long) as world:
-        for position in ((0.0, 0.0, 3.0), (0.0, 0.0, 0.75), (6.0, 0.0, 2.0), (-6.0, 3.0, 2.0)):
-            depth = world.render(CAMERA, view_pose(position, 0.0, view)).depth_m
-            assert not np.isnan(depth).any()
-            assert depth.min() > 0.1
 
 
 @pytest.mark.parametrize(("below", "east_is_right"), [(-6.0, True), (6.0, False)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from support import handmade
 
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -41,3 +42,15 @@ def courtyard() -> Scene:
     return Scene(
         "U_Court_0", (ground, *walls, *cubes), MATERIALS, np.array([[-12.0, -12.0, 0.0], [12.0, 12.0, 12.0]])
     )
+
+
+def boxes_and_a_wall() -> Scene:
+    """A wall 10 m to the east with two hundred boxes behind it, and as many to the west."""
+    wall = handmade.instance("wall", handmade.box((10, -80, 0), (10.5, 80, 60)))
+    boxes = [
+        handmade.instance(
+            f"box_{x}_{k}", handmade.box((x, k % 40 - 20, k // 40), (x + 0.5, k % 40 - 19.5, k // 40 + 0.5))
+        )
+        for x in (14, -14) for k in range(200)
+    ]  # fmt: skip
+    return handmade.scene(wall, *boxes, half=90.0, ceiling=70.0)
