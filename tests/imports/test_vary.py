@@ -22,7 +22,7 @@ def test_worlds_run_through_the_stages_and_train_or_test_by_their_seeds(tmp_path
     assert {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")} == before
     with pytest.raises(UsageError, match="occupancy"):
         vary(["U_ParkingLot"], range(1000, 1001), out, VaryOptions({"occupancy": 0.5}))
-    run_pipeline(out / "pipeline.toml", data=out / "data")
+    run_pipeline(out / "pipeline.toml", data=out / "data", workers=1)
     for scene, subset in (("U_ParkingLot-7", "test"), ("U_ParkingLot-1000", "train")):
         tables = [pq.read_table(p) for p in (out / "data/release/tasks").rglob(f"part-{scene}.parquet")]
         assert {s for t in tables for s in t.column("subset").to_pylist()} == {subset}

@@ -1,18 +1,17 @@
 """A training that begins with the weights of another: what it takes over, what it refuses, what a report says."""
 
 import json
-import tomllib
+from functools import partial
 
 import numpy as np
 import pytest
-from support.trainings import history
+from support.trainings import history, recipe_of
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.scoring import score
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.cli import app as cli
-from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.store.files import file_digest
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
@@ -52,13 +51,7 @@ rounds = 0
 BOTH = ("before", "after")
 # A rate at which no weight changes that is not 0.
 STILL = {"learning_rate": 1e-30, "epochs": 1}
-
-
-def recipe(**changed):
-    given = tomllib.loads(TEXT)
-    for key, value in changed.items():
-        given[key] = {**given[key], **value}
-    return Recipe.model_validate(given)
+recipe = partial(recipe_of, TEXT)
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ from support.trainings import assert_same_training, history, kill_at_first_check
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules
+from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.recipe import load_recipe
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the extra 'train'")
@@ -124,10 +124,7 @@ def test_the_search_leads_where_the_place_is_not_known_and_nowhere_else(smoke, t
     chosen = Selection(("id_train",), limit=4)
     evaluation = Evaluation("lost", "policy", {"weights": str(trained(12))}, chosen)
     evaluate(smoke, evaluation, out=tmp_path, workers=1)
-    rows = [
-        row for scene in read_index(open_root(smoke), chosen).scenes
-        for row in store.read_scene(tmp_path, "episodes", scene, ["n_actions", "termination"], "lost").to_pylist()
-    ]  # fmt: skip
+    rows = read_run(tmp_path, "lost").to_pylist()
     assert rows
     if lost:
         assert CountedSearch.led == CountedSearch.looked >= len(rows)

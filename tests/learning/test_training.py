@@ -2,10 +2,9 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
-import tomllib
+from functools import partial
 
 import numpy as np
 import pyarrow as pa
@@ -13,11 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 from support.extended import set_columns
 from support.flying import town
-from support.trainings import assert_same_training, history, kill_at_first_checkpoint
+from support.trainings import assert_same_training, history, kill_at_first_checkpoint, recipe_of
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.episodes import read_run, run_scenes
+from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
@@ -26,7 +25,7 @@ from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.flights import NO_LABEL, Teacher
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import pictures
-from aerialdojo_gen.learning.recipe import Recipe, load_recipe
+from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
 from aerialdojo_gen.pipeline.code_digest import code_of
@@ -35,7 +34,6 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
 from aerialdojo_gen.store.schemas.columns import list_of
@@ -73,13 +71,7 @@ rounds = 0
 """
 # A model that can learn eight trajectories by heart, or a map.
 LARGER = {"channels": (16, 16, 32), "features": 64, "word_features": 32, "hidden": 128}
-
-
-def recipe(**changed):
-    given = tomllib.loads(TEXT)
-    for key, value in changed.items():
-        given[key] = {**given[key], **value} if isinstance(value, dict) else value
-    return Recipe.model_validate(given)
+recipe = partial(recipe_of, TEXT)
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +84,6 @@ def learned(smoke, cache, tmp_path_factory):
     """A policy that saw eight trajectories six times."""
     out = tmp_path_factory.mktemp("policy")
     return train(smoke, recipe(), out=out, cache=cache, device="cpu", workers=1)
-
-
-def the_eight(smoke):
-    """The navigation tasks that were learned from."""
-    index = read_index(open_root(smoke), Selection(("id_train",)))
-    return set(index.take(sample_evenly(index, 8, 0)).nav_id)
 
 
 def test_a_short_training_fits_better_at_its_end(learned):
@@ -114,11 +100,10 @@ def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_pat
     assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
     evaluate(smoke, Evaluation("learned", POLICY, options, Selection(("id_train",))), out=tmp_path, workers=1)
-    rows = []
-    for scene in run_scenes(open_root(tmp_path), "learned"):
-        columns = ["nav_id", "success", "agent_options"]
-        rows += store.read_scene(tmp_path, "episodes", scene, columns, "learned").to_pylist()
-    own = [row for row in rows if row["nav_id"] in the_eight(smoke)]
+    rows = read_run(tmp_path, "learned").to_pylist()
+    index = read_index(open_root(smoke), Selection(("id_train",)))
+    eight = set(index.take(sample_evenly(index, 8, 0)).nav_id)
+    own = [row for row in rows if row["nav_id"] in eight]
     assert len(own) == 16, "both goals of each"
     assert sum(row["success"] for row in own) >= 14
     assert json.loads(own[0]["agent_options"])["weights"] == str(learned.policy)
@@ -180,25 +165,24 @@ def test_a_shape_beyond_its_weights_is_refused_before_it_takes_memory(learned, c
         Policy(str(path))
 
 
-def test_other_pictures_of_the_goals_are_drawn_from_anew(smoke, tmp_path):
-    data = tmp_path / "data"
-    shutil.copytree(smoke / "release", data / "release")
-    shutil.copytree(smoke / "meshes", data / "meshes")
-    root = open_root(data)
-    index = read_index(root, Selection(("id_train",)))
+def parts_by_name(root, index, folder, seed=0):
+    parts = parts_of(root, index, folder, (("id_train",), ()), Sensors(), 32, seed, "gl")
+    assert sorted(nav_id for part in parts for nav_id in part.nav_ids) == sorted(index.nav_id)
+    return {part.folder.name: part for part in parts}
 
-    def names():
-        parts = parts_of(open_root(data), index, tmp_path, (("id_train",), ()), Sensors(), 32, 0, "gl")
-        return {part.scene: part.folder.name for part in parts}
 
-    before = names()
-    part = data / part_name("release/objects", index.scenes[0])
+def test_other_pictures_of_the_goals_are_drawn_from_anew(planted, tmp_path):
+    index = read_index(open_root(planted.data), Selection(("id_train",)))
+    before = parts_by_name(open_root(planted.data), index, tmp_path)
+    part = planted.data / part_name("release/objects", planted.scene)
     table = pq.read_table(part)
     shown = [None if png is None else png + b"x" for png in table["reference_image"].to_pylist()]
     at = table.column_names.index("reference_image")
     pq.write_table(table.set_column(at, table.schema.field(at), pa.array(shown, table.schema.field(at).type)), part)
-    after = names()
-    assert {scene for scene in before if before[scene] != after[scene]} == {index.scenes[0]}
+    after = parts_by_name(open_root(planted.data), index, tmp_path)
+    assert len(after) == len(before)
+    changed = [part.scene == planted.scene for name, part in before.items() if name not in after]
+    assert changed == [True] * sum(part.scene == planted.scene for part in before.values())
 
 
 def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
@@ -216,18 +200,15 @@ def test_of_more_trajectories_or_other_scenes_what_was_drawn_stays_drawn(smoke, 
     index = read_index(root, Selection(("id_train", "ood_train")))
     assert len(index.scenes) > 1
 
-    def names(chosen):
-        parts = parts_of(root, chosen, tmp_path, (("id_train",), ()), Sensors(), 32, 3, "gl")
-        assert sorted(nav_id for part in parts for nav_id in part.nav_ids) == sorted(chosen.nav_id)
-        return {part.folder.name for part in parts if len(part) == 5}
+    def whole(chosen):
+        return {name for name, part in parts_by_name(root, chosen, tmp_path, 3).items() if len(part) == 5}
 
-    all_of_them = names(index)
-    fewer = names(index.take(sample_evenly(index, 10 * len(index.scenes), 3)))
+    all_of_them = whole(index)
+    fewer = whole(index.take(sample_evenly(index, 10 * len(index.scenes), 3)))
     assert len(fewer) == 2 * len(index.scenes)
-    assert fewer < all_of_them
-    last = names(index.take(np.flatnonzero(index.scene == len(index.scenes) - 1)))
+    last = whole(index.take(np.flatnonzero(index.scene == len(index.scenes) - 1)))
     assert last
-    assert last < all_of_them
+    assert fewer | last < all_of_them
 
 
 def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(smoke, tmp_path):
@@ -318,12 +299,10 @@ def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
     with pytest.raises(UsageError, match="there are no weights"):
         checkpoints.read(tmp_path / "none.safetensors")
     cut = tmp_path / "cut.safetensors"
-    cut.write_bytes(learned.policy.read_bytes()[:-1000])
-    with pytest.raises(StoreError, match="holds no policy"):
-        checkpoints.read(cut)
-    cut.write_text("{}")
-    with pytest.raises(StoreError, match="holds no policy"):
-        checkpoints.read(cut)
+    for content in (learned.policy.read_bytes()[:-1000], b"{}"):
+        cut.write_bytes(content)
+        with pytest.raises(StoreError, match="holds no policy"):
+            checkpoints.read(cut)
     file = tmp_path / "wrong.toml"
     file.write_text("[train]\nepoch = 3\n")
     with pytest.raises(ConfigError, match="did you mean 'epochs'"):

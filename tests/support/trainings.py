@@ -5,6 +5,18 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
+from typing import Any
+
+from aerialdojo_gen.learning.recipe import Recipe
+
+
+def recipe_of(text: str, **changed: Any) -> Recipe:
+    """A recipe from its file's text, with other values of some sections or keys."""
+    given = tomllib.loads(text)
+    for key, value in changed.items():
+        given[key] = {**given[key], **value} if isinstance(value, dict) else value
+    return Recipe.model_validate(given)
 
 
 def history(folder):
