@@ -181,6 +181,56 @@ def _slope(w: Floats, row: int, col: int, down: int, right: int) -> float:
 
 
 @njit(cache=True)
+def _inverse_depths(depth: NDArray[np.float32], surface: NDArray[np.int32]) -> Floats:
+    """Inverse depth of every pixel; 0 of the sky."""
+    w = np.zeros(depth.shape)
+    for row in range(depth.shape[0]):
+        for col in range(depth.shape[1]):
+            if surface[row, col] >= 0:
+                w[row, col] = 1.0 / depth[row, col]
+    return w
+
+
+@njit(cache=True)
+def _turned(pose: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A direction of the camera's frame in the world's."""
+    return (
+        pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z,
+        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z,
+        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z,
+    )
+
+
+@njit(cache=True)
+def _fade(base: Floats, albedo: NDArray[np.uint8], across_texels: float, facing: float) -> None:
+    """Take a texture's colour the less the more texels a pixel covers: the nearest one is noise there."""
+    texels_2 = across_texels**2 / max(facing, 0.02)
+    sharpness = min(1.0, max(0.0, (_FADE_TEXELS**2 - texels_2) / (_FADE_TEXELS**2 - 1.0)))
+    for c in range(3):
+        base[c] += (albedo[c] - base[c]) * sharpness
+
+
+@njit(cache=True)
+def _depth_below(x: float, y: float, z: float, heights: NDArray[np.uint8], place: Floats) -> float:
+    """How far a place lies below the mean height about it, as a share of `_DEEP_M`."""
+    if heights.shape[0] <= 1:
+        return 0.0
+    u, v = (x - place[0]) / place[2], (y - place[1]) / place[2]
+    return (place[3] + _bilinear(heights, u, v) * place[4] - z - _BEFORE_M) / _DEEP_M
+
+
+@njit(cache=True)
+def _light(base: Floats, rows: Floats, up: float, open_sky: float, lit: float, dark: float) -> None:
+    """Light a colour, 0-255, by the sky and the sun, in place."""
+    grey = 0.3 * base[0] + 0.6 * base[1] + 0.1 * base[2]
+    for c in range(3):
+        base[c] = grey + (base[c] - grey) * _VIVID
+        from_sky = (rows[3, c] + (rows[2, c] - rows[3, c]) * up) * open_sky
+        value = base[c] / 255.0
+        base[c] = tone(value * value * dark * (from_sky + rows[1, c] * lit))
+
+
+@njit(cache=True)
 def _shade(
     albedo: NDArray[np.uint8],
     depth: NDArray[np.float32],
@@ -204,19 +254,12 @@ def _shade(
     height, width = depth.shape
     sun = rows[0]
     flat = math.sqrt(sun[0] * sun[0] + sun[1] * sun[1]) + 1e-9
-    base, sky, mapped = np.empty(3), np.empty(3), heights.shape[0] > 1
-    w = np.zeros((height, width))
-    for row in range(height):
-        for col in range(width):
-            if surface[row, col] >= 0:
-                w[row, col] = 1.0 / depth[row, col]
+    base, sky, w = np.empty(3), np.empty(3), _inverse_depths(depth, surface)
     for row in range(height):
         y = (row + 0.5 - height / 2.0) / focal
         for col in range(width):
             x = (col + 0.5 - width / 2.0) / focal
-            dx = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2]
-            dy = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2]
-            dz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2]
+            dx, dy, dz = _turned(pose, x, y, 1.0)
             stretch = math.sqrt(dx * dx + dy * dy + dz * dz)
             k = surface[row, col]
             if k < 0:
@@ -231,17 +274,12 @@ def _shade(
             e = w[row, col] - x * a - y * b
             norm = math.sqrt(a * a + b * b + e * e)
             facing = w[row, col] / (norm * stretch)
-            nx = -(pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * e) / norm
-            ny = -(pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * e) / norm
-            nz = -(pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * e) / norm
+            inwards = _turned(pose, a, b, e)
+            nx, ny, nz = -inwards[0] / norm, -inwards[1] / norm, -inwards[2] / norm
             for c in range(3):
                 base[c] = colour[k, c]
             if texel[k] > 0.0:
-                # The rasteriser samples the nearest texel: fade into the mean colour with distance, against noise.
-                texels_2 = (z * stretch / focal / texel[k]) ** 2 / max(facing, 0.02)
-                sharpness = min(1.0, max(0.0, (_FADE_TEXELS**2 - texels_2) / (_FADE_TEXELS**2 - 1.0)))
-                for c in range(3):
-                    base[c] += (albedo[row, col, c] - base[c]) * sharpness
+                _fade(base, albedo[row, col], z * stretch / focal / texel[k], facing)
             px, py, pz = pose[0, 3] + dx * z, pose[1, 3] + dy * z, pose[2, 3] + dz * z
             lit = nx * sun[0] + ny * sun[1] + nz * sun[2]
             if lit <= 0.0:
@@ -250,37 +288,20 @@ def _shade(
                 # Offset by more than a texel of the map, against self-shadowing.
                 at = px + nx * bias_m, py + ny * bias_m, pz + nz * bias_m
                 lit *= _sunlit(at[0], at[1], at[2], shadow, sun_pose, sun_focal)
-            deep = 0.0
-            if mapped:
-                u = (px + nx * _BEFORE_M - place[0]) / place[2]
-                v = (py + ny * _BEFORE_M - place[1]) / place[2]
-                deep = (place[3] + _bilinear(heights, u, v) * place[4] - pz - _BEFORE_M) / _DEEP_M
-            open_ = (1.0 - _SHADED * min(max(deep, 0.0), 1.0)) * (1.0 + SIDE * (nx * sun[0] + ny * sun[1]) / flat)
-            up = 0.5 + 0.5 * nz
+            deep = _depth_below(px + nx * _BEFORE_M, py + ny * _BEFORE_M, pz, heights, place)
+            open_sky = (1.0 - _SHADED * min(max(deep, 0.0), 1.0)) * (1.0 + SIDE * (nx * sun[0] + ny * sun[1]) / flat)
             level = min(max(4.0 * nz - 3.0, 0.0), 1.0) * rows[6, 2]
             mirror = max(shiny[k], level * 0.6)
             if mirror > 0.0:
                 turn = 2.0 * facing * stretch
-                _sky(
-                    (dx + nx * turn) / stretch,
-                    (dy + ny * turn) / stretch,
-                    (dz + nz * turn) / stretch,
-                    rows,
-                    clouds,
-                    sky,
-                )
+                mx, my, mz = (dx + nx * turn) / stretch, (dy + ny * turn) / stretch, (dz + nz * turn) / stretch
+                _sky(mx, my, mz, rows, clouds, sky)
                 glance = 1.0 - facing
                 mirror *= _MIRROR_LEAST + (_MIRROR_MOST - _MIRROR_LEAST) * glance * glance * glance
             range_2 = (z * stretch) ** 2
             haze = range_2 / (range_2 + rows[6, 0])
-            dark = 1.0 - (1.0 - _WET) * level
-            grey = 0.3 * base[0] + 0.6 * base[1] + 0.1 * base[2]
-            for c in range(3):
-                if not unlit[k]:
-                    base[c] = grey + (base[c] - grey) * _VIVID
-                    from_sky = (rows[3, c] + (rows[2, c] - rows[3, c]) * up) * open_
-                    value = base[c] / 255.0
-                    base[c] = tone(value * value * dark * (from_sky + rows[1, c] * lit))
+            if not unlit[k]:
+                _light(base, rows, 0.5 + 0.5 * nz, open_sky, lit, 1.0 - (1.0 - _WET) * level)
             for c in range(3):
                 value = base[c]
                 if mirror > 0.0:

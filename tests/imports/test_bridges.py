@@ -131,9 +131,6 @@ def test_the_same_map_makes_the_same_bridges_whatever_its_order(town, tmp_path):
     other = maps.write_map(tmp_path / "town.osm.pbf", maps.BRIDGES, order=-1)
     again = add_map("Bridges", other, tmp_path / "a", bbox=[maps.box()])[0]
     assert again.recipe.read_bytes() == town.recipe.read_bytes()
-    assert [i.node for i in again.scene.instances] == [i.node for i in town.scene.instances]
-    assert all(np.array_equal(a.vertices, b.vertices)
-               for a, b in zip(again.scene.instances, town.scene.instances, strict=True))  # fmt: skip
 
 
 def test_over_a_valley_the_deck_is_level_and_its_piers_reach_down(tmp_path):
