@@ -38,27 +38,20 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
         raise AssetError(f"{path}: meshes are read from {', '.join(s[1:].upper() for s in SUFFIXES)} files")
     try:
         check_regular(path)
-        size = path.stat().st_size
+        size, fault = path.stat().st_size, mismatch(path, SUFFIXES)
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
         raise AssetError(
             f"{path}: {size >> 20} MiB, the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
         )
-    if fault := _type_mismatch(path):
+    if fault:
         raise AssetError(f"{path}: {fault}")
     with scratch_folder() as folder:
         out = folder / "nodes.npz"
         args = [str(out), str(texture_px)]
         read_in_sandbox(__name__, path, args, max_memory_bytes, "simplify or split the mesh")
         return unpack_nodes(out)
-
-
-def _type_mismatch(path: Path) -> str:
-    try:
-        return mismatch(path, SUFFIXES)
-    except OSError as error:
-        return str(error.strerror)
 
 
 def read_into(path: Path, out: Path, texture_px: int = TEXTURE_PX) -> str:
