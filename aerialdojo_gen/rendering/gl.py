@@ -233,7 +233,7 @@ class GlRenderer(Closable):
         world_from_camera : (4, 4) float64
         clip : (4, 4) float64
             Of `clip_from_world`.
-        seen : sequence of (3 k,) uint32
+        visible : sequence of (3 k,) uint32
             Indices into the vertices of each kind of surface.
         instances : bool
             Whether the picture has an instance id map.
