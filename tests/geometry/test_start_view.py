@@ -19,7 +19,6 @@ from aerialdojo_gen.geometry.surface import Surface
 coordinates = st.floats(-50, 50)
 BALL = instance("ball", trimesh.creation.icosphere(3, radius=0.5).apply_translation([10.0, 0.0, 2.0]))
 POINTS = Surface.of(BALL).sample(64, np.random.default_rng(0))
-AT = {"x": 0.0, "y": 0.0, "z": 2.0}
 
 
 def seen(*others, x=0.0, y=0.0, z=2.0, yaw=0.0):

@@ -9,7 +9,6 @@ from scipy.optimize import minimize
 from aerialdojo_gen.geometry.motion import TURN_RAD
 from aerialdojo_gen.planning.difficulty import free_lengths_m
 
-HEADINGS = np.arange(24) * TURN_RAD
 # Displacements of every size: shorter than an Approach, about as long, and as long as a route.
 metres = st.one_of(st.floats(-2.0, 2.0), st.floats(-100.0, 100.0))
 way = st.tuples(metres, metres, metres)
