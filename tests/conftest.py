@@ -100,15 +100,6 @@ def own_cache(shared: Path) -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def kept_bytecode(shared: Path) -> Iterator[None]:
-    """Processes of the tests share compiled modules: without, each spends half of its start on compiling."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
-        patch.setenv("PYTHONPYCACHEPREFIX", str(shared / "bytecode"))
-        yield
-
-
 @pytest.fixture(scope="session")
 def project() -> Path:
     """The checkout's folder."""

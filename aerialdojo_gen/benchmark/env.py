@@ -162,7 +162,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Draw episodes from some scenes alone; the spaces stay those of all tasks."""
         self._draw.restrict(scenes)
 
-    def told(self) -> list[tuple[str, str, str, str | None]]:
+    def goals_in_words(self) -> list[tuple[str, str, str, str | None]]:
         """Goals in words, of all tasks to draw from: target, landmark, direction, description or None."""
         names = (*_TEXT[:2], "direction")
         words = self._rows.group_by([*names, *_TEXT[2:], "scene", "subset", "nav_id"]).aggregate([]).to_pylist()
@@ -306,7 +306,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Make the space over all tasks, so that it reveals nothing about the current one."""
         said = {name: {text for text in pc.unique(self._rows[name]).to_pylist() if text} for name in _TEXT}
         if self._paraphrase != "task":
-            said["description"] |= {text for *_, text in self.told() if text}
+            said["description"] |= {text for *_, text in self.goals_in_words() if text}
         characters = "".join(sorted(set(string.printable).union(*(text for some in said.values() for text in some))))
         goal: dict[str, spaces.Space[Any]] = {
             "modality": spaces.Discrete(len(MODALITIES)),

@@ -82,7 +82,7 @@ def evaluate(
         budget = BudgetTracker(limits, *run.spent())
         with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
-            def tell(finished: Finished) -> None:
+            def on_finished(finished: Finished) -> None:
                 budget.add(finished)
                 bar.advance(finished.episodes)
 
@@ -95,7 +95,7 @@ def evaluate(
                 # The processes have ended when their journals are flushed.
                 with run.flushing(), made as pool:
                     units = run.units(todo, pool.workers if todo.num_rows else 1)
-                    for scene in fly_units(root, evaluation, units, pool, tell, stopped):
+                    for scene in fly_units(root, evaluation, units, pool, on_finished, stopped):
                         run.flush_journals(scene)
             except ServiceDown as error:
                 raise ServiceDown(f"{error} Finished episodes are kept: the same command continues") from None

@@ -119,7 +119,7 @@ class Worker:
         self._identity, self._retry_policy, self._secrets = identity, retry_policy, secrets
         self._guarded = GuardedAgent(agent, identity["agent"], secrets, retry_policy.tolerate)
 
-    def fly(self, unit: WorkUnit, tell: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
+    def fly(self, unit: WorkUnit, on_finished: Callable[[Finished], None], stopped: Callable[[], bool]) -> None:
         """Fly a unit's episodes, and write each to the journal."""
         actions: dict[str, list[int]] = {}
         # By its exact class: no other agent can get the reference.
@@ -140,7 +140,7 @@ class Worker:
                 if done is None:
                     return
                 journal.add(done[0])
-                tell(done[1])
+                on_finished(done[1])
 
     def _finish(self, task: Task, stopped: Callable[[], bool]) -> tuple[dict[str, Any], Finished] | None:
         """Fly one episode, with retries after external failures; None if the run is stopped meanwhile."""

@@ -73,14 +73,14 @@ def fly_units(
     evaluation: Evaluation,
     units: Sequence[WorkUnit],
     executor: Executor,
-    tell: Callable[[Finished], None],
+    on_finished: Callable[[Finished], None],
     stopped: Callable[[], bool],
 ) -> Iterator[str]:
     """Fly units, and yield a scene when all of its units are finished."""
     left = Counter(unit.scene for unit in units)
     work = [_Work(data, evaluation, unit) for unit in units]
     for outcome in executor.map(
-        _fly, work, lambda one: one.scene, channel=ParentChannel(tell, stopped), memory_mb=MEMORY_MB
+        _fly, work, lambda one: one.scene, channel=ParentChannel(on_finished, stopped), memory_mb=MEMORY_MB
     ):
         if isinstance(outcome, AerialDojoError):
             raise outcome
@@ -100,7 +100,7 @@ def _fly(work: _Work, link: WorkerChannel) -> str:
         at_end(stack.close)
         _worker_of_process["worker"] = stack.enter_context(worker(work.data, work.evaluation, link))
     with _ProgressSender(link) as progress:
-        _worker_of_process["worker"].fly(work.unit, progress.tell, link.stopped)
+        _worker_of_process["worker"].fly(work.unit, progress.add, link.stopped)
     return work.scene
 
 
@@ -110,7 +110,7 @@ class _ProgressSender:
     def __init__(self, link: WorkerChannel) -> None:
         self._link, self._sum, self._last = link, Finished(), time.monotonic()
 
-    def tell(self, finished: Finished) -> None:
+    def add(self, finished: Finished) -> None:
         self._sum += finished
         if time.monotonic() - self._last >= self._link.every_s:
             self._send()

@@ -247,10 +247,10 @@ def _episodes(part: Part, stats: list[dict[str, Stats]], keys: list[str], at: di
         columns[f"videos/{key}/to_timestamp"] = end / FPS
     columns |= {"nav_id": index.nav_id, "scene": [part.scene] * n, "split": part.splits, "setting": part.settings}
     columns |= {
-        name: pa.array(index.told[name], pa.string())
+        name: pa.array(index.goal_columns[name], pa.string())
         for name in ("target_name", "landmark", "direction", "reference_image_id")
     }
-    columns["image_distance_m"] = pa.array(index.told["image_distance_m"], pa.float64())
+    columns["image_distance_m"] = pa.array(index.goal_columns["image_distance_m"], pa.float64())
     for key in stats[0]:
         for name in stats[0][key]:
             columns[f"stats/{key}/{name}"] = [found[key][name] for found in stats]

@@ -91,7 +91,7 @@ class Part:
         first = np.concatenate([[0], np.cumsum([len(actions) for actions in short])]).astype(np.int64)
         small = Index(
             index.scenes, index.roots, index.scene, index.nav_id, np.concatenate(short), first, index.start,
-            index.goal, index.budget, index.told,
+            index.goal, index.budget, index.goal_columns,
         )  # fmt: skip
         n = len(small)
         return Part(0, small, self.settings[:n], self.splits[:n], self.tasks[:n], self.texts[:n], 0, 0)
@@ -111,7 +111,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     else:
         chosen = _recorded(chosen, options)
     texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
-        *(chosen.told[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
+        *(chosen.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
     )]  # fmt: skip
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
@@ -193,7 +193,7 @@ class SampleFrames:
         A trajectory without an image instance has a black one.
         """
         s = self._sensors
-        named = self._part.index.told["reference_image_id"][k]
+        named = self._part.index.goal_columns["reference_image_id"][k]
         if named is None:
             return np.zeros((s.height, s.width, 3), np.uint8)
         picture = reference_image(self._root, self._part.scene, named)

@@ -79,9 +79,10 @@ def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list
         "task": part.texts[k],
     }
     if "text" in options.goal:
-        whole |= {name: index.told[name][k] for name in ("target_name", "landmark", "direction", "description")}
+        names = ("target_name", "landmark", "direction", "description")
+        whole |= {name: index.goal_columns[name][k] for name in names}
     if "image" in options.goal:
-        whole |= {name: index.told[name][k] for name in ("reference_image_id", "image_distance_m")}
+        whole |= {name: index.goal_columns[name][k] for name in ("reference_image_id", "image_distance_m")}
     return [
         {
             **whole,

@@ -76,7 +76,7 @@ def _offset_places(space: FlightSpace, places: NDArray[np.float64], draw: np.ran
 
 def _named(part: Part, index: Index, scene: Scene) -> tuple[list[str], NDArray[np.int16]]:
     """Targets' names, and each instance's index into them; the last entry stands for no instance."""
-    wanted = dict(zip(index.nav_id, index.told["target_name"], strict=True))
+    wanted = dict(zip(index.nav_id, index.goal_columns["target_name"], strict=True))
     names: dict[int, str] = {}
     for side in ("train", "test"):
         rows = store.read_stored(part.data, f"routes/{side}", part.scene, ("nav_id", "target_object_id")).to_pylist()

@@ -29,7 +29,7 @@ from aerialdojo_gen.store.schemas import APPROACH, STOP
 _SIDES = ("train", "test")
 _GOAL = ("goal_x_m", "goal_y_m", "goal_z_m")
 _START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
-_TOLD = ("target_name", "landmark", "direction")
+_GOAL_WORDS = ("target_name", "landmark", "direction")
 _BY_MODALITY = ("description", "reference_image_id", "image_distance_m")
 
 
@@ -46,7 +46,7 @@ class Index:
     start: NDArray[np.float64]  # (n, 4) float64; start poses: x, y, z in metres and yaw in radians, world frame
     goal: NDArray[np.float64]  # (n, 3) float64; goal anchors, metres, world frame
     budget: NDArray[np.int32]  # (n,) int32; most actions, Stop included
-    told: dict[str, list[Any]]  # What each goal says, by column of `tasks`
+    goal_columns: dict[str, list[Any]]  # What each goal says, by column of `tasks`
 
     def __len__(self) -> int:
         """Return the number of trajectories."""
@@ -73,8 +73,8 @@ class Index:
     @property
     def goal_texts(self) -> list[str]:
         """Say each trajectory's goal in words."""
-        told = (self.told[name] for name in (*_TOLD, "description"))
-        return [goal_text(str(name), str(mark), str(way), said) for name, mark, way, said in zip(*told, strict=True)]
+        said = (self.goal_columns[name] for name in (*_GOAL_WORDS, "description"))
+        return [goal_text(str(name), str(mark), str(way), text) for name, mark, way, text in zip(*said, strict=True)]
 
     @cached_property
     def digest(self) -> str:
@@ -82,7 +82,7 @@ class Index:
         found = hashlib.sha256("\n".join(self.nav_id).encode())
         for array in (self.actions, self.first, self.start, self.goal, self.budget):
             found.update(np.ascontiguousarray(array).tobytes())
-        for name, texts in sorted(self.told.items()):
+        for name, texts in sorted(self.goal_columns.items()):
             found.update(f"{name}\0{texts}".encode())
         return found.hexdigest()
 
@@ -100,7 +100,7 @@ class Index:
             np.concatenate([*pieces, np.empty(0, np.int8)]),
             _starts(pieces),
             self.start[rows], self.goal[rows], self.budget[rows],
-            {name: [texts[k] for k in rows] for name, texts in self.told.items()},
+            {name: [texts[k] for k in rows] for name, texts in self.goal_columns.items()},
         )  # fmt: skip
 
 
@@ -218,7 +218,7 @@ def _scene(
         np.array([[wanted[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
         np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
         np.array([wanted[i]["action_budget"] for i in ids], np.int32),
-        {name: [wanted[i][name] for i in ids] for name in (*_TOLD, *_BY_MODALITY)},
+        {name: [wanted[i][name] for i in ids] for name in (*_GOAL_WORDS, *_BY_MODALITY)},
     )
 
 
@@ -271,5 +271,5 @@ def _joined(parts: Sequence[Index]) -> Index:
         np.concatenate([p.start for p in parts]),
         np.concatenate([p.goal for p in parts]),
         np.concatenate([p.budget for p in parts]),
-        {name: [t for p in parts for t in p.told[name]] for name in parts[0].told},
+        {name: [t for p in parts for t in p.goal_columns[name]] for name in parts[0].goal_columns},
     )

@@ -129,12 +129,12 @@ def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[n
 
 def goals_of(part: Part, index: Index) -> dict[str, Any]:
     """Read each trajectory's goal as text and image: fields of `Steps`."""
-    names = [index.told[name] for name in ("target_name", "landmark", "direction", "description")]
+    names = [index.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")]
     text = [
         [goal_text(str(n), str(m), str(d), more) for more in (None, said)]
         for n, m, d, said in zip(*names, strict=True)
     ]
-    ids = index.told["reference_image_id"]
+    ids = index.goal_columns["reference_image_id"]
     known = sorted({one for one in ids if one is not None})
     place = {one: k for k, one in enumerate(known)}
     shown = [goal_picture(reference_image(part.data, part.scene, one), part.size_px) for one in known]

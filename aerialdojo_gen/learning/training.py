@@ -230,7 +230,7 @@ class _Training:
         named: tuple[str, ...] = ()
         if d.looks and d.views and self._recipe.sight.epochs:
             # Of all targets, independent of the limit on trajectories.
-            targets = set(zip(index.scene.tolist(), index.told["target_name"], strict=True))
+            targets = set(zip(index.scene.tolist(), index.goal_columns["target_name"], strict=True))
             named = name_vocabulary(str(name) for _, name in sorted(targets, key=str))
         return (index if d.limit is None else index.take(sample_evenly(index, d.limit, self._recipe.seed))), named
 

@@ -272,12 +272,12 @@ class Trajectories:
     @cached_property
     def _image_shape(self) -> tuple[int, ...]:
         # Of the selection, not of what was seen before: a batch without a picture is the same whenever it comes.
-        first = next((k for k, named in enumerate(self.index.told["reference_image_id"]) if named), None)
+        first = next((k for k, named in enumerate(self.index.goal_columns["reference_image_id"]) if named), None)
         picture = None if first is None else self._image(first)
         return (0, 0, 3) if picture is None else picture.shape
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
-        named = self.index.told["reference_image_id"][k]
+        named = self.index.goal_columns["reference_image_id"][k]
         return None if named is None else reference_image(*self.index.scene_of(k), named)
 
     def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:

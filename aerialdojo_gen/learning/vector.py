@@ -205,7 +205,7 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
         own = env.unwrapped
         if not isinstance(own, AerialDojoEnv):
             raise UsageError(f"observations are of AerialDojo-v0, not of {own}")
-        self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.told())
+        self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.goals_in_words())
         seen = own.observation_space
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)
         flat: dict[str, spaces.Space[Any]] = {

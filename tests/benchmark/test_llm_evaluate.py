@@ -45,7 +45,6 @@ def fly(smoke: Path, out: Path, url: str, *more: str, agent: str = "openai") -> 
 def shell(line: str, out: Path) -> subprocess.CompletedProcess[str]:
     """Do as a person does: in a process of its own, which logs all that the packages log."""
     environment = {"PATH": "/usr/bin:/bin", "HOME": str(out), "OPENAI_LOG": "debug", "OPENAI_API_KEY": KEY}
-    environment["PYTHONPYCACHEPREFIX"] = os.environ["PYTHONPYCACHEPREFIX"]
     return subprocess.run(line, shell=True, capture_output=True, text=True, check=False, env=environment)
 
 

@@ -24,7 +24,7 @@ def test_an_episode_has_a_text_of_its_side(smoke, subset):
     found = drawn(env)
     assert set(found) <= set(texts[env.task.row["nav_id"]])
     assert len(set(found)) > 1
-    assert set(found) <= {text for *_, text in env.told()}
+    assert set(found) <= {text for *_, text in env.goals_in_words()}
     assert env.observation_space.contains(env.reset()[0])
     assert found == drawn(env)
 
@@ -44,5 +44,5 @@ def test_sides_share_no_text_and_a_task_keeps_its_own(smoke):
 @pytest.mark.pipeline
 def test_trajectories_draw_by_their_seed(smoke):
     how = {"views": (), "rgb": False, "depth": False, "scene": SCENE, "paraphrase": "random"}
-    texts = [Trajectories(smoke, "train", seed=seed, **how).index.told["description"] for seed in (1, 1, 2)]
+    texts = [Trajectories(smoke, "train", seed=seed, **how).index.goal_columns["description"] for seed in (1, 1, 2)]
     assert texts[0] == texts[1] != texts[2]

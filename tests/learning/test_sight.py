@@ -76,7 +76,7 @@ def test_patches_are_told_by_the_names_of_what_they_show(smoke, trained):
     assert rows[-1]["accuracy"] > max(0.6, rows[0]["accuracy"] + 0.1)
     _, about, _ = checkpoints.read(trained(12))
     index = read_index(open_root(smoke), Selection(("id_train",)))
-    said = " ".join(index.told["target_name"]).lower().split()
+    said = " ".join(index.goal_columns["target_name"]).lower().split()
     assert about.named
     assert set(about.named) <= set(said)
 
