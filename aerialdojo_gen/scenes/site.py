@@ -361,11 +361,6 @@ class Footprints:
         for cell in _cells(area.bounds):
             self._buckets.setdefault(cell, []).append((area, z0_m, z1_m))
 
-    def occupy_about(self, points: Iterable[tuple[float, float]], half_m: float, z0_m: float, z1_m: float) -> None:
-        """Occupy squares about points, such as the feet of columns, between two heights."""
-        for x, y in points:
-            self.occupy(rectangle(x - half_m, y - half_m, x + half_m, y + half_m), z0_m, z1_m)
-
     def is_free(self, area: BaseGeometry, z0_m: float, z1_m: float) -> bool:
         """Whether the area is unoccupied between two heights, metres."""
         for cell in _cells(area.bounds):
