@@ -24,7 +24,7 @@ _DETOUR, _DETOUR_M = 1.03, 1.0
 # Longest lattice path per level distance, and the most that an Approach shortens it by per metre.
 _MAX_LATTICE_RATIO, _APPROACH_SAVING = 1.01, 0.45
 _SPLITS = 4
-_COS, _SIN = math.cos(TURN_RAD), math.sin(TURN_RAD)
+_COS, _SIN, _COS_HALF = math.cos(TURN_RAD), math.sin(TURN_RAD), math.cos(TURN_RAD / 2)
 
 
 @njit(cache=True, error_model="numpy")
@@ -118,9 +118,11 @@ def direct_legs(
     sign = 1.0 if dz >= 0.0 else -1.0
     cos_yaw, sin_yaw = math.cos(goal_yaw), math.sin(goal_yaw)
     best, na, nb, nz = np.inf, 0, 0, 0
-    min_total = max(0, math.ceil(along_a + along_b - approach))
+    # An Approach along the bisector of both directions saves more metres of them than it is long.
+    min_total = max(0, math.ceil(along_a + along_b - approach / _COS_HALF))
+    max_total = max(3, math.ceil(along_a + along_b - approach) + 3)
     share = along_a / max(along_a + along_b, 1e-9)
-    for total in range(min_total, min_total + 4):
+    for total in range(min_total, max_total + 1):
         middle = round(share * total)
         for p in range(max(0, middle - _SPLITS), min(total, middle + _SPLITS) + 1):
             ex, ey = dx - p * ax - (total - p) * bx, dy - p * ay - (total - p) * by

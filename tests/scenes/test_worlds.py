@@ -136,8 +136,7 @@ def test_a_knob_changes_its_part_alone() -> None:
     few, many = (draft_of(World(kind, 1002, {"occupancy": share})) for share in (0.4, 0.8))
     assert few is not None
     assert many is not None
-    rows = [entry for entry in few.tables()["site"] if entry.get("make") == "parking_rows"]
-    assert rows
+    assert [entry for entry in few.tables()["site"] if "occupancy" in entry]
     for one, other in zip(few.tables()["site"], many.tables()["site"], strict=True):
         assert {**one, "occupancy": 0} == {**other, "occupancy": 0}
 

@@ -36,7 +36,8 @@ BAD = ROUTE | {"x_m": [-5.0, -2.0, -2.0, -2.0, -2.0, 1.0], "y_m": [-5.0] * 6, "z
 
 def route_row(nav_id, setting, lists):
     goal = [lists[name][-1] for name in ("x_m", "y_m", "z_m")]
-    return {"nav_id": nav_id, "setting": setting, "target_object_id": 1, **xyz(goal, "goal_{}_m"), **lists}
+    row = {"nav_id": nav_id, "setting": setting, "target_object_id": 1, "n_actions": len(lists["action"])}
+    return {**row, **xyz(goal, "goal_{}_m"), **lists}
 
 
 def write_inputs(data, bad=BAD):
