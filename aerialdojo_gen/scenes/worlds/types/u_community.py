@@ -111,10 +111,8 @@ def _flats(draft: Draft, pose: Pose, long_m: float, k: int) -> Point | None:
 
 def _paths(draft: Draft, fronts: Sequence[Point], middle: Point) -> None:
     """Lead paths from the doors to the middle of the garden, benches beside them."""
-    path, lines = draft.material("path"), []
-    radius = draft.number(5.5, 8.0, "plaza")
-    for front in fronts:
-        lines.append(shapely.LineString([front, middle]))
+    path, radius = draft.material("path"), draft.number(5.5, 8.0, "plaza")
+    lines = [shapely.LineString([front, middle]) for front in fronts]
     ways = [[list(front), list(middle)] for front in fronts]
     draft.paint([{"ribbon": way, "width_m": 2.2, "round_ends": True} for way in ways], path)
     draft.paint({"disc": [*middle, radius]}, draft.material("plaza"))

@@ -34,14 +34,9 @@ def write(draft: Draft) -> None:
     _TOPOLOGIES[draft.topology](draft, lot)
     edge_slots(draft, "verge", lot.grown(-1.6), 5.2, (3.2, 3.2))
     edge_slots(draft, "tree", lot.grown(1.4), 6.5, (2.0, 2.0))
-    spots = [
-        (x, y, 180.0)
-        for x, y in draft.shuffled(
-            [*grid(lot.grown(-2), 3.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)], "landmarks"
-        )
-    ]
+    spots = [*grid(lot.grown(-2), 3.0), (lot.x0 + 4, lot.y1 - 4), (lot.x1 - 4, lot.y0 + 4)]
     draft.section("Landmarks")
-    draft.landmark(spots)
+    draft.landmark([(*p, 180.0) for p in draft.shuffled(spots, "landmarks")])
     draft.fill_slots()
 
 
