@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
-from aerialdojo_gen.base.rng import generator, rank
+from aerialdojo_gen.base.rng import generator, pick, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
@@ -89,7 +89,7 @@ class Draft:
 
     def pick(self, options: Sequence[T], *key: object) -> T:
         """Draw one of several, all alike likely."""
-        return options[int(self.rng(*key).integers(len(options)))]
+        return pick(options, self.rng(*key))
 
     def shuffled(self, options: Iterable[T], *key: object) -> list[T]:
         """Return all of several in a drawn order."""
