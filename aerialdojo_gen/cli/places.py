@@ -102,9 +102,9 @@ def vary(
         bool, typer.Option("--held-out", help="Use the topologies, palettes and things that no other world has.")
     ] = False,
     objects: Annotated[int, typer.Option(min=2, max=500, help="Maximum annotated objects of a world.")] = 40,
-    workers: options.Workers = None,
+    workers: options.Workers = None, executor: options.ExecutorName = "local", address: options.Address = None,
     quiet: options.Quiet = False,
-) -> None:
+) -> None:  # fmt: skip
     """Make worlds of a scene type from seeds: plans to read and edit, with annotations."""
     from aerialdojo_gen.dataset.build import default_workers
     from aerialdojo_gen.imports import worlds
@@ -115,8 +115,9 @@ def vary(
     reporter = Reporter(quiet=quiet)
     with reporter.bar("vary", worlds.count(types, chosen), unit="worlds") as bar:
         done = worlds.vary(
-            types, chosen, out, options, workers=workers or default_workers(), on_done=lambda _: bar.advance()
-        )
+            types, chosen, out, options, workers=workers or (default_workers() if executor == "local" else None),
+            executor=executor, address=address, on_done=lambda _: bar.advance(),
+        )  # fmt: skip
     made, refused = sum(one.made for one in done), sum(len(one.refused) for one in done)
     kept = f", {len(done) - made:,} there already" if made < len(done) else ""
     print(f"{out}: {made:,} worlds made{kept}, {refused:,} draws refused ({out / worlds.DRAWS})")

@@ -18,7 +18,7 @@ from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import PIPELINE, make_project
 from aerialdojo_gen.imports.drafting import draft_scene
-from aerialdojo_gen.pipeline.executors import make_executor
+from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.stage import ProjectPaths
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
@@ -54,7 +54,8 @@ class VaryOptions:
 
 def vary(
     types: Sequence[str], seeds: range, project: Path, options: VaryOptions | None = None, *,
-    workers: int = 1, on_done: Callable[[VariedWorld], object] = lambda done: None,
+    workers: int | None = 1, executor: str = "local", address: str | None = None,
+    on_done: Callable[[VariedWorld], object] = lambda done: None,
 ) -> list[VariedWorld]:  # fmt: skip
     """Write the worlds of some types (names or globs) and seeds; those that are there already stay.
 
@@ -66,8 +67,10 @@ def vary(
     project : Path
         Folder for ``scenes/``, ``annotations/``, ``pipeline.toml`` and ``draws.csv``, the table of refused draws.
     options : VaryOptions, optional
-    workers : int
-        Processes.
+    workers : int, optional
+        Processes; all of a Ray cluster's cores where None.
+    executor, address : str, optional
+        ``"ray"``, and ``HOST:PORT`` of a cluster whose machines share `project`.
     on_done : callable
         Called with each world when it is written.
 
@@ -85,10 +88,12 @@ def vary(
     worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
     names_of = {world.name: k for k, world in enumerate(worlds)}
     make_project(project)
+    project = project.resolve()
     done: list[VariedWorld] = []
     work = [_Work(world, project, options) for world in worlds]
     try:
-        with Interrupts() as interrupts, make_executor("local", workers) as pool:
+        pool_of_run = make_executor(executor, workers, address, SharedPaths(shared=(project,), written=(project,)))
+        with Interrupts() as interrupts, pool_of_run as pool:
             for one in pool.map(_write_world, work, memory_mb=_MEMORY_MB):
                 interrupts.check()
                 if isinstance(one, AerialDojoError):

@@ -18,6 +18,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.evaluation import Evaluation
 from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
+from aerialdojo_gen.imports.worlds import VaryOptions, vary
 from aerialdojo_gen.pipeline.executors import bundled, ray_worker
 from aerialdojo_gen.store.staging import AREA
 
@@ -158,6 +159,18 @@ def test_evaluate_and_validate_say_on_a_cluster_what_they_say_here(project, smok
     report = tmp_path / "faults.jsonl"
     finish(start(project, nodes, smoke, "validate", "--sample", "1", "--pictures", "1", "--report", str(report)))
     assert report.read_text() == "", "no fault"
+
+
+@pytest.mark.ray
+@pytest.mark.slow
+def test_worlds_are_made_on_a_cluster_as_they_are_here(nodes, tmp_path):
+    asked = ["U_Alley"], range(1003, 1005)
+    here, there = (tmp_path / name / "worlds" for name in ("here", "there"))
+    for folder, where in ((here, {}), (there, {"executor": "ray", "address": nodes.address, "workers": None})):
+        made = vary(*asked, folder, VaryOptions({}, n_objects=4), **where)
+        assert [one.made for one in made] == [True, True]
+    assert len(snapshot(here)) == 6
+    assert snapshot(there) == snapshot(here)
 
 
 def test_a_machine_that_cannot_work_says_why(tmp_path):
