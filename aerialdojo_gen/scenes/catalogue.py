@@ -86,7 +86,7 @@ class Catalogue:
         form = prop.designs[0] if design is None else prop.design(design)
         if stretch is not None:
             x, y, z = (own * factor for own, factor in zip(form.stretch, stretch, strict=True))
-            form = replace(form, name=f"{form.name} {x:.4f} {y:.4f} {z:.4f}", stretch=(x, y, z))
+            form = replace(form, stretch=(x, y, z))
         sizes = self._draw_params(prop, look, {**form.params, **(params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
         surfaces = dict(prop.roles) | dict(look.roles) | dict(roles or {})
@@ -96,7 +96,8 @@ class Catalogue:
             assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
-            key = (category, look.name, form.name, tuple(sizes.items()), tuple(surfaces.items()), signs, shape_seed)
+            drawn = (form.name, form.stretch, tuple(sizes.items()))
+            key = (category, look.name, *drawn, tuple(surfaces.items()), signs, shape_seed)
             if key not in self._parts:
                 if len(self._parts) >= _CACHE_SIZE:
                     self._parts.clear()
