@@ -13,7 +13,7 @@ from aerialdojo_gen.base.errors import AssetError
 # Those of the other types are at version 2.
 VERSIONS = {
     "D_Earthquake": 3, "D_Explosion": 3, "D_Flood": 3, "I_Bridge": 3, "I_RailCorridor": 3, "N_Island": 4,
-    "N_Mountain": 3, "N_Snowfield": 3, "U_Alley": 3, "U_Community": 5, "U_ConstructionSite": 3, "U_Factory": 3,
+    "N_Mountain": 3, "N_Snowfield": 3, "U_Alley": 3, "U_Community": 5, "U_ConstructionSite": 3, "U_Factory": 4,
     "U_Mall": 4, "U_ParkingLot": 5,
 }  # fmt: skip
 # Seeds of the test and of the validation worlds; all that follow are for training.

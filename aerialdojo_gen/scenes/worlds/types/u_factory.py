@@ -31,6 +31,9 @@ def write(draft: Draft) -> None:
     uses = list(_TOPOLOGIES[draft.topology][1])
     lots = sorted((lot.grown(-1.2) for lot in lots), key=lambda b: -b.width * b.depth)
     dealt = [_use(lot, uses[k % len(uses)]) for k, lot in enumerate(lots)]
+    # Offices take their ground before landmarks do, or a chimney stands in one.
+    for lot in (lot for lot, use in zip(lots, dealt, strict=True) if use == "office"):
+        draft.take(_office_box(lot).shape())
     _landmarks(draft, [lot for lot, use in zip(lots, dealt, strict=True) if use in ("yard", "green", "office")])
     for k, (lot, use) in enumerate(zip(lots, dealt, strict=True)):
         draft.section(f"A lot: {use}")
@@ -70,7 +73,8 @@ def _landmarks(draft: Draft, lots: list[Box]) -> None:
     spots = []
     for n, lot in enumerate(draft.shuffled(lots, "landmark_lots")):
         x, y = lot.middle
-        far = sorted(grid(lot.grown(-2.8), 3.0), key=lambda p: -abs(p[0] - x) - abs(p[1] - y))
+        free = [p for p in grid(lot.grown(-2.8), 3.0) if draft.is_free(shapely.Point(p))]
+        far = sorted(free, key=lambda p: -abs(p[0] - x) - abs(p[1] - y))
         spots += [(*p, draft.pick(SIDES, "landmark", n)) for p in far[:12]]
     draft.landmark(spots)
 
@@ -197,12 +201,9 @@ def _power(draft: Draft, lot: Box, k: int) -> None:
 
 def _office(draft: Draft, lot: Box, k: int) -> None:
     """Put up offices, with bays for cars before them."""
-    along_x = lot.width >= lot.depth
-    deep = min(11.0, (lot.depth if along_x else lot.width) - 8.5)
-    if deep < 6.0:
+    box, along_x = _office_box(lot), lot.width >= lot.depth
+    if min(box.width, box.depth) < 6.0:
         return _yard(draft, lot, k)
-    box = (Box(lot.x0 + 1, lot.y1 - 1 - deep, lot.x1 - 1, lot.y1 - 1) if along_x
-           else Box(lot.x1 - 1 - deep, lot.y0 + 1, lot.x1 - 1, lot.y1 - 1))  # fmt: skip
     storeys = max(2, round(draft.knob("storeys")) - draft.whole(0, 1, "office", k))
     draft.paint(lot.rounded(), draft.material("road"))
     front = 270.0 if along_x else 180.0
@@ -214,6 +215,13 @@ def _office(draft: Draft, lot: Box, k: int) -> None:
         row = [round(at[0], 2), round(at[1], 2), front + 180.0, count]
         draft.make("parking_rows", rows=[row], occupancy=draft.number(0.3, 0.7, "cars", k))
     return None
+
+
+def _office_box(lot: Box) -> Box:
+    """Where offices stand on their lot: at its far side, along it."""
+    if lot.width >= lot.depth:
+        return Box(lot.x0 + 1, lot.y1 - 1 - min(11.0, lot.depth - 8.5), lot.x1 - 1, lot.y1 - 1)
+    return Box(lot.x1 - 1 - min(11.0, lot.width - 8.5), lot.y0 + 1, lot.x1 - 1, lot.y1 - 1)
 
 
 def _yard(draft: Draft, lot: Box, k: int) -> None:
