@@ -104,6 +104,18 @@ class ColumnIndex:
         )  # fmt: skip
         return below, next_m, away_m
 
+    def gaps_m(self, points: Floats, own: int, owner: Ints, deep_m: float) -> Floats:
+        """Air below points (n, 3) down to triangles of another owner than `own`, (n,) metres; inf where is none.
+
+        Zero where a point is sunk: where one that faces up is above it, no higher than `deep_m`.
+        """
+        return np.asarray(
+            _gaps_below(
+                np.ascontiguousarray(points), own, owner, deep_m, self.triangles, self.low[0], self.low[1],
+                self.bin_m, self.shape[0], self.shape[1], self.first, self.member,
+            )
+        )  # fmt: skip
+
 
 @njit(cache=True, inline="always")
 def _height(x: float, y: float, t: Floats, k: int) -> float:
@@ -233,3 +245,30 @@ def _find_layers(
             last = h
             if abs(h - z) < abs(away_m[p]):
                 away_m[p] = h - z
+
+
+@njit(cache=True)
+def _gaps_below(
+    points: Floats, own: int, owner: Ints, deep: float, t: Floats, x0: float, y0: float, edge: float, nx: int,
+    ny: int, first: Ints, member: Ints,
+) -> Floats:  # fmt: skip
+    out = np.full(len(points), np.inf)
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        if not (x >= x0 and y >= y0):
+            continue
+        i, j = int((x - x0) / edge), int((y - y0) / edge)
+        if i >= nx or j >= ny:
+            continue
+        for m in range(first[i * ny + j], first[i * ny + j + 1]):
+            k = member[m]
+            if owner[k] == own:
+                continue
+            h = _height(x, y, t, k)
+            if h <= z:
+                out[p] = min(out[p], z - h)
+            elif h - z <= deep:
+                ax, ay = t[k, 3] - t[k, 0], t[k, 4] - t[k, 1]
+                if ax * (t[k, 7] - t[k, 1]) > ay * (t[k, 6] - t[k, 0]):
+                    out[p] = 0.0
+    return out

@@ -108,6 +108,13 @@ class CollisionWorld:
             manager.setup()
             return manager
 
+    def within(self, one: int, other: int, reach_m: float) -> bool:
+        """Whether the surfaces of two instances, by their index, meet or are no further apart than `reach_m`."""
+        a, b = self._object(one), self._object(other)
+        if fcl.collide(a, b, self._request, fcl.CollisionResult()):
+            return True
+        return bool(fcl.distance(a, b, self._distances, fcl.DistanceResult()) <= reach_m)
+
     def sphere_in_collision(self, p: ArrayLike, radius_m: float) -> bool:
         """Whether a ball (centre (3,), world metres) touches a surface."""
         x, y, z = np.asarray(p, np.float64).tolist()
