@@ -1,7 +1,8 @@
 """The check that nothing hovers: what a scene holds touches the rest of it, and things rest on what is below them.
 
-It is measured on the mesh alone, on its triangles and by FCL. A thing rests where its points that have something within
-5 cm below them, or are sunk into something, surround its middle: that of its feet, or that of its surface. One that does not rest may hang, as signs do on walls: then it touches the rest, and has half a metre of air below.
+It is measured on the mesh alone, on its triangles and by FCL. A thing rests where its points that have something
+within 5 cm below them, or are sunk into something, surround its middle: that of its feet, or that of its surface. One
+that does not rest may hang, as signs do on walls: then it touches the rest, and has half a metre of air below.
 """
 
 from __future__ import annotations
