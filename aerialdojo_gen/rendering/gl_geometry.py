@@ -29,7 +29,8 @@ Singles = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
 CHUNK_TRIANGLES = 96
-_LARGEST_TEXTURE = 512
+_LARGEST_TEXTURE, _COARSE_PX = 512, 256
+_FINE = "FINE"  # Tag of what has a texture larger than most
 _MORTON_BITS = 16
 # Cosine of the angle between two faces beyond which the edge between them is sharp: of land, of things, by material.
 _LAND, _THINGS = 0.45, 0.7
@@ -39,7 +40,8 @@ _GRAINED = frozenset({*NATURAL, "asphalt", "hedge"})
 _GRAIN_SPREAD, _GRAIN_MOST = 0.7, 11.0  # of the pattern's own, and of 255: from afar joints and stones are one tone
 # What is drawn first hides most.
 _ORDER: tuple[tuple[str, ...], ...] = (
-    ("TEXTURED",), (), ("TEXTURED", "SHINY"), ("SHINY",), ("TEXTURED", "NATURAL"), ("TEXTURED", "NATURAL", "SHINY"),
+    ("TEXTURED", _FINE), ("TEXTURED",), (), ("TEXTURED", _FINE, "SHINY"), ("TEXTURED", "SHINY"), ("SHINY",),
+    ("TEXTURED", "NATURAL"), ("TEXTURED", "NATURAL", "SHINY"),
 )  # fmt: skip
 
 # Three vertices a triangle, none shared: normal, colour and instance are those of the face.
@@ -96,11 +98,17 @@ class Kind:
 
 
 def own_kinds(scene: Scene) -> list[Kind]:
-    """Pack a scene's catalogue materials and its horizon by what draws them; all share one texture array."""
-    names = [name for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
-    grained = [name.split(":")[0] in _GRAINED for name in names]
+    """Pack a scene's catalogue materials and its horizon by what draws them; two texture arrays by size serve all."""
+    named = [(name, m) for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
+    sizes: dict[bool, list[str]] = {
+        fine: [name for name, m in named if _is_fine(m) == fine] for fine in (False, True)
+    }
     # What has grain has a layer of it behind its own.
-    layer = {name: float(k + sum(grained[:k])) for k, name in enumerate(names)}
+    layer = {
+        name: float(k + sum(one in _GRAINED for one in _bases(names[:k])))
+        for names in sizes.values()
+        for k, name in enumerate(names)
+    }
     rows: dict[tuple[str, ...], list[NDArray[np.void]]] = {tags: [] for tags in _ORDER}
     far: list[tuple[NDArray[np.void], tuple[str, ...]]] = []
     beyond = [instance for instance in scene.backdrop if instance.surface == HORIZON]
@@ -117,7 +125,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
             if k < 0:
                 far.append((found, (*_tags(material), "HORIZON")))
             else:
-                rows[_tags(material)].append(found)
+                rows.setdefault(_tags(material), []).append(found)
                 # Buildings are flat: shallow roofs have a ridge.
                 crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else None)
                 if crease is not None:
@@ -129,8 +137,9 @@ def own_kinds(scene: Scene) -> list[Kind]:
         smooth(*(found for found, _ in far), crease=_LAND)
     for found, tags in far:
         rows.setdefault(tags, []).append(found)
-    layers = _layers(scene, names, grained)
-    return [Kind(cut(some), tags, layers if "TEXTURED" in tags else None) for tags, some in rows.items()]
+    layers = {fine: _layers(scene, names) for fine, names in sizes.items()}
+    own = {tags: layers[_FINE in tags] if "TEXTURED" in tags else None for tags in rows}
+    return [Kind(cut(some), tags, own[tags]) for tags, some in rows.items()]
 
 
 def _tags(material: Material) -> tuple[str, ...]:
@@ -138,6 +147,7 @@ def _tags(material: Material) -> tuple[str, ...]:
     tags: tuple[str, ...] = ()
     if material.texture is not None:
         tags = ("TEXTURED", "NATURAL") if material.name.split(":")[0] in _GRAINED else ("TEXTURED",)
+        tags = (*tags, _FINE) if _is_fine(material) else tags
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
@@ -223,7 +233,16 @@ def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
     return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
 
 
-def _layers(scene: Scene, names: list[str], grained: list[bool]) -> NDArray[np.uint8] | None:
+def _is_fine(material: Material) -> bool:
+    """Whether a texture is of façades, so large that those of others would be blown up for it."""
+    return material.texture is not None and max(material.texture.shape[:2]) > _COARSE_PX
+
+
+def _bases(names: list[str]) -> list[str]:
+    return [name.split(":")[0] for name in names]
+
+
+def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
     textures = [t for name in names if (t := scene.materials[name].texture) is not None]
     if not textures:
         return None
@@ -231,11 +250,11 @@ def _layers(scene: Scene, names: list[str], grained: list[bool]) -> NDArray[np.u
     while edge < min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures)):
         edge *= 2
     layers: list[NDArray[np.uint8]] = []
-    for texture, grain in zip(textures, grained, strict=True):
+    for texture, base in zip(textures, _bases(names), strict=True):
         larger = max(texture.shape[:2]) > edge
         sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)
         layers.append(cv2.transform(sized, MUTE))
-        if grain:
+        if base in _GRAINED:
             mean, spread = (
                 layers[-1].mean(axis=(0, 1)),
                 np.minimum(_GRAIN_SPREAD * layers[-1].std(axis=(0, 1)), _GRAIN_MOST),

@@ -62,24 +62,27 @@ def building(
 
 
 def facade(plan: Polygon, z0_m: float, z1_m: float, tile_m: float) -> Mesh:
-    """Make the outer walls of a plan, each with a whole number of texture tiles across and of half tiles up.
+    """Make the outer walls of a plan, each a whole number of half texture tiles across and of quarters up.
 
-    A façade's tile is two storeys high and one or two windows wide, so that no window is cut at a corner or an eave.
+    A façade's tile is four storeys high and an even number of bays wide, so that no window is cut at a corner or an
+    eave; walls that meet begin with its two halves in turn.
     """
-    up = max(round((z1_m - z0_m) / (tile_m / 2)), 1) * tile_m / 2
+    half, quarter = tile_m / 2, tile_m / 4
+    up = max(round((z1_m - z0_m) / quarter), 1) * quarter
     vertices: list[tuple[float, float, float]] = []
     faces: list[tuple[int, int, int]] = []
     uvs: list[tuple[tuple[float, float], ...]] = []
     outline = orient(plan)
     for ring in (outline.exterior, *outline.interiors):
         xy = [(float(x), float(y)) for x, y in ring.coords]
-        for (ax, ay), (bx, by) in pairwise(xy):
+        for n, ((ax, ay), (bx, by)) in enumerate(pairwise(xy)):
             length = float(np.hypot(bx - ax, by - ay))
-            across = max(round(length / tile_m), 1) * tile_m if length > 0.7 * tile_m else length
+            u0 = n % 2 * half
+            u1 = u0 + (max(round(length / half), 1) * half if length > 0.7 * half else length)
             k = len(vertices)
             vertices += [(ax, ay, z0_m), (bx, by, z0_m), (bx, by, z1_m), (ax, ay, z1_m)]
             faces += [(k, k + 1, k + 2), (k, k + 2, k + 3)]
-            uvs += [((0.0, 0.0), (across, 0.0), (across, up)), ((0.0, 0.0), (across, up), (0.0, up))]
+            uvs += [((u0, 0.0), (u1, 0.0), (u1, up)), ((u0, 0.0), (u1, up), (u0, up))]
     return mesh(vertices, faces, np.array(uvs))
 
 

@@ -3,35 +3,47 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from aerialdojo_gen.base import safe_parse
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Material
 from aerialdojo_gen.scenes.noise import balanced
 from aerialdojo_gen.scenes.textures_built import BUILT
+from aerialdojo_gen.scenes.textures_facade import Layout, draw_facade
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
-_KEYS = {"texture", "colour", "tile_m"}
+_KEYS = {"texture", "colour", "tile_m", "layouts"}
 _SMALLEST_TILE_M, _LARGEST_TILE_M = 0.01, 1000.0
+
+
+@dataclass(frozen=True)
+class _Entry:
+    texture: str | None
+    colour: str
+    tile_m: float = 1.0
+    layouts: Mapping[str, Layout] | None = None  # Of a façade, in place of a texture
 
 
 class MaterialLibrary:
     """The surfaces of `materials.toml`, made on first use.
 
     A material's specification is a name (``"brick"``), a name with a colour (``"brick:#8a4b3c"``) or a bare colour
-    (``"#8a4b3c"``).
+    (``"#8a4b3c"``); of a façade also a name with a colour or none, and a layout (``"facade_flats::loggias"``).
     """
 
-    def __init__(self, entries: dict[str, tuple[str | None, str, float]], source: str) -> None:
+    def __init__(self, entries: dict[str, _Entry], source: str) -> None:
         self._entries = entries
         self._source = source
         self._cache: dict[str, Material] = {}
@@ -43,28 +55,50 @@ class MaterialLibrary:
 
     def check(self, spec: str, where: str) -> None:
         """Raise an `AssetError` that begins with `where` if `spec` names no material."""
-        name, _, colour = spec.partition(":")
-        if _COLOUR.fullmatch(spec) or (name in self._entries and (not colour or _COLOUR.fullmatch(colour))):
+        name, colour, layout = _split(spec)
+        if _COLOUR.fullmatch(spec):
             return
-        if name in self._entries or name.startswith("#"):
+        if name.startswith("#") or (name in self._entries and colour and not _COLOUR.fullmatch(colour)):
             raise AssetError(f"{where}: colour of material {spec!r} is not of the form #rrggbb")
-        raise AssetError(f"{where}: unknown material {name!r}{nearest(name, self._entries)} (see {self._source})")
+        if name not in self._entries:
+            raise AssetError(f"{where}: unknown material {name!r}{nearest(name, self._entries)} (see {self._source})")
+        known = self.layouts(name)
+        if layout and layout not in known:
+            raise AssetError(f"{where}: {name} has no layout {layout!r}{nearest(layout, known)} (see {self._source})")
+
+    def layouts(self, spec: str) -> tuple[str, ...]:
+        """Names of the layouts that a façade comes in; none of other surfaces."""
+        entry = self._entries.get(_split(spec)[0])
+        return tuple(entry.layouts or ()) if entry else ()
+
+    def laid_out(self, spec: str, draw: int) -> str:
+        """Give a façade the layout that a number draws, unless its specification names one."""
+        (name, colour, layout), known = _split(spec), self.layouts(spec)
+        return spec if layout or not known else f"{name}:{colour}:{known[draw % len(known)]}"
 
     def __getitem__(self, spec: str) -> Material:
         """Make or look up the material of a specification; its name is the specification."""
         if spec not in self._cache:
             self.check(spec, "material")
-            name, _, colour = spec.partition(":")
-            texture, default, tile_m = self._entries.get(name, (None, spec, 1.0))
-            rgb = parse_colour(colour or default)
-            image = None if texture is None else make_texture(texture, rgb)
+            name, colour, _ = _split(spec)
+            entry = self._entries.get(name, _Entry(None, spec))
+            rgb = parse_colour(colour or entry.colour)
+            image = None
+            if entry.layouts:
+                layout = _split(self.laid_out(spec, 0))[2]
+                image = _bytes(
+                    draw_facade(entry.layouts[layout], np.array(rgb, float), entry.tile_m, f"{name} {layout}")
+                )
+            elif entry.texture is not None:
+                image = make_texture(entry.texture, rgb)
             mean = rgb if image is None else tuple(int(c) for c in image.reshape(-1, 3).mean(axis=0).round())
-            self._cache[spec] = Material(spec, (mean[0], mean[1], mean[2]), image, tile_m)
+            self._cache[spec] = Material(spec, (mean[0], mean[1], mean[2]), image, entry.tile_m)
         return self._cache[spec]
 
     def tile_m(self, spec: str) -> float:
         """Edge of a texture tile of a material, metres; 1 for a flat colour."""
-        return self[spec].tile_m
+        self.check(spec, "material")
+        return self._entries.get(_split(spec)[0], _Entry(None, spec)).tile_m
 
 
 def load_materials(path: Path) -> MaterialLibrary:
@@ -82,8 +116,28 @@ def load_materials(path: Path) -> MaterialLibrary:
             raise AssetError(f"{where}: colour must be of the form #rrggbb, got {colour!r}")
         if not isinstance(tile_m, int | float) or not _SMALLEST_TILE_M <= tile_m <= _LARGEST_TILE_M:
             raise AssetError(f"{where}: tile_m must be {_SMALLEST_TILE_M:g} to {_LARGEST_TILE_M:g} m, got {tile_m!r}")
-        entries[name] = (texture, colour, float(tile_m))
+        if texture is not None and "layouts" in body:
+            raise AssetError(f"{where} has a texture or layouts, not both")
+        entries[name] = _Entry(texture, colour, float(tile_m), _layouts(body.get("layouts", {}), where))
     return MaterialLibrary(entries, path.name)
+
+
+def _layouts(raw: Any, where: str) -> dict[str, Layout]:
+    if not isinstance(raw, dict) or not all(name.isidentifier() for name in raw):
+        raise AssetError(f"{where}: layouts are tables by names of letters, digits and _")
+    made = {}
+    for name, body in raw.items():
+        try:
+            made[name] = Layout.model_validate(body)
+        except ValidationError as error:
+            raise AssetError(f"{where}: layout {name!r}: {'; '.join(explain(error, Layout))}") from error
+    return made
+
+
+def _split(spec: str) -> tuple[str, str, str]:
+    """Give the name, the colour and the layout of a specification, empty where it has none."""
+    name, colour, layout = (*spec.split(":", 2), "", "")[:3]
+    return name, colour, layout
 
 
 def parse_colour(text: str) -> tuple[int, int, int]:
@@ -117,6 +171,10 @@ def make_texture(name: str, colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     image = TEXTURES[name](base)
     if name in NATURAL:
         image = balanced(image, base)
+    return _bytes(image)
+
+
+def _bytes(image: NDArray[np.float64]) -> NDArray[np.uint8]:
     out = np.clip(np.rint(image), 0, 255).astype(np.uint8)
     out.flags.writeable = False
     return out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Unpack, overload
 
@@ -253,7 +254,8 @@ class Site:
     ) -> Instance:
         """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
         name = self._reserve_node(node or self.node(category))
-        instance = Instance(name, category, variant, dict(attributes or {}), placed(self._as_parts(parts), (0, 0, 0)))
+        shape = tuple(replace(part, material=self._laid_out(part.material, name)) for part in self._as_parts(parts))
+        instance = Instance(name, category, variant, dict(attributes or {}), placed(shape, (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
         self.instances.append(instance)
@@ -261,6 +263,11 @@ class Site:
             low, high = instance.bounds[:, 2]
             self._footprints.add(footprint, float(low), float(high))
         return instance
+
+    def _laid_out(self, material: str, node: str) -> str:
+        """Draw the layout of a node's façades: all of one kind have the same."""
+        kind = material.partition(":")[0]
+        return self.catalogue.materials.laid_out(material, rank(self.head.seed, "facade", self.name, node, kind))
 
     def part(self, body: Mesh, material: str) -> Part:
         """Give a mesh in world coordinates a material; its pattern runs on from its neighbours'."""

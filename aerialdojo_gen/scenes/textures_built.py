@@ -1,4 +1,4 @@
-"""Textures of masonry, paving, roofs, metal, cloth and façades; see `aerialdojo_gen.scenes.materials`."""
+"""Textures of masonry, paving, roofs, metal, glass and cloth; see `aerialdojo_gen.scenes.materials`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 
 from aerialdojo_gen.scenes.noise import Floats, fractal, shade, texture_rng, value_noise
-from aerialdojo_gen.scenes.textures_facade import FACADES
 
 Generator = Callable[[Floats], Floats]
 _LIGHT = np.array([205.0, 198.0, 188.0])
@@ -184,6 +183,13 @@ def chain_link(colour: Floats) -> Floats:
     return np.where((wire < 0.22)[..., None], colour, colour * 0.42 + 14.0)
 
 
+def glass(colour: Floats) -> Floats:
+    """A single pane with slanting reflections, drawn for 2 m."""
+    y, x = np.mgrid[0:128, 0:128] / 128.0
+    streak = np.sin(2 * np.pi * (x + y)) + 0.5 * np.sin(2 * np.pi * (2 * x + 2 * y) + 1.0)
+    return shade(colour, 1.0 + 0.12 * streak)
+
+
 def _courses(
     name: str, colour: Floats, size: int, rows: int, columns: int, joint: int, mortar: Floats, spread: float
 ) -> Floats:
@@ -215,5 +221,5 @@ def _slabs(name: str, colour: Floats, size: int, count: int, joint: int, spread:
 BUILT: dict[str, Generator] = {
     f.__name__: f
     for f in (brick, blocks, paving, tiles, cobbles, asphalt, concrete, plaster, planks, boards, logs, roof_tiles,
-              shingles, corrugated, metal, rust, fabric, stripes, hazard, checker, chain_link)
-} | FACADES  # fmt: skip
+              shingles, corrugated, metal, rust, glass, fabric, stripes, hazard, checker, chain_link)
+}  # fmt: skip

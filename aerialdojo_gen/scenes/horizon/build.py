@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import placed, single
 from aerialdojo_gen.scenes.horizon.border import border_of
 from aerialdojo_gen.scenes.horizon.kinds import kind_of
@@ -37,7 +37,7 @@ def make_horizon(
     noise, rng = Noise(head.seed, scene), generator(head.seed, "horizon-things", scene)
     land = make_land(border, kind, float(bounds[1, 2]) + _ABOVE_M, noise)
     things = things_on(land, kind, bounds, noise, rng, MAX_TRIANGLES - len(land.faces))
-    parts = _merged([*_land_parts(land, materials), *_thing_parts(things, materials)])
+    parts = _merged([*_land_parts(land, materials), *_thing_parts(scene, things, materials)])
     return (Instance(HORIZON, HORIZON, "", {}, parts, surface=HORIZON),)
 
 
@@ -50,9 +50,11 @@ def _land_parts(land: Land, materials: MaterialLibrary) -> Iterable[Part]:
         yield Part(vertices, faces.reshape(-1, 3).astype(np.int32), uv, name)
 
 
-def _thing_parts(things: Iterable[Thing], materials: MaterialLibrary) -> Iterable[Part]:
-    for bodies, at, turn in things:
-        named = [(_known(name, materials), body) for name, body in bodies]
+def _thing_parts(scene: str, things: Iterable[Thing], materials: MaterialLibrary) -> Iterable[Part]:
+    for k, (bodies, at, turn) in enumerate(things):
+        # Two layouts of each façade: what is far away is worth no more pictures.
+        draw = rank(0, "horizon-facade", scene, k % 2)
+        named = [(materials.laid_out(_known(name, materials), draw), body) for name, body in bodies]
         parts = [to_part(body, name, materials.tile_m(name)) for name, body in named]
         yield from placed(parts, tuple(at), float(np.degrees(turn)))
 
