@@ -18,7 +18,7 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
-from aerialdojo_gen.rendering.lighting import is_shiny
+from aerialdojo_gen.rendering.lighting import is_fine, is_shiny, texel_m
 from aerialdojo_gen.rendering.shading import MUTE, muted
 from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 from aerialdojo_gen.scenes.noise import fractal, texture_rng
@@ -29,7 +29,7 @@ Singles = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
 CHUNK_TRIANGLES = 96
-_LARGEST_TEXTURE, _COARSE_PX = 512, 256
+_LARGEST_TEXTURE = 512
 _FINE = "FINE"  # Tag of what has a texture larger than most
 _MORTON_BITS = 16
 # Cosine of the angle between two faces beyond which the edge between them is sharp: of land, of things, by material.
@@ -100,9 +100,7 @@ class Kind:
 def own_kinds(scene: Scene) -> list[Kind]:
     """Pack a scene's catalogue materials and its horizon by what draws them; two texture arrays by size serve all."""
     named = [(name, m) for name, m in sorted(scene.materials.items()) if m.texture is not None and not m.atlas]
-    sizes: dict[bool, list[str]] = {
-        fine: [name for name, m in named if _is_fine(m) == fine] for fine in (False, True)
-    }
+    sizes: dict[bool, list[str]] = {fine: [name for name, m in named if is_fine(m) == fine] for fine in (False, True)}
     # What has grain has a layer of it behind its own.
     layer = {
         name: float(k + sum(one in _GRAINED for one in _bases(names[:k])))
@@ -120,7 +118,7 @@ def own_kinds(scene: Scene) -> list[Kind]:
                 continue
             found = packed(part, material, k)
             if material.texture is not None:
-                found["texel_m"] = material.tile_m / material.texture.shape[1]
+                found["texel_m"] = texel_m(material)
                 found["layer"] = layer[part.material]
             if k < 0:
                 far.append((found, (*_tags(material), "HORIZON")))
@@ -147,7 +145,7 @@ def _tags(material: Material) -> tuple[str, ...]:
     tags: tuple[str, ...] = ()
     if material.texture is not None:
         tags = ("TEXTURED", "NATURAL") if material.name.split(":")[0] in _GRAINED else ("TEXTURED",)
-        tags = (*tags, _FINE) if _is_fine(material) else tags
+        tags = (*tags, _FINE) if is_fine(material) else tags
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
@@ -231,11 +229,6 @@ def cut(parts: list[NDArray[np.void]], double_sided: bool = False) -> Chunks:
 
 def _positions(triangles: NDArray[np.void]) -> NDArray[np.float32]:
     return np.ascontiguousarray(triangles["position"].reshape(-1, 9), dtype=np.float32)
-
-
-def _is_fine(material: Material) -> bool:
-    """Whether a texture is of façades, so large that those of others would be blown up for it."""
-    return material.texture is not None and max(material.texture.shape[:2]) > _COARSE_PX
 
 
 def _bases(names: list[str]) -> list[str]:

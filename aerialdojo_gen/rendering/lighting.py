@@ -28,6 +28,7 @@ _CLOUDS_PX = 256
 _HEIGHT_CELLS, _BLUR_M = 256, 1.6
 # The highest that it tells from higher ones, above the lowest ground, metres.
 REACH_M = 60.0
+_COARSE_PX, _WINDOWS_STAY = 256, 3.0
 # Surfaces in which the sky is mirrored.
 _SHINY = frozenset({"water", "glass", "window", "curtain_wall", "ice"})
 
@@ -96,7 +97,7 @@ def light_of(scene: Scene, materials: Sequence[str] = (), light: Light | None = 
     zenith, horizon = sky * np.array([0.72, 0.84, 0.97]), sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
     return Lighting(
         colour=np.array([m.colour for m in found], dtype=np.float64).reshape(-1, 3),
-        texel_m=np.array([_texel_m(m) for m in found]),
+        texel_m=np.array([texel_m(m) for m in found]),
         unlit=np.array([m.unlit for m in found], dtype=bool),
         shiny=np.array([float(is_shiny(m)) for m in found]),
         sun=sun,
@@ -116,10 +117,18 @@ def is_shiny(material: Material) -> bool:
     return not material.foreign and material.name.split(":")[0] in _SHINY
 
 
-def _texel_m(material: Material) -> float:
+def is_fine(material: Material) -> bool:
+    """Whether a texture is larger than those of surfaces without openings: it shows a façade."""
+    return material.texture is not None and max(material.texture.shape[:2]) > _COARSE_PX
+
+
+def texel_m(material: Material) -> float:
+    """Edge of a texel, metres, by which a pattern fades with distance; rows of windows are seen from far away."""
     if material.atlas:
         return _ENDLESS_M
-    return 0.0 if material.texture is None else material.tile_m / material.texture.shape[1]
+    if material.texture is None:
+        return 0.0
+    return material.tile_m / material.texture.shape[1] * (_WINDOWS_STAY if is_fine(material) else 1.0)
 
 
 @lru_cache(maxsize=8)

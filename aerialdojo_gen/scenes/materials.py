@@ -71,9 +71,14 @@ class MaterialLibrary:
         entry = self._entries.get(_split(spec)[0])
         return tuple(entry.layouts or ()) if entry else ()
 
-    def laid_out(self, spec: str, draw: int) -> str:
-        """Give a façade the layout that a number draws, unless its specification names one."""
+    def laid_out(self, spec: str, draw: int, flush: bool = False) -> str:
+        """Give a façade the layout that a number draws, unless its specification names one.
+
+        Before flush ones balconies can be built.
+        """
         (name, colour, layout), known = _split(spec), self.layouts(spec)
+        if flush and known:
+            known = tuple(k for k, one in (self._entries[name].layouts or {}).items() if one.flush) or known
         return spec if layout or not known else f"{name}:{colour}:{known[draw % len(known)]}"
 
     def __getitem__(self, spec: str) -> Material:

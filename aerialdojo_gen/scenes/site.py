@@ -254,7 +254,7 @@ class Site:
     ) -> Instance:
         """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
         name = self._reserve_node(node or self.node(category))
-        shape = tuple(replace(part, material=self._laid_out(part.material, name)) for part in self._as_parts(parts))
+        shape = tuple(replace(part, material=self.laid_out(part.material, name)) for part in self._as_parts(parts))
         instance = Instance(name, category, variant, dict(attributes or {}), placed(shape, (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
@@ -264,10 +264,11 @@ class Site:
             self._footprints.add(footprint, float(low), float(high))
         return instance
 
-    def _laid_out(self, material: str, node: str) -> str:
-        """Draw the layout of a node's façades: all of one kind have the same."""
-        kind = material.partition(":")[0]
-        return self.catalogue.materials.laid_out(material, rank(self.head.seed, "facade", self.name, node, kind))
+    def laid_out(self, material: str, node: str, flush: bool = False) -> str:
+        """Draw the layout of a node's façades, or one without balconies; nodes that differ by one in number differ."""
+        row = node.rstrip("0123456789")
+        first = rank(self.head.seed, "facade", self.name, row, material.partition(":")[0])
+        return self.catalogue.materials.laid_out(material, first + int(node[len(row) :] or 0), flush)
 
     def part(self, body: Mesh, material: str) -> Part:
         """Give a mesh in world coordinates a material; its pattern runs on from its neighbours'."""

@@ -76,6 +76,11 @@ class Layout(BaseModel):
         """Number of bays across a tile."""
         return len(self.rows[0].split())
 
+    @property
+    def flush(self) -> bool:
+        """Whether it has no balconies."""
+        return not any(one.rail or one.recess or one.parapet is not None for one in self.openings.values())
+
 
 def draw_facade(layout: Layout, colour: Floats, tile_m: float, name: str) -> Floats:
     """Draw a tile of a layout: (SIZE, SIZE, 3), a storey's floor at the lower edge; the pattern is the name's."""

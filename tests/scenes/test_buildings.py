@@ -18,13 +18,14 @@ from aerialdojo_gen.scenes.mesh import to_part
 @given(st.floats(5, 40), st.floats(5, 40), st.integers(1, 6), st.floats(0, 360))
 def test_facades_show_whole_windows_on_every_wall(x, y, storeys, turn):
     plan = rotate(rectangle(0, 0, x, y), turn)
-    walls = facade(plan, 1.0, 1.0 + 3.1 * storeys, 6.4)
-    part = to_part(walls, "facade", 6.4)
+    walls = facade(plan, 1.0, 1.0 + 3.1 * storeys, 12.8)
+    part = to_part(walls, "facade", 12.8)
     corners = part.uv[part.faces].reshape(-1, 2)
-    # Tiles are two windows wide and two storeys high: corners lie on whole tiles across, on half tiles up.
-    np.testing.assert_allclose(corners[:, 0], np.rint(corners[:, 0]), atol=1e-5)
-    np.testing.assert_allclose(corners[:, 1] * 2, np.rint(corners[:, 1] * 2), atol=1e-5)
-    assert corners[:, 1].max() * 2 == pytest.approx(storeys, abs=1)
+    # Tiles are an even number of bays wide and four storeys high: corners lie on half tiles across, on quarters up.
+    np.testing.assert_allclose(corners[:, 0] * 2, np.rint(corners[:, 0] * 2), atol=1e-5)
+    np.testing.assert_allclose(corners[:, 1] * 4, np.rint(corners[:, 1] * 4), atol=1e-5)
+    assert corners[:, 1].max() * 4 == pytest.approx(storeys, abs=1)
+    assert set(corners[:, 0] % 1.0) == {0.0, 0.5}
     c = walls.vertices[walls.faces]
     normals = np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0])
     assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2 * (x + y) * 3.1 * storeys)

@@ -54,9 +54,10 @@ def flats(
                 parts.append(("glass", _leaf(s * (d - 0.05), s * (d + 0.04), w - 0.7, w + 0.7, 1.0, 2.2)))
     site.add(None, "flats_base", frame.parts(parts), {"place": name}, footprint=frame.area(low))
     sign: Parts = [("marking", letters(name.split()[-1], 1.8, (d + 0.02, half - 2.4, top - 2.6), 0.0, 0.08))]
+    node = site.node("flats")
     building(
-        site, frame.area(rectangle(-d, -half, d, half)), wall=wall, roof=roof, storeys=storeys - 1,
-        storey_m=_STOREY_M, z=_STOREY_M, category="flats", attributes={"place": name},
+        site, frame.area(rectangle(-d, -half, d, half)), wall=site.laid_out(wall, node, flush=True), roof=roof,
+        storeys=storeys - 1, storey_m=_STOREY_M, z=_STOREY_M, node=node, category="flats", attributes={"place": name},
         extra=[*frame.parts(sign), *frame.parts(_balconies(size_m[0], d, storeys, band))],
     )  # fmt: skip
     return top
