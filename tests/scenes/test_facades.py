@@ -4,8 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from support.layout_checks import blank_site
-from support.settings import ASSETS
+from support.layout_checks import ASSETS, blank_site
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.rendering.lighting import is_fine, texel_m
@@ -78,7 +77,7 @@ def test_a_plan_can_name_a_layout():
 
 
 def test_built_balconies_stand_before_flush_walls():
-    site = blank_site("U_T_0", size_m=(400, 400))
+    site = blank_site("U_T_0", size_m=400)
     for k in range(8):
         flats(site, at=(-150.0 + 40 * k, 0.0), yaw_deg=0.0, size_m=(30.0, 12.0), storeys=4, wall="facade_flats",
               band="steel", name=f"house {k}")  # fmt: skip
