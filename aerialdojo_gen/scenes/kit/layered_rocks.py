@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -11,12 +11,15 @@ import shapely
 from pydantic import Field
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.grammar_frames import Parts
 from aerialdojo_gen.scenes.grammar_scatter import slab
 from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.mesh import Floats, Mesh
 from aerialdojo_gen.scenes.plans.values import Area, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -52,15 +55,19 @@ def _layered_rock(site: Site, rock: Rock, bands: Sequence[str], cap: str | None)
     rng = site.rng_for("strata", rock.name)
     count = max(round((top - low) / 1.3), 2)
     cuts = np.linspace(low, top, count + 1)
-    cuts[1:-1] += rng.uniform(-0.35, 0.35, size=count - 1)
+    cuts[1:-1] += rng.uniform(-0.5, 0.5, size=count - 1)
     noise = OpenSimplex(seed=site.head.seed * 13 + _number(rock.name))
     parts: Parts = []
     for k in range(count):
-        # Hard layers jut out over soft ones; the topmost is hard, and caps the rest.
+        # Hard layers jut out over soft ones; the topmost is hard, and caps the rest: things stand on it.
+        last = k == count - 1
         hard = 0.28 if (count - 1 - k) % 2 == 0 else -0.12
-        inset = rock.batter * (float(cuts[k]) - low) - hard + float(rng.uniform(-0.1, 0.1))
-        outline = _weathered(area.buffer(-max(inset, -0.3)), noise, float(k) * 0.35).intersection(site.extent)
-        parts += [(bands[k % len(bands)], slab(p, float(cuts[k]), float(cuts[k + 1]))) for p in polygons_of(outline)]
+        inset = rock.batter * (float(cuts[k]) - low) - hard + float(rng.uniform(-1.0, 1.0)) * (0.1 if last else 0.3)
+        gullies = 0.9 * (1.0 - k / (count - 1))
+        outline = _weathered(area.buffer(-max(inset, -0.3)), noise, float(k) * 0.35, gullies)
+        for p in polygons_of(outline.intersection(site.extent)):
+            layer = slab(p, float(cuts[k]), float(cuts[k + 1]))
+            parts.append((bands[k % len(bands)], _broken(layer, p, noise, level=last)))
     if cap is not None:
         parts += [(cap, slab(p, top, top + _CAP_M)) for p in polygons_of(outline.buffer(0.1))]
         top += _CAP_M
@@ -68,17 +75,42 @@ def _layered_rock(site: Site, rock: Rock, bands: Sequence[str], cap: str | None)
     return top
 
 
-def _weathered(area: BaseGeometry, noise: OpenSimplex, phase: float) -> BaseGeometry:
-    """Notch an outline: every 1.5 m of it moves by up to half a metre, similarly in neighbouring layers."""
+def _weathered(area: BaseGeometry, noise: OpenSimplex, phase: float, gullies: float) -> BaseGeometry:
+    """Notch an outline: every 1.5 m of it moves by up to half a metre, similarly in neighbouring layers.
+
+    Gullies of a width of some metres, so deep, run down through all layers.
+    """
     pieces = []
     for p in polygons_of(area):
-        xy = shapely.get_coordinates(shapely.segmentize(p.exterior, 1.5))[:-1]
+        xy = shapely.get_coordinates(shapely.segmentize(orient(p).exterior, 1.5))[:-1]
         d = np.array(
             [[noise.noise3(x / 2.2, y / 2.2, phase), noise.noise3(x / 2.2, y / 2.2, phase + 40.0)] for x, y in xy]
         )
-        moved = Polygon(xy + 0.5 * d)
+        wide = np.array([noise.noise3(x / 5.0, y / 5.0, 80.0 + 0.2 * phase) for x, y in xy])
+        moved = Polygon(xy + 0.5 * d + (gullies * np.minimum(wide, 0.15))[:, None] * _outwards(xy))
         pieces += polygons_of(moved if moved.is_valid else moved.buffer(0))
     return shapely.union_all(pieces)
+
+
+def _broken(layer: Mesh, plan: Polygon, noise: OpenSimplex, level: bool) -> Mesh:
+    """Slope the walls of a layer unevenly, and let its upper edge rise and fall unless it is to be level."""
+    n = len(layer.vertices) // 2
+    v = layer.vertices.copy()
+    high = v[n:]
+    wide = np.array([noise.noise3(x / 3.1, y / 3.1, 7.0 + 0.9 * z) for x, y, z in high])
+    if not plan.interiors:
+        high[:, :2] -= ((0.12 if level else 0.3) * (1.0 + wide))[:, None] * _outwards(high[:, :2])
+    if not level:
+        high[:, 2] += 0.35 * wide
+    # Its foot reaches down into the layer below, whose edge falls in places.
+    v[:n, 2] -= 0.35
+    return replace(layer, vertices=v)
+
+
+def _outwards(ring: Floats) -> Floats:
+    """Directions out of a counter-clockwise ring at its corners, (n, 2)."""
+    along = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+    return np.column_stack([along[:, 1], -along[:, 0]]) / np.maximum(norm(along), 1e-9)[:, None]
 
 
 def _number(name: str) -> int:
