@@ -265,7 +265,7 @@ class Site:
         return instance
 
     def laid_out(self, material: str, node: str, flush: bool = False) -> str:
-        """Draw the layout of a node's façades, or one without balconies; nodes that differ by one in number differ."""
+        """Draw the layout of a node's façades, or one without balconies; the next in number has another."""
         row = node.rstrip("0123456789")
         first = rank(self.head.seed, "facade", self.name, row, material.partition(":")[0])
         return self.catalogue.materials.laid_out(material, first + int(node[len(row) :] or 0), flush)
