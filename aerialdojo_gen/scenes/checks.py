@@ -19,6 +19,7 @@ HUNG = frozenset({"dock_door", "shop_sign", "storefront", "wall_banner", "wall_c
 SPANNING = frozenset(
     {"container_crane", "fire_tower", "freighter", "gantry_crane", "hedge_block", "shipping_container"}
 )
+SITTER = "sitter"
 _MIN_TRIANGLES, _MAX_TRIANGLES = 10_000, 220_000
 _MIN_THINGS = 30  # that tasks may ask for
 _MIN_SEEN = 1 / 3  # of the free volume, by each landmark
@@ -87,8 +88,11 @@ def floating(
 def clashes(
     scene: Scene, catalogue: Catalogue, share: float = 0.2, bearers: Collection[str] = ()
 ) -> list[tuple[str, str]]:
-    """List the pairs of props that stand in one another; those of `bearers` may have others on them."""
-    props = props_of(scene, catalogue)
+    """List the pairs of props that stand in one another; those of `bearers` may have others on them.
+
+    Who sits lies in the outline of the seat, and is left out.
+    """
+    props = [prop for prop in props_of(scene, catalogue) if prop.category != SITTER]
     outlines = [footprint(p, float(p.bounds[0, 2])) for p in props]
     tree = shapely.STRtree(outlines)
     out = []

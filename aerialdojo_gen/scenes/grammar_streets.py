@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from shapely.affinity import rotate, translate
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring, unary_union
 
@@ -37,6 +37,8 @@ def streets(
         site.paint(unary_union([ribbon(path, width + 2 * pavement_m) for path in paths]), pavement, KERB_M)
     carriageways = unary_union(roads)
     site.paint(carriageways, surface)
+    for path in paths:
+        drive(site, path, width, lanes)
     if marks:
         for k, path in enumerate(paths):
             others = unary_union([r.buffer(1.0) for j, r in enumerate(roads) if j != k])
@@ -47,6 +49,16 @@ def streets(
     return carriageways
 
 
+def drive(site: Site, path: Polyline, width_m: float, lanes: int, oneway: bool = False) -> None:
+    """Tell the site of a street's lanes; one drives on the right."""
+    lane_m, line = width_m / lanes, LineString(path)
+    for k in range(lanes):
+        offset = (k + 0.5) * lane_m - width_m / 2
+        shifted = line.offset_curve(offset, join_style="mitre") if abs(offset) > 1e-6 else line
+        if isinstance(shifted, LineString) and not shifted.is_empty:
+            site.lanes.append((shifted.reverse() if offset > 1e-6 and not oneway else shifted, lane_m))
+
+
 def crossing(
     site: Site, x: float, y: float, yaw_deg: float, length_m: float, width_m: float = 3.0, surface: str = "asphalt"
 ) -> None:
@@ -54,6 +66,7 @@ def crossing(
     site.paint(
         _posed(rectangle(-length_m / 2, -width_m / 2 - 0.5, length_m / 2, width_m / 2 + 0.5), x, y, yaw_deg), surface
     )
+    site.crossings.append(Point(x, y))
     count = int(length_m // 1.0)
     for k in range(count):
         u = (k - (count - 1) / 2) * 1.0

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.affinity import rotate, translate
-from shapely.geometry import MultiPoint, Point, Polygon
+from shapely.geometry import LineString, MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
@@ -50,6 +50,9 @@ class Site:
         self.instances: list[Instance] = []
         # Outlines and middles of things that the ground is to be levelled under.
         self.footings: list[tuple[BaseGeometry, Point]] = []
+        # Middle lines of lanes in the direction of driving, with their widths, and middles of crossings.
+        self.lanes: list[tuple[LineString, float]] = []
+        self.crossings: list[Point] = []
         self._counts: dict[str, int] = {}
         self._nodes: set[str] = set()
         self._moved_nodes: set[str] = set()

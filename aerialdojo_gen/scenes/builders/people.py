@@ -18,15 +18,19 @@ _BODY_M = 1.75
 _HIP, _KNEE, _ANKLE = 0.93, 0.5, 0.08
 _SHOULDER, _HEAD = 1.43, 1.61
 _UPPER_ARM, _FOREARM, _THIGH, _SHIN = 0.29, 0.25, 0.43, 0.42
-_STAND, _WALK, _SIT, _WORK, _CALL = range(5)
+_STAND, _WALK, _SIT, _WORK, _CALL, _ON_SEAT, _RIDE = range(7)
+_SEATED = frozenset({_SIT, _ON_SEAT, _RIDE})
+_ABOVE_SEAT_M = 0.09  # the hips' middle over what bears them
 
 
 @builder
 def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
-    """Person who stands, walks, sits, works bent or calls, in what the parameters dress them in."""
+    """Person who stands, walks, sits, works bent, calls or rides, in what the parameters dress them in."""
     posture = round(params["posture"])
-    lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0}.get(posture, 0.0)
+    lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0, _ON_SEAT: -3.0, _RIDE: params.get("lean", 0.0)}.get(posture, 0.0)
     hip_m = {_SIT: 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
+    if posture in (_ON_SEAT, _RIDE):
+        hip_m = params["seat"] * _BODY_M / params["height"] + _ABOVE_SEAT_M
     upper = _upper(rng, params, posture, lean_deg)
     out = [(role, posed(body, rotation(0.0, lean_deg, 0.0), vec(0.0, 0.0, hip_m))) for role, body in upper]
     out += _legs(rng, params, posture, hip_m)
@@ -49,11 +53,12 @@ def _upper(rng: np.random.Generator, params: Mapping[str, float], posture: int, 
     ]
     if bust:
         out.append(("top", translated(sphere(radii=(0.075, 0.13, 0.085)), vec(0.075, 0.0, 0.33))))
-    if params["coat"] and posture != _SIT:
+    if params["coat"] and posture not in _SEATED:
         flare = limb([(0, 0, -0.34), (0, 0, -0.05), (0, 0, 0.1)], [0.215 * stout, 0.175 * stout, 0.155 * stout], 10)
         out.append(("top", stretched(flare, np.array([0.8, 1.0, 1.0]))))
     out += _head(params, neck + 0.06)
-    out += _arms(rng, params, posture, up, lean_deg)
+    grips = _grips(params, up, lean_deg) if posture == _RIDE else _hanging(rng, posture, up, lean_deg)
+    out += _arms(params, grips)
     if params["vest"]:
         for z, r in ((0.2, 0.163), (0.32, 0.181)):
             band = limb([(0, 0, z - 0.022), (0, 0, z + 0.022)], [r, r], 10)
@@ -100,34 +105,65 @@ def _head(params: Mapping[str, float], z: float) -> Parts:
     return [(role, translated(stretched(body, np.full(3, size)), centre)) for role, body in parts]
 
 
-def _arms(rng: np.random.Generator, params: Mapping[str, float], posture: int, up: float, lean_deg: float) -> Parts:
-    """Both arms from their shoulders; they hang straight down even where the back leans."""
-    out: Parts = []
+def _hanging(rng: np.random.Generator, posture: int, up: float, lean_deg: float) -> list[list[Floats]]:
+    """Find shoulder, elbow and wrist of both arms; they hang straight down even where the back leans."""
+    out = []
     swing = float(rng.uniform(18.0, 28.0))
     for side in (-1.0, 1.0):
-        shoulder = vec(0.0, side * 0.185, up - 0.035)
         # Degrees forward of the upper arm and of the forearm, seen from the side, and outward.
         upper, fore, out_deg = float(rng.uniform(-6.0, 6.0)), float(rng.uniform(4.0, 22.0)), 7.0
         if posture == _WALK:
             upper, fore = side * swing, side * swing + 22.0
-        elif posture == _SIT:
+        elif posture in (_SIT, _ON_SEAT):
             upper, fore = 28.0, 62.0
         elif posture == _WORK:
             upper, fore, out_deg = 34.0 + side * 12.0, 52.0 + side * 12.0, 4.0
         elif posture == _CALL and side > 0:
             upper, fore, out_deg = 38.0, 158.0, 16.0
         upper, fore = upper + lean_deg, fore + lean_deg
+        shoulder = vec(0.0, side * 0.185, up - 0.035)
         elbow = shoulder + _UPPER_ARM * _way(upper, side * out_deg)
         wrist = elbow + _FOREARM * _way(fore, side * (out_deg - (12.0 if fore > 60.0 else 4.0)))
+        out.append([shoulder, elbow, wrist, 0.04 * _way(fore, 0.0)])
+    return out
+
+
+def _grips(params: Mapping[str, float], up: float, lean_deg: float) -> list[list[Floats]]:
+    """Find shoulder, elbow and wrist of both arms of one who holds handlebars."""
+    lean = math.radians(lean_deg)
+    x, z = params["grip_x"], params["grip_z"] - params["seat"] - _ABOVE_SEAT_M
+    ahead, above = math.cos(lean) * x - math.sin(lean) * z, math.sin(lean) * x + math.cos(lean) * z
+    out = []
+    for side in (-1.0, 1.0):
+        shoulder = vec(0.0, side * 0.185, up - 0.035)
+        wrist = vec(ahead - 0.03, side * params["grip_y"], above + 0.03)
+        out.append([shoulder, _joint(shoulder, wrist, _UPPER_ARM, _FOREARM, -1.0), wrist, vec(0.03, 0.0, 0.0)])
+    return out
+
+
+def _arms(params: Mapping[str, float], joints: list[list[Floats]]) -> Parts:
+    """Both arms through their joints, with hands."""
+    out: Parts = []
+    for shoulder, elbow, wrist, to_hand in joints:
         thick = 1.15 if params["coat"] or params["vest"] else 1.0
         sleeve = "top" if params["sleeves"] else "skin"
         out += [
             ("top", translated(sphere(radii=(0.074 * thick, 0.067 * thick, 0.076), subdivisions=0), shoulder)),
             ("top", limb([shoulder, (shoulder + elbow) / 2], [0.06 * thick, 0.054 * thick], 6)),
             (sleeve, limb([(shoulder + elbow) / 2, elbow, wrist], [0.053 * thick, 0.046 * thick, 0.034 * thick], 6)),
-            ("skin", translated(sphere(radii=(0.044, 0.036, 0.056), subdivisions=0), wrist + 0.04 * _way(fore, 0.0))),
+            ("skin", translated(sphere(radii=(0.044, 0.036, 0.056), subdivisions=0), wrist + to_hand)),
         ]
     return out
+
+
+def _joint(start: Floats, end: Floats, upper_m: float, lower_m: float, side: float) -> Floats:
+    """Where a limb bends between its ends, seen from the side: forward, or back where `side` is negative."""
+    dx, dz = float(end[0] - start[0]), float(end[2] - start[2])
+    away = max(math.sqrt(dx * dx + dz * dz), 1e-6)
+    along = min((upper_m * upper_m - lower_m * lower_m + away * away) / (2.0 * away), upper_m)
+    out = side * math.sqrt(max(upper_m * upper_m - along * along, 0.0))
+    x, z = (along * dx - out * dz) / away, (along * dz + out * dx) / away
+    return np.round(vec(start[0] + x, (start[1] + end[1]) / 2, start[2] + z), 9)
 
 
 def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, hip_m: float) -> Parts:
@@ -140,6 +176,15 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
         if posture == _SIT:
             spread = float(rng.uniform(0.0, 0.06))
             knee, ankle = vec(0.33, side * (0.14 + spread), 0.43), vec(0.56, side * (0.13 + spread), _ANKLE)
+        elif posture == _ON_SEAT:
+            spread = float(rng.uniform(0.0, 0.05))
+            knee, ankle = vec(_THIGH, side * (0.1 + spread), hip_m - 0.01), vec(0, side * (0.1 + spread), _ANKLE)
+            down = float(knee[2]) - _ANKLE
+            ankle[0] = knee[0] + min(math.sqrt(max(_SHIN * _SHIN - down * down, 0.0)), 0.2)
+        elif posture == _RIDE:
+            foot_m = params["foot_z"] + side * params["foot_dz"]
+            ankle = vec(params["foot_x"], side * params["foot_y"], foot_m + _ANKLE)
+            knee = _joint(hip, ankle, _THIGH, _SHIN, 1.0)
         elif posture == _WALK:
             ahead = -side * 24.0
             knee = hip + _THIGH * _way(ahead, 0.0)
@@ -162,7 +207,7 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
             limb([(-0.01, 0, 0.02), (-0.01, 0, 0.11)], [0.052, 0.05], 5),
         ])  # fmt: skip
         out.append(("shoes", posed(shoe, rotation(0.0, toe, 0.0), ankle - vec(0.0, 0.0, _ANKLE))))
-    if params["skirt"] and posture != _SIT:
+    if params["skirt"] and posture not in _SEATED:
         skirt = limb(
             [(0, 0, _KNEE + 0.02), (0, 0, hip_m - 0.02), (0, 0, hip_m + 0.12)], [0.26, 0.185 * stout, 0.15], 12
         )

@@ -1,4 +1,4 @@
-"""People and animals, set out by rules where there is room: groups, herds, birds on what is high."""
+"""People, animals and traffic, set out by rules where there is room: groups, herds, birds on what is high."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.resting import perch_on_wires, seat_people
+from aerialdojo_gen.scenes.kit.traffic import set_out_traffic
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
@@ -41,6 +43,7 @@ _APART_M = 1.6
 _LEVEL_M = 0.12  # most that the ground rises or falls under two feet
 _ON_DECKS, _EDGE_M = 0.4, 0.5
 _HERD_M = 9.0
+_SEATED, _ON_WIRES = 6, 6
 _DRY_M = 0.15
 _ELBOW_M = 0.6  # birds stand so far from one another
 _PERCH_M = (2.2, 16.0)  # heights of what birds stand on
@@ -51,13 +54,15 @@ _LEDGE_M2 = (0.01, 40.0)  # a smaller face bears no bird, and on a large roof th
 def life(
     site: Site, people: int = 0, who: Sequence[str] = ("town",), animals: dict[str, int] | None = None,
     birds: dict[str, int] | None = None, ground: Sequence[str] = WALKED, decks: Sequence[str] = (),
-    stream: str = "life",
+    stream: str = "life", seated: int | None = None, traffic: int | None = None,
 ) -> None:  # fmt: skip
-    """Set out people alone and in groups, animals in herds, and birds on walls, roofs and lamps.
+    """Set out people alone and in groups, animals in herds, birds on what is high, and standing traffic in lanes.
 
     People come from the variants of ``person`` whose names begin with one of `who`; they and the animals stand on
     ground of the materials `ground`, where it is level and nothing else is. Where there is no room there are fewer.
     Up to two in five of the people stand on structures of the categories `decks`: platforms, jetties, piers.
+    Besides, `seated` people (a third as many, six at most) sit on benches, chairs and seats of stands, and `traffic`
+    vehicles and riders (one for 30 m of lane, ten at most) stand in lanes, where the entries before have made some.
     """
     dressed = [v.name for v in site.catalogue["person"].variants if v.name.split("_")[0] in who]
     known = sorted({v.name.split("_")[0] for v in site.catalogue["person"].variants})
@@ -74,6 +79,10 @@ def life(
         _herd(site, category, number, spots, ground, rng)
     for category, number in (birds or {}).items():
         _perch(site, category, number, site.rng_for("life", stream, category))
+    for category, number in (birds or {}).items():
+        perch_on_wires(site, category, min(number, _ON_WIRES), site.rng_for("life", stream, category, "wires"))
+    seat_people(site, min(people // 3, _SEATED) if seated is None else seated, dressed)
+    set_out_traffic(site, traffic)
 
 
 def _under_water(site: Site, spot: Pose, wet: Sequence[np.ndarray]) -> bool:

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.scenes.grammar_streets import KERB_M, MARK_M
+from aerialdojo_gen.scenes.grammar_streets import KERB_M, MARK_M, drive
 from aerialdojo_gen.scenes.ground import Surface, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.street_decks import Bridge, Deck, deck, put_up_bridge
@@ -72,6 +72,10 @@ def street_network(
 ) -> None:  # fmt: skip
     """Paint streets that meet in junctions, paths, tracks and zebra crossings; put up the bridges they lie on."""
     layout = lay_out(site, streets, bridges, crossings, pavement, kerb)
+    for street in streets:
+        if street.kind == "street" and layout.on_ground(street):
+            drive(site, street.line, street.width_m, street.lanes, street.oneway)
+    site.crossings += [Point(at) for at in crossings]
     tracks = [LineString(line) for line in rails]
     for surface in layout.surfaces:
         site.paint(surface.area, surface.material, surface.rise_m, surface.edge)

@@ -1,0 +1,206 @@
+"""Who rests on what: people on benches, chairs and seats of stands, birds on wires."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.mesh import areas
+from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.placement import Placement
+from aerialdojo_gen.scenes.site import Site
+
+Floats = NDArray[np.float64]
+# Parts that are sat on; of a bench all of them make one seat, else each copy is one and faces the middle.
+_SEATS = {"bench": "seat", "picnic_table": "bench", "cafe_table": "chair"}
+_STAND = "grandstand"
+_SEAT_M = (0.37, 0.52)  # heights that feet reach the ground from
+_WIDE_M = 0.62  # room of one who sits
+_BACK_M = 0.06  # in a seat of a stand one sits so far behind its middle
+_SEAT_M2, _BACK_M2 = (0.06, 0.075), (0.008, 0.016)  # triangles of the tops of a stand's seats and of their backs
+_WIRES = frozenset({"power_line", "overhead_wire", "light_string", "light_strings", "washing_line", "lift_ropes"})
+_THIN_M, _LONG_M = 0.09, 0.9  # a wire's faces
+_HIGH_M = (2.2, 16.0)
+_TOGETHER = 4
+_PERCHED_M = 0.45
+
+
+def seat_people(site: Site, number: int, dressed: Sequence[str]) -> int:
+    """Seat people on what there is to sit on, half of the places at most; returns how many."""
+    rng = site.rng_for("life", "seats")
+    spots = [spot for thing in site.instances for spot in seats_of(thing)]
+    wardrobe = {variant.name: variant for variant in site.catalogue["person"].variants}
+    boxes = _boxes(site)
+    placed = 0
+    for k in rng.permutation(len(spots))[: (len(spots) + 1) // 2]:
+        pose, seat_m, top, own = spots[int(k)]
+        if placed == number:
+            break
+        if not _has_room(site, pose, top - seat_m, own, boxes):
+            continue
+        clothes = wardrobe[dressed[int(rng.integers(len(dressed)))]]
+        params = {key: (low + high) / 2 for key, (low, high) in clothes.params.items()}
+        # A child's feet would not reach the ground.
+        params |= {"seat": seat_m, "bag": 0.0, "height": max(params.get("height", 1.72), 1.6)}
+        one = site.place(Placement("sitter", *pose, z=top - seat_m, params=params, roles=clothes.roles, solid=False))
+        boxes.append((_box_of(one), one))
+        placed += 1
+    return placed
+
+
+def seats_of(thing: Instance) -> list[tuple[Pose, float, float, Instance]]:
+    """List places to sit: pose of the hips, height over the feet and over z = 0 in metres, and what is sat on."""
+    if thing.category == _STAND:
+        return [(pose, 0.43, z, thing) for pose, z in _stand_seats(thing)]
+    part = _SEATS.get(thing.category)
+    if part is None or thing.anatomy is None:
+        return []
+    copies = thing.copies_of(part)
+    if thing.category == "bench" and copies:
+        copies = [np.concatenate(copies)]
+    foot = float(thing.bounds[0, 2])
+    out = []
+    for faces in copies:
+        corners = thing.vertices[thing.faces[faces]].reshape(-1, 3)
+        top = float(corners[:, 2].max())
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        yaw = thing.anatomy.yaw_rad
+        if thing.category != "bench":
+            away = thing.centroid - middle
+            yaw = math.atan2(away[1], away[0])
+        if thing.category == "picnic_table":
+            # Its benches run along its own y.
+            turn = thing.anatomy.yaw_rad
+            yaw = turn if math.cos(yaw - turn) > 0 else turn + math.pi
+        across = np.array([-math.sin(yaw), math.cos(yaw)])
+        reach = (corners[:, :2] - middle[:2]) * across
+        long = float(np.ptp(reach.sum(axis=1)))
+        count = max(math.floor(long / _WIDE_M), 1)
+        if _SEAT_M[0] <= top - foot <= _SEAT_M[1]:
+            for k in range(count):
+                x, y = (middle[:2] + across * (k - (count - 1) / 2) * _WIDE_M).tolist()
+                out.append((Pose(x, y, math.degrees(yaw)), top - foot, top, thing))
+    return out
+
+
+def _stand_seats(stand: Instance) -> list[tuple[Pose, float]]:
+    """Seats of a stand: each faces away from its back."""
+    corners = stand.vertices[stand.faces]
+    sizes = areas(stand.vertices, stand.faces)
+    level = np.ptp(corners[:, :, 2], axis=1) < 1e-3
+    seats = _middles(corners[level & (sizes > _SEAT_M2[0]) & (sizes < _SEAT_M2[1])])
+    backs = _middles(corners[level & (sizes > _BACK_M2[0]) & (sizes < _BACK_M2[1])])
+    if not len(seats) or not len(backs):
+        return []
+    near = shapely.STRtree(shapely.points(backs[:, :2])).nearest(shapely.points(seats[:, :2]))
+    out = []
+    for (x, y, z), (u, v, _) in zip(seats.tolist(), backs[near].tolist(), strict=True):
+        away = math.hypot(x - u, y - v)
+        if 0.1 < away < 0.35:
+            c, s = (x - u) / away, (y - v) / away
+            out.append((Pose(x - _BACK_M * c, y - _BACK_M * s, math.degrees(math.atan2(s, c))), z))
+    return out
+
+
+def _middles(triangles: Floats) -> Floats:
+    """Middles of the rectangles that pairs of triangles make, (n, 3): of the upper one of a box's two."""
+    edges = np.stack([triangles[:, k] - triangles[:, k - 1] for k in range(3)], axis=1)
+    longest = np.argmax((edges * edges).sum(axis=2), axis=1)
+    rows = np.arange(len(triangles))
+    middles = np.round((triangles[rows, longest] + triangles[rows, longest - 1]) / 2, 4)
+    found: dict[tuple[float, float], Floats] = {}
+    for at in middles:
+        key = (float(np.round(at[0], 2)), float(np.round(at[1], 2)))
+        if key not in found or at[2] > found[key][2]:
+            found[key] = at
+    return np.array(list(found.values())).reshape(-1, 3)
+
+
+def _has_room(
+    site: Site, pose: Pose, foot_m: float, own: Instance, boxes: Sequence[tuple[Polygon, Instance]]
+) -> bool:
+    """Whether nobody and nothing is where one sits, and the feet are on level ground or on a deck."""
+    frame = Frame(*pose)
+    x, y = frame.at(0.45, 0.0)
+    ground = site.ground_z(x, y)
+    if foot_m < ground + 0.3 and abs(foot_m - ground) > 0.05:
+        return False
+    outline = frame.area(shapely.box(-0.2, -0.26, 0.62, 0.26))
+    if own.category == "bench" and not site.is_free(*frame.at(0.75, 0.0), 0.2, foot_m + 0.05, 1.2):
+        return False
+    low, high = foot_m + 0.05, foot_m + 1.3
+    return not any(
+        thing is not own and box.intersects(outline) and thing.bounds[0, 2] < high and thing.bounds[1, 2] > low
+        for box, thing in boxes
+    )
+
+
+def _boxes(site: Site) -> list[tuple[Polygon, Instance]]:
+    return [(_box_of(thing), thing) for thing in site.instances if thing.category in site.catalogue]
+
+
+def _box_of(thing: Instance) -> Polygon:
+    (x0, y0, _), (x1, y1, _) = thing.bounds
+    return shapely.box(x0, y0, x1, y1)
+
+
+def perch_on_wires(site: Site, category: str, number: int, rng: np.random.Generator) -> int:
+    """Place birds in rows on wires, turned across them; returns how many."""
+    placed = 0
+    for thing in site.instances:
+        wires = _wires_of(site, thing) if thing.category in _WIRES else np.zeros((0, 2, 3))
+        if not len(wires):
+            continue
+        caster = TriangleRayCaster(thing.vertices, thing.faces)
+        for k in rng.permutation(len(wires))[:3]:
+            (a, b), room = wires[int(k)], min(int(rng.integers(2, _TOGETHER + 1)), number - placed)
+            long = math.hypot(b[0] - a[0], b[1] - a[1])
+            first = float(rng.uniform(0.15, 0.5)) * long
+            for j in range(room):
+                along = first + j * _PERCHED_M + float(rng.uniform(0.0, 0.15))
+                if along < long - 0.15:
+                    placed += _perched(site, category, a + (b - a) * (along / long), b - a, caster, rng)
+    return placed
+
+
+def _perched(
+    site: Site, category: str, at: Floats, way: Floats, caster: TriangleRayCaster, rng: np.random.Generator
+) -> bool:
+    """Place a bird on the ridge of a wire near a point."""
+    yaw = math.atan2(way[1], way[0])
+    across = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
+    from_above = at + np.linspace(-0.05, 0.05, 21)[:, None] * across + np.array([0.0, 0.0, 0.5])
+    away, _ = caster.first_hit(from_above, np.tile([0.0, 0.0, -1.0], (len(from_above), 1)))
+    top = 0.5 - away
+    if not np.isfinite(away).any() or float(top.max()) < -0.1:
+        return False
+    x, y, _ = from_above[top > float(top.max()) - 1e-3].mean(axis=0).tolist()
+    z = float(at[2] + top.max())
+    if not site.is_free(x, y, 0.25, z + 0.05, 0.4):
+        return False
+    side = 90.0 if rng.random() < 0.7 else -90.0
+    site.place(Placement(category, x, y, math.degrees(yaw) + side, z=z, solid=False))
+    return True
+
+
+def _wires_of(site: Site, thing: Instance) -> Floats:
+    """Ends of a thing's long thin faces that are high up and nearly level, (n, 2, 3)."""
+    corners = thing.vertices[thing.faces]
+    edges = np.stack([corners[:, k] - corners[:, k - 1] for k in range(3)], axis=1)
+    lengths = np.sqrt((edges * edges).sum(axis=2))
+    longest, rows = np.argmax(lengths, axis=1), np.arange(len(corners))
+    long = lengths[rows, longest]
+    thin = 2.0 * areas(thing.vertices, thing.faces) / np.maximum(long, 1e-9) < _THIN_M
+    ends = np.stack([corners[rows, longest - 1], corners[rows, longest]], axis=1)
+    level = np.abs(ends[:, 1, 2] - ends[:, 0, 2]) < 0.15 * long
+    out = ends[thin & level & (long > _LONG_M)]
+    heights = [z - site.ground_z(x, y) for x, y, z in out.mean(axis=1).tolist()]
+    return out[[_HIGH_M[0] <= h <= _HIGH_M[1] for h in heights]] if len(out) else out
