@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shapely.geometry import Point
 
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.base.safe_parse import read_toml
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.checks import clashes, floating
 from aerialdojo_gen.scenes.kit.life import WALKED, life
@@ -126,3 +129,73 @@ def test_no_claim_is_about_somebody_who_moves(catalogue):
 def test_an_unknown_group_of_people_is_named(catalogue, built):
     with pytest.raises(AssetError, match=r"'towm'.*town"):
         life(built, people=1, who=["towm"])
+
+
+TRAFFIC = {"cyclist", "motorcyclist", "estate_car", "coach", "lorry", "minibus"}
+
+
+def tops_under(caster, points):
+    """Heights of what is next below points, from 5 cm above them."""
+    away, _ = caster.first_hit(points + (0.0, 0.0, 0.05), np.tile([0.0, 0.0, -1.0], (len(points), 1)))
+    return points[:, 2] + 0.05 - away
+
+
+@pytest.mark.parametrize("name", ["U_Alley_0", "I_RailCorridor_0"])
+def test_who_sits_touches_a_seat_with_feet_on_the_ground(catalogue, name):
+    scene = scene_of(name)
+    sitters = living(catalogue, scene.instances, {"sitter"})
+    assert len(sitters) >= 2
+    others = [i for i in scene.instances if i.category not in catalogue or catalogue[i.category].kind != "life"]
+    caster = TriangleRayCaster(*soup([part for i in others for part in i.parts]))
+    for one in sitters:
+        foot, v = one.bounds[0, 2], one.vertices
+        feet = v[v[:, 2] < foot + 0.02]
+        assert np.abs(tops_under(caster, feet) - feet[:, 2]).min() < 0.05
+        thighs = v[(v[:, 2] > foot + 0.35) & (v[:, 2] < foot + 0.56)]
+        gaps = thighs[:, 2] - tops_under(caster, thighs)
+        borne = (np.abs(gaps) < 0.04) & (thighs[:, 2] - gaps > foot + 0.3)
+        assert borne.sum() >= 3, one.node
+
+
+def test_traffic_stands_in_its_lane_on_the_carriageway(catalogue):
+    site = site_of("U_Alley_0")
+    traffic = living(catalogue, site.instances, TRAFFIC)
+    assert len(traffic) >= 2
+    for one in traffic:
+        x, y = one.centroid[:2].tolist()
+        assert abs(one.bounds[0, 2] - site.ground_z(x, y)) < 0.03
+        assert site.ground_material(x, y).partition(":")[0] in {"asphalt", "marking"}
+        line, lane_m = min(site.lanes, key=lambda lane: lane[0].distance(Point(x, y)))
+        assert line.distance(Point(x, y)) < lane_m / 2
+        s = line.project(Point(x, y))
+        a, b = line.interpolate(s - 0.5), line.interpolate(s + 0.5)
+        way = np.array([np.cos(one.anatomy.yaw_rad), np.sin(one.anatomy.yaw_rad)])
+        assert way[0] * (b.x - a.x) + way[1] * (b.y - a.y) > 0.99  # Along the lane, not against it
+
+
+def test_no_vehicle_in_traffic_has_a_target_s_colour(catalogue):
+    """A text about the red sedan is not true of an estate car in a lane."""
+    vehicles = [catalogue[name] for name in catalogue.targets if catalogue[name].kind == "vehicle"]
+    taken = {
+        colour for one in vehicles for v in one.variants for colour in (dict(one.roles) | dict(v.roles)).values()
+    }
+    for name in TRAFFIC:
+        one = catalogue[name]
+        assert name not in catalogue.targets and not one.looks
+        for variant in one.variants:
+            assert not variant.attributes
+            surfaces = dict(one.roles) | dict(variant.roles)
+            assert not {surfaces[role] for role in ("body", "cab", "cover", "frame") if role in surfaces} & taken, (
+                name
+            )
+
+
+def test_birds_stand_on_wires(catalogue):
+    scene = scene_of("I_RailCorridor_0")
+    wires = [part for i in scene.instances if i.category == "overhead_wire" for part in i.parts]
+    caster = TriangleRayCaster(*soup(wires))
+    on = 0
+    for bird in living(catalogue, scene.instances, {"pigeon"}):
+        feet = bird.vertices[bird.vertices[:, 2] < bird.bounds[0, 2] + 0.01]
+        on += bool((np.abs(tops_under(caster, feet) - feet[:, 2]) < 0.015).any())
+    assert on >= 3
