@@ -136,7 +136,7 @@ TRAFFIC = {"cyclist", "motorcyclist", "estate_car", "coach", "lorry", "minibus"}
 
 def tops_under(caster, points):
     """Heights of what is next below points, from 5 cm above them."""
-    away, _ = caster.first_hit(points + (0.0, 0.0, 0.05), np.tile([0.0, 0.0, -1.0], (len(points), 1)))
+    away, _ = caster.first_hit(points + np.array([0.0, 0.0, 0.05]), np.tile([0.0, 0.0, -1.0], (len(points), 1)))
     return points[:, 2] + 0.05 - away
 
 
@@ -169,8 +169,14 @@ def test_traffic_stands_in_its_lane_on_the_carriageway(catalogue):
         assert line.distance(Point(x, y)) < lane_m / 2
         s = line.project(Point(x, y))
         a, b = line.interpolate(s - 0.5), line.interpolate(s + 0.5)
-        way = np.array([np.cos(one.anatomy.yaw_rad), np.sin(one.anatomy.yaw_rad)])
-        assert way[0] * (b.x - a.x) + way[1] * (b.y - a.y) > 0.99  # Along the lane, not against it
+        way = np.array([b.x - a.x, b.y - a.y])
+        off = one.vertices[:, :2] - one.centroid[:2]
+        across = np.ptp(off[:, 0] * way[1] - off[:, 1] * way[0])
+        assert across < 0.65 * np.ptp((off * way).sum(axis=1))
+        lamps = [part.vertices[:, :2].mean(axis=0) for part in one.parts if part.material == "#f3ead0"]
+        # Along the lane, not against it; a bicycle has no lamp.
+        assert all(((lamp - one.centroid[:2]) * way).sum() > 0.3 for lamp in lamps)
+        assert lamps or one.category == "cyclist"
 
 
 def test_no_vehicle_in_traffic_has_a_target_s_colour(catalogue):
@@ -181,7 +187,8 @@ def test_no_vehicle_in_traffic_has_a_target_s_colour(catalogue):
     }
     for name in TRAFFIC:
         one = catalogue[name]
-        assert name not in catalogue.targets and not one.looks
+        assert name not in catalogue.targets
+        assert not one.looks
         for variant in one.variants:
             assert not variant.attributes
             surfaces = dict(one.roles) | dict(variant.roles)
