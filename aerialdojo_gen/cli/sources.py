@@ -216,6 +216,8 @@ def gallery(
     props: Annotated[bool, typer.Option("--props/--no-props", help="Draw the sheets of props too.")] = True,
     small: Annotated[bool, typer.Option("--small", help="Write JPEGs 1280 pixels wide, for web pages.")] = False,
     kit: Annotated[bool, typer.Option("--kit", help="Draw the builders that plans call instead.")] = False,
+    designs: Annotated[list[str] | None, typer.Option(
+        metavar="CATEGORY", help="Draw the designs that a category comes in instead; repeatable.")] = None,
     references: Annotated[bool, typer.Option(
         "--references", help="Draw the objects' reference images with their descriptions instead.")] = False,
     data: options.Data = "data",
@@ -226,7 +228,7 @@ def gallery(
         _reference_sheets(out, scene, data, "jpg" if small else "png")
         return
     from aerialdojo_gen.pipeline import runner
-    from aerialdojo_gen.rendering.gallery import props_sheet, scene_sheet, write_picture
+    from aerialdojo_gen.rendering.gallery import designs_sheet, props_sheet, scene_sheet, write_picture
     from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
     from aerialdojo_gen.store.atomic import make_folder
@@ -236,6 +238,9 @@ def gallery(
     make_folder(out)  # before anything is drawn
     catalogue = load_catalogue(roots.scene_assets)
     suffix, width = ("jpg", 1280) if small else ("png", None)
+    if designs:
+        print(write_picture(designs_sheet(catalogue, designs, 140), out, f"designs.{suffix}", width))
+        return
     if kit:
         from aerialdojo_gen.rendering.kit_gallery import kit_sheets
 

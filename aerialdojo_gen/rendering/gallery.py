@@ -59,11 +59,14 @@ def contact_sheet(
 _FLYING_HEIGHT_M = 3.0
 
 
-def prop_picture(catalogue: Catalogue, category: str, size_px: int = 240, variant: str | None = None) -> Image:
+def prop_picture(
+    catalogue: Catalogue, category: str, size_px: int = 240, variant: str = "", design: str = ""
+) -> Image:
     """Picture a prop from before it and above, (size_px, size_px, 3) uint8 sRGB."""
-    names = [v.name for v in catalogue[category].variants]
-    chosen = variant if variant is not None else (names[0] if names else None)
-    prop = catalogue.instantiate(category, "prop", generator(0, "gallery", category), variant=chosen)
+    first = catalogue[category].variants[0].name, catalogue[category].designs[0].name
+    prop = catalogue.instantiate(
+        category, "prop", generator(0, "gallery", category), variant=variant or first[0], design=design or first[1]
+    )
     low, high = prop.bounds
     reach = float(np.linalg.norm(high - low)) / 2
     floor = to_part(extrude(rectangle(-6 * reach, -6 * reach, 6 * reach, 6 * reach), 0.02), "paving", 1.2)
@@ -87,6 +90,21 @@ def props_sheet(
     return contact_sheet(
         [prop_picture(catalogue, name, size_px) for name in names], [catalogue[n].name for n in names], columns
     )
+
+
+def designs_sheet(catalogue: Catalogue, categories: Sequence[str], size_px: int) -> Image:
+    """Picture the designs of categories, a row each, those that are held out with a star; (H, W, 3) uint8 sRGB."""
+    columns = max(len(catalogue[name].designs) for name in categories)
+    images, labels = [], []
+    for name in categories:
+        variants, designs = catalogue[name].variants, catalogue[name].designs
+        for k, one in enumerate(designs):
+            images.append(prop_picture(catalogue, name, size_px, variants[k % len(variants)].name, one.name))
+            labels.append("*" * one.held_out + (one.name.replace("_", " ") if k else catalogue[name].name))
+        gap = columns - len(designs)
+        images += [np.full((size_px, size_px, 3), 255, np.uint8)] * gap
+        labels += [""] * gap
+    return contact_sheet(images, labels, columns)
 
 
 def scene_sheet(scene: Scene, width: int = 640, height: int = 440) -> Image:
