@@ -20,7 +20,7 @@ SPANNING = frozenset(
     {"container_crane", "fire_tower", "freighter", "gantry_crane", "hedge_block", "shipping_container"}
 )
 SITTER = "sitter"
-_MIN_TRIANGLES, _MAX_TRIANGLES = 10_000, 220_000
+MIN_TRIANGLES, MAX_TRIANGLES = 10_000, 220_000
 _MIN_THINGS = 30  # that tasks may ask for
 _MIN_SEEN = 1 / 3  # of the free volume, by each landmark
 _VIEWS = 300
@@ -28,7 +28,7 @@ _VIEWS = 300
 
 def faults(scene: Scene, catalogue: Catalogue, reach_m: float = 1.5) -> Iterator[tuple[str, str]]:
     """Yield what is wrong with a scene: a reason that is counted, and what it is about."""
-    if not _MIN_TRIANGLES <= scene.n_triangles <= _MAX_TRIANGLES:
+    if not MIN_TRIANGLES <= scene.n_triangles <= MAX_TRIANGLES:
         yield "triangles", f"{scene.n_triangles:,}"
     things = {(i.category, i.variant, i.attributes.get("colour", "")) for i in targets_of(scene, catalogue)}
     if len(things) < _MIN_THINGS:

@@ -32,6 +32,7 @@ from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes import checks
 from aerialdojo_gen.scenes.horizon.build import MAX_TRIANGLES
 from aerialdojo_gen.scenes.model import Scene
 
@@ -137,7 +138,7 @@ def test_it_keeps_to_its_bounds_and_its_budget(scene: Scene) -> None:
     targets = [scene[thing["node"]] for thing in read_annotations(scene.name)["objects"]]
     assert [t.node for t in targets if (t.centroid < low - [0.0, 0.0, 2.0]).any() or (t.centroid > high).any()] == []
     assert [i.node for i in scene.instances if ((i.bounds[1] < low) | (i.bounds[0] > high)).any()] == []
-    assert 30_000 <= scene.n_triangles <= 200_000
+    assert 30_000 <= scene.n_triangles <= checks.MAX_TRIANGLES
     # Of air over the lowest ground there is more where there are hills.
     relief_m = float(np.ptp(scene["ground"].vertices[:, 2]))
     assert 12.0 <= scene.ceiling_m <= 30.0 + relief_m
