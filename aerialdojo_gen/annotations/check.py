@@ -11,6 +11,7 @@ import numpy as np
 from aerialdojo_gen.annotations.bearings import Bearing
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
+from aerialdojo_gen.annotations.landmarks import is_in_sight
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -111,7 +112,7 @@ class _Checker:
         if node not in scene:
             text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
             yield self._fault((*path, "node"), text)
-        elif not _inside(scene, scene[node].centroid):
+        elif not (is_in_sight(scene, scene[node]) if path[0] == "landmarks" else _inside(scene, scene[node].centroid)):
             yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:

@@ -75,10 +75,16 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
     return min(gaps, default=1000.0)
 
 
+def is_in_sight(scene: Scene, instance: Instance) -> bool:
+    """Whether a landmark's middle lies over the site and some of it below the ceiling, as a high mast's does."""
+    (x0, y0, z0), (x1, y1, z1) = scene.bounds.tolist()
+    x, y, _ = instance.centroid.tolist()
+    bottom, top = instance.bounds[:, 2].tolist()
+    return x0 <= x <= x1 and y0 <= y <= y1 and bottom <= z1 and top >= z0
+
+
 def _inside(scene: Scene) -> list[Instance]:
-    """Things with their middle in the scene's bounds, as landmarks have: a mast may be too high for a low ceiling."""
-    low, high = scene.bounds
-    return [i for i in scene.instances if ((i.centroid >= low) & (i.centroid <= high)).all()]
+    return [i for i in scene.instances if is_in_sight(scene, i)]
 
 
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
