@@ -112,7 +112,10 @@ class _Checker:
         if node not in scene:
             text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
             yield self._fault((*path, "node"), text)
-        elif not (is_in_sight(scene, scene[node]) if path[0] == "landmarks" else _inside(scene, scene[node].centroid)):
+        elif isinstance(entry, Landmark):
+            if not is_in_sight(scene, scene[node]):
+                yield self._fault((*path, "node"), f"{node!r} stands outside the scene's bounds")
+        elif not _inside(scene, scene[node].centroid):
             yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")
 
     def _object(self, path: JsonPath, entry: Object) -> Iterator[Fault]:

@@ -49,7 +49,7 @@ def plaza(catalogue) -> Scene:
     return Scene("U_Plaza_0", tuple(instances), materials, street().bounds)
 
 
-@pytest.mark.parametrize("up, chosen", [(0.0, True), (60.0, False)])
+@pytest.mark.parametrize(("up", "chosen"), [(0.0, True), (60.0, False)])
 def test_a_landmark_rises_through_the_ceiling_but_stands_below_it(plaza, catalogue, up, chosen):
     mast = catalogue.instantiate("radio_mast", "radio_mast_000", generator(0, "test", "mast"), (40.0, 40.0, up))
     materials = plaza.materials | {p.material: catalogue.materials[p.material] for p in mast.parts}
