@@ -11,7 +11,7 @@ import numpy as np
 from aerialdojo_gen.annotations.bearings import Bearing
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Landmark, Object, Source
-from aerialdojo_gen.annotations.landmarks import is_in_sight
+from aerialdojo_gen.annotations.landmarks import reaches_into
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.positions import Fault
 from aerialdojo_gen.annotations.relations import SceneGeometry
@@ -113,7 +113,7 @@ class _Checker:
             text = f"no node {node!r} in the scene{nearest(node, (i.node for i in scene.instances), 2)}"
             yield self._fault((*path, "node"), text)
         elif isinstance(entry, Landmark):
-            if not is_in_sight(scene, scene[node]):
+            if not reaches_into(scene, scene[node]):
                 yield self._fault((*path, "node"), f"{node!r} stands outside the scene's bounds")
         elif not _inside(scene, scene[node].centroid):
             yield self._fault((*path, "node"), f"the middle of {node!r} is outside the scene's bounds")

@@ -75,7 +75,7 @@ def spread_m(instance: Instance, chosen: Sequence[Instance]) -> float:
     return min(gaps, default=1000.0)
 
 
-def is_in_sight(scene: Scene, instance: Instance) -> bool:
+def reaches_into(scene: Scene, instance: Instance) -> bool:
     """Whether a landmark's middle lies over the site and some of it below the ceiling, as a high mast's does."""
     (x0, y0, z0), (x1, y1, z1) = scene.bounds.tolist()
     x, y, _ = instance.centroid.tolist()
@@ -84,7 +84,7 @@ def is_in_sight(scene: Scene, instance: Instance) -> bool:
 
 
 def _inside(scene: Scene) -> list[Instance]:
-    return [i for i in scene.instances if is_in_sight(scene, i)]
+    return [i for i in scene.instances if reaches_into(scene, i)]
 
 
 def _prominent(vocabulary: Vocabulary) -> list[Instance]:
