@@ -24,7 +24,7 @@ from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.build import build_plan, build_tables
-from aerialdojo_gen.scenes.prop import Category, Variant, parse_category
+from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
 
 ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 SLACK = 1.05
@@ -159,6 +159,34 @@ def test_designs_of_a_category_are_different_shapes(catalogue, bodies):
         assert len({body.shape for body in designs_of_first(bodies, catalogue, category)}) == len(designs), category
         few += [category] if len([d for d in designs if not d.held_out]) < 4 or len(designs) < 6 else []
     assert len(few) < FEW_DESIGNS, few
+
+
+def test_held_out_designs_have_structure_of_their_own(catalogue):
+    """Of a category with parts by design, each held-out one has, or lacks, what no training one does."""
+    checked = 0
+    for category in catalogue.targets:
+        prop = catalogue[category]
+        if not any(designs_of(part) for part in prop.parts):
+            continue
+        checked += 1
+        built = {
+            design.name: frozenset(
+                k
+                for k, part in enumerate(prop.parts)
+                if not design.without.intersection(tags_of(part))
+                and (not designs_of(part) or design.name in designs_of(part))
+            )
+            for design in prop.designs
+        }
+        training = [built[design.name] for design in prop.designs if not design.held_out]
+        assert len(set(training)) >= 6, (category, len(set(training)))
+        held_out = [design.name for design in prop.designs if design.held_out]
+        assert len(held_out) >= 2, category
+        for name in held_out:
+            own = built[name] - frozenset().union(*training)
+            lacks = frozenset.intersection(*training) - built[name]
+            assert own or lacks, (category, name)
+    assert checked >= 25
 
 
 @pytest.mark.slow

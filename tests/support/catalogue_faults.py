@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -12,7 +13,7 @@ MIN_LOOKS = 3
 
 
 def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None) -> list[str]:
-    """Build every variant of the target categories and list the false statements about them."""
+    """Build every variant of the target categories in every design and list the false statements about them."""
     faults = []
     for name in catalogue.targets if categories is None else categories:
         prop = catalogue[name]
@@ -22,24 +23,22 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
         if len(prop.looks) < MIN_LOOKS:
             faults.append(f"{prop.source}: {len(prop.looks)} looks, {MIN_LOOKS} are the least")
         why: dict[str, list[str]] = {look.phrase: [] for look in prop.looks}
-        for variant in prop.variants:
-            thing = catalogue.instantiate(
-                name, "thing", generator(0, "check", name, variant.name), variant=variant.name
-            )
+        for variant, design in product(prop.variants, prop.designs):
+            made = f"variant {variant.name!r}" + (f", design {design.name!r}" if design.name != "plain" else "")
+            rng = generator(0, "check", name, variant.name)
+            thing = catalogue.instantiate(name, "thing", rng, variant=variant.name, design=design.name)
             assert thing.anatomy is not None
             for tell in thing.anatomy.identifying_parts:
                 if not len(thing.faces_of(tell)):
-                    faults.append(f"{prop.source} variant {variant.name!r}: tells: it has no {tell}")
+                    faults.append(f"{prop.source} {made}: tells: it has no {tell}")
             wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in prop.looks}
             true = sum(not w for w in wrong.values())
             if true < min(MIN_TRUE_LOOKS, len(prop.looks)):
-                faults.append(
-                    f"{prop.source} variant {variant.name!r}: {true} looks are true of it: {_message(wrong)}"
-                )
+                faults.append(f"{prop.source} {made}: {true} looks are true of it: {_message(wrong)}")
             for say, claims in wrong.items():
                 why[say].append(f"{variant.name}: {', '.join(claims)}" if claims else "")
         faults += [
-            f"{prop.source}: {say!r} is true of no variant ({'; '.join(claims)})"
+            f"{prop.source}: {say!r} is true of no variant ({'; '.join(dict.fromkeys(claims))})"
             for say, claims in why.items()
             if all(claims)
         ]
