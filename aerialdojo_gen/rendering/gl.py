@@ -31,7 +31,6 @@ from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
 
-_SHADOW_PX = 2048
 _HINT = "install moderngl (pip install 'aerialdojo-gen[gl]') and Mesa (Debian: libegl1 libgl1 libgl1-mesa-dri)"
 
 
@@ -113,7 +112,9 @@ class GlRenderer(Closable):
         self._scene = scene
         self._clouds = self._own(gl_programs.table_texture(self._gl, cloud_map(scene.name)[..., None], "f1"))
         self._height_map = height_map(scene)
-        self._heights = self._own(gl_programs.table_texture(self._gl, self._height_map.above[..., None], "f1"))
+        # As floats: llvmpipe reads bytes between cells more slowly.
+        above = (self._height_map.above[..., None] / 255.0).astype(np.float16)
+        self._heights = self._own(gl_programs.table_texture(self._gl, above, "f2"))
         self._heights.repeat_x = self._heights.repeat_y = False
         self._shadow: Any = None
         self.relight(scene.light)
@@ -122,7 +123,7 @@ class GlRenderer(Closable):
         """Draw by another light from now on."""
         self.light = light
         self._light = light_of(self._scene, light=light)
-        camera, pose, near_m, far_m = sun_view(self._scene, _SHADOW_PX, light)
+        camera, pose, near_m, far_m = sun_view(self._scene, glsl.SHADOW_PX, light)
         self._sun_from_world = clip_from_world(camera, pose, near_m, far_m)
         self._bias_m = 0.03 + 1.5 * (near_m + far_m) / 2.0 / camera.focal_px
         if self._shadow is not None:
@@ -159,7 +160,7 @@ class GlRenderer(Closable):
     def _shadow_map(self) -> Any:
         """Draw the shadow map, of which the shader averages the comparisons with the four nearest depths."""
         gl = self._gl
-        depth = gl.depth_texture((_SHADOW_PX, _SHADOW_PX))
+        depth = gl.depth_texture((glsl.SHADOW_PX, glsl.SHADOW_PX))
         target = gl.framebuffer(depth_attachment=depth)
         self._begin(target)
         for drawn in self._sets:
@@ -174,7 +175,7 @@ class GlRenderer(Closable):
             program.release()
         target.release()
         # As a float texture: llvmpipe's comparison with a depth texture takes twice as long.
-        shadow = self._own(gl.texture((_SHADOW_PX, _SHADOW_PX), 1, depth.read(), dtype="f4"))
+        shadow = self._own(gl.texture((glsl.SHADOW_PX, glsl.SHADOW_PX), 1, depth.read(), dtype="f4"))
         depth.release()
         shadow.filter = (gl.NEAREST, gl.NEAREST)
         return shadow

@@ -12,6 +12,9 @@ _HEAD = "#version 400 core\n"
 # Contrast of a natural texture at its larger scales.
 _GRAIN = 0.55
 
+# Edge of the shadow map.
+SHADOW_PX = 2048
+
 # The sky in a direction, as `aerialdojo_gen.rendering.shading` has it.
 _SKY = """
 uniform vec3 horizon;
@@ -36,9 +39,6 @@ uniform mat4 sun_from_world;
 uniform vec3 eye;
 uniform vec3 sun;
 uniform vec2 side;
-uniform vec2 place;  // the map of heights: its south-western corner, and one over its extent
-uniform vec2 extent;
-uniform float lowest_m;
 uniform float bias_m;
 uniform float focal_px;
 in vec3 position;
@@ -76,7 +76,6 @@ uniform vec3 ground_rgb;
 out vec3 v_light;
 flat out vec3 v_normal;
 out vec4 v_sun;
-out vec3 v_heights;
 #endif
 #ifdef FOREIGN
 out vec3 v_colour;
@@ -109,9 +108,6 @@ void main() {
 #else
     vec4 s = sun_from_world * vec4(position + n * bias_m, 1.0);
     v_sun = vec4((s.xyz + s.w) * 0.5, s.w);
-#ifdef TEXTURED
-    v_heights = vec3((position.xy + n.xy * BEFORE - place.xy) * extent, (lowest_m - position.z - BEFORE) / DEEP);
-#endif
 #endif
 #ifdef TEXTURED
     v_uv = uv;
@@ -134,6 +130,10 @@ _FRAGMENT = (
     + """
 uniform sampler2D shadow;
 uniform sampler2D heights;
+uniform vec3 eye;
+uniform vec2 place;  // the map of heights: its south-western corner, and one over its extent
+uniform vec2 extent;
+uniform float lowest_m;
 uniform vec3 sun_rgb;
 uniform vec3 sky_rgb;
 uniform vec3 ground_rgb;
@@ -156,7 +156,6 @@ in vec4 v_air;
 in vec3 v_light;
 flat in vec3 v_normal;
 in vec4 v_sun;
-in vec3 v_heights;
 #endif
 #ifdef FOREIGN
 in vec3 v_colour;
@@ -210,12 +209,15 @@ void main() {
     // The mean of four comparisons, weighted as a linear filter would.
     vec3 at_sun = v_sun.xyz / v_sun.w;
     vec4 lit_by = step(vec4(at_sun.z), textureGather(shadow, at_sun.xy));
-    vec2 part = fract(at_sun.xy * vec2(textureSize(shadow, 0)) - 0.5);
+    vec2 part = fract(at_sun.xy * SHADOW_PX - 0.5);
     vec2 column = mix(lit_by.wx, lit_by.zy, part.x);
     float lit = v_light.z * mix(column.x, column.y, part.y);
     // What is deep below its surroundings sees less of the sky.
 #ifdef TEXTURED
-    float deep = clamp(textureLod(heights, v_heights.xy, 0.0).r * (REACH / DEEP) + v_heights.z, 0.0, 1.0);
+    // From the ray: an output of the vertices less.
+    vec2 on_map = (v_ray.xy + v_normal.xy * BEFORE + (eye.xy - place)) * extent;
+    float below = (lowest_m - BEFORE - eye.z - v_ray.z) * (1.0 / DEEP);
+    float deep = clamp(textureLod(heights, on_map, 0.0).r * (REACH / DEEP) + below, 0.0, 1.0);
 #else
     float deep = 0.0;
 #endif
@@ -348,6 +350,7 @@ def specialise(source: str, *defined: str) -> str:
         "GRAIN": _GRAIN,
         "REACH": lighting.REACH_M,
         "END": shading._END_M,
+        "SHADOW_PX": SHADOW_PX,
     }
     lines = [f"#define {name} {value:.6f}" for name, value in constants.items()]
     # The bits of an endless depth.
