@@ -15,7 +15,7 @@ import shapely
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import SceneMesh, scene_mesh
+from aerialdojo_gen.dataset.validate.scene_mesh import MESH_CHECKS, SceneMesh, scene_mesh
 from aerialdojo_gen.geometry.columns import ColumnIndex
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -25,7 +25,7 @@ _HANGS_M = 0.5  # with less air below, a thing was meant to stand
 _ASIDE_M = 0.1  # so far aside of what it rests on may its middle be
 
 
-@check("scenes", needs=("mesh",))
+@check("scenes", needs=("mesh",), after=MESH_CHECKS)
 def thing_hovers(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Nothing hovers: all that is in a scene touches the rest of it, and its things rest on something or hang."""
     mesh = scene_mesh(data)

@@ -34,7 +34,7 @@ def pack(target: Path, folders: Sequence[Path]) -> None:
         ):
             files[f"{package.name}/{path.relative_to(package).as_posix()}"] = path
     # In a checkout these folders are next to the package, in a wheel inside it.
-    siblings = [package.parent / name for name in ("pipelines",) if (package.parent / "scene_assets").is_dir()]
+    siblings = [package.parent / name for name in ("pipelines", "scene_assets") if (package.parent / name).is_dir()]
     for number, folder in enumerate(dict.fromkeys([*siblings, *folders])):
         if folder.is_relative_to(package):
             names[str(folder)] = f"{package.name}/{folder.relative_to(package).as_posix()}"
