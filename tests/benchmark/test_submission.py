@@ -18,6 +18,7 @@ from aerialdojo_gen.benchmark.agents.goal import BLIND
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.leaderboard import write_leaderboard
 from aerialdojo_gen.benchmark.metrics import METRICS, PROFILES
+from aerialdojo_gen.benchmark.registry import NAMES_OF
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.scoring import ScoreCard, score, scored_runs
@@ -333,7 +334,7 @@ def test_the_page_sorts_in_a_browser_and_asks_for_nothing(scored, tmp_path):
         urls = [m["params"]["request"]["url"] for m in asked if m["method"] == "Network.requestWillBeSent"]
         assert [u for u in urls if not u.startswith(("data:", "chrome"))] == [page.as_uri()]
         titles = [title.text for title in driver.find_elements("css selector", "h2")]
-        own = [name.title() for name in ("base", "standard", "hard") if name in hostile["tasks"]]
+        own = [title for name, title in NAMES_OF.items() if name in hostile["tasks"]]
         assert titles == [*own, "All settings", "How it was scored"]
         board = driver.find_element("css selector", ".board")
 
