@@ -47,7 +47,7 @@ RELEASED = {
 # How deep in what bears it a prop's foot may be, metres: boulders lie half in the ground, trees root in slopes, what
 # a flood has moved stands in the water.
 REACH_M = {
-    "D_Earthquake": 1.2, "D_Explosion": 1.2, "D_Flood": 2.4, "I_Bridge": 1.5, "I_RailCorridor": 1.5, "N_Desert": 1.4,
+    "D_Earthquake": 1.5, "D_Explosion": 1.2, "D_Flood": 2.4, "I_Bridge": 1.5, "I_RailCorridor": 1.5, "N_Desert": 1.4,
     "N_Forest": 2.2, "N_Mountain": 2.2, "N_Snowfield": 1.4, "U_Park": 1.3, "U_Stadium": 1.3,
 }  # fmt: skip
 # They hang on walls; a kiosk's own stilts reach through the pier's deck; chair and box stand on porch and lookout.
