@@ -1,4 +1,4 @@
-"""Designs: the proportions that things of one category come in, `scene_assets/designs.toml`."""
+"""Designs: the forms that things of one category come in, as its table in the catalogue lists or names them."""
 
 from __future__ import annotations
 
@@ -15,11 +15,7 @@ Side = Literal["train", "held_out", "plain"]
 _KEYS = ("name", "stretch", "params", "without", "held_out")
 # Shapes that turn about their own z axis.
 ROUND = frozenset({"cylinder", "cone", "lathe", "torus", "capsule"})
-# A part is the body if it takes this share of a thing's extent on the ground.
-_BODY_SHARE = 0.55
 _LEAST, _MOST = 0.5, 2.0
-# Sets that `default_set` names.
-_DEFAULTS = ("free", "round", "vehicle", "scaled", "fixed")
 
 
 @dataclass(frozen=True)
@@ -83,43 +79,6 @@ def _is_factor(value: Any) -> bool:
 
 
 def load_sets(path: Path) -> DesignSets:
-    """Read the sets of designs that categories share; without the file, or a set, things have one design."""
+    """Read the designs that categories share; without the file there are none."""
     body = read_toml(path) if path.is_file() else {}
-    sets = {name: parse_designs(raw, {}, set(), f"{path}: {name}") for name, raw in body.items()}
-    return {**dict.fromkeys(_DEFAULTS, (PLAIN,)), **sets}
-
-
-def default_set(kind: str, parts: Sequence[Mapping[str, Any]]) -> str:
-    """Name the set of a category that says none, by its kind and its parts."""
-    if kind == "landmark" or not parts:
-        return "fixed"
-    if kind == "vehicle":
-        return "vehicle"
-    reach = [_reach(part) for part in parts]
-    body = [part for part, one in zip(parts, reach, strict=True) if one >= _BODY_SHARE * max(reach)]
-    if any(part["shape"] == "sphere" and "radius" in part and not part.get("half") for part in body):
-        return "scaled"
-    return "round" if any(_is_upright_round(part) for part in body) else "free"
-
-
-def _is_upright_round(part: Mapping[str, Any]) -> bool:
-    """Whether a part turns about an upright axis, by its shape or as a ring."""
-    ring = part.get("ring")
-    if ring is not None:
-        return bool(ring.get("axis", "z") == "z") and part["shape"] != "text"
-    return part["shape"] in ROUND and not any(part.get("rotate", ()))
-
-
-def _reach(part: Mapping[str, Any]) -> float:
-    """Rough horizontal extent of a part, metres; expressions count nothing."""
-    ring = part.get("ring", {})
-    sizes = [
-        part.get("radius", 0.0),
-        part.get("width", 0.0),
-        *(part.get("radii") or [0.0])[:2],
-        ring.get("radius", 0.0),
-    ]
-    sizes += [row[0] for row in part.get("points", []) if isinstance(row, list)]
-    out = max((abs(size) for size in sizes if isinstance(size, int | float)), default=0.0) * 2.0
-    flat = [size for size in part.get("size", [])[:2] if isinstance(size, int | float)]
-    return max([out, *flat])
+    return {name: parse_designs(raw, {}, set(), f"{path}: {name}") for name, raw in body.items()}

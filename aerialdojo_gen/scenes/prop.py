@@ -11,7 +11,7 @@ from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.anatomy import FRONTS
 from aerialdojo_gen.scenes.builders import builders
-from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, default_set, parse_designs
+from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, parse_designs
 from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
@@ -57,7 +57,7 @@ class Category:
     target: bool = True  # Whether tasks may ask for it: false of landmarks and of scenery
     front: str = ""
     identifying_parts: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
-    designs: tuple[Design, ...] = (PLAIN,)  # Proportions that it comes in; the first is what its parts say
+    designs: tuple[Design, ...] = (PLAIN,)  # Forms that it comes in; the first is what its parts say
     scale: float = 1.0  # Factor of all that its parts or its builder say
 
     def design(self, name: str) -> Design:
@@ -121,7 +121,8 @@ def parse_category(
             raise AssetError(f"{where} variants[{k}]: duplicate variant {variants[-1].name!r}")
     if not variants:
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
-    chosen = body.get("designs", default_set(kind, parts) if target else "fixed")
+    chosen = body.get("designs", "plain")
+    sets = {"plain": (PLAIN,), **sets}
     if isinstance(chosen, str) and chosen not in sets:
         raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
     designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")

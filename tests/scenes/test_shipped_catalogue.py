@@ -19,7 +19,7 @@ from support.catalogue_faults import catalogue_faults
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
-from aerialdojo_gen.scenes.designs import PLAIN, DesignSets, of_side, parse_designs
+from aerialdojo_gen.scenes.designs import of_side, parse_designs
 from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
@@ -234,9 +234,8 @@ def test_the_scale_of_a_category_multiplies_all_extents(catalogue):
 @pytest.mark.parametrize("scale", [0, 0.09, 10.5, -1, True, "2", float("nan")])
 def test_a_scale_beyond_use_is_named(catalogue, scale):
     body = {"name": "box", "scale": scale, "parts": [{"shape": "box", "size": [1, 1, 1], "role": "wood"}]}
-    sets: DesignSets = dict.fromkeys(("free", "fixed"), (PLAIN,))
     with pytest.raises(AssetError, match=r"\[crate\]: scale must be a number from 0.1 to 10"):
-        parse_category(Path("props.toml"), "crate", body, catalogue.materials, sets)
+        parse_category(Path("props.toml"), "crate", body, catalogue.materials, {})
 
 
 @pytest.mark.parametrize(("category", "part", "axes"), [
