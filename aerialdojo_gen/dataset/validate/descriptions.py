@@ -45,6 +45,8 @@ _COLOURS = {
     "gray": {"grey", "white", "black"}, "black": {"black", "grey"},
 }  # fmt: skip
 _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
+# Beside a colour they say nothing of which thing has it: others of the text are dark green, too.
+_NO_PART = {*_COLOURS, "and", "dark", "light", "pale", "bright", "deep"}
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ def _recoloured(instance: Instance, text: str) -> str:
         words += _split(key) if len(words) == 1 and key != "colour" else []
         for k, word in enumerate(words):
             rest = [*words[:k], *words[k + 1 :]]
-            if word not in _COLOURS or {*rest} <= {*_COLOURS, "and"}:
+            if word not in _COLOURS or {*rest} <= _NO_PART:
                 continue
             phrase = " ".join([*words[:k], _ANY_COLOUR, *words[k + 1 :]]).removeprefix("a ")
             found = re.findall(rf"\b{phrase}\b(?! {head}\b)", normalized)
