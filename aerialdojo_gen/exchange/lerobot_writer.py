@@ -150,12 +150,12 @@ def _write_videos(
     counts: Counts = {}
     for _, frames in sample_frames.frames(k):
         for v, view in enumerate(s.views):
-            if frames.rgb is not None:
-                _add(counts, view_key(view), _rgb_counts(frames.rgb[:, v]))
-                for picture in frames.rgb[:, v]:
+            if "rgb" in frames:
+                _add(counts, view_key(view), _rgb_counts(frames["rgb"][:, v]))
+                for picture in frames["rgb"][:, v]:
                     clips[view_key(view)].write(picture)
-            if frames.depth_m is not None:
-                codes = depth_codes(frames.depth_m[:, v], s.max_depth_m)
+            if "depth_m" in frames:
+                codes = depth_codes(frames["depth_m"][:, v], s.max_depth_m)
                 _add(counts, depth_key(view), _counted(codes, DEPTH_CODES)[None])
                 for code in codes:
                     clips[depth_key(view)].write(code)

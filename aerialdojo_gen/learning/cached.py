@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.learning.index import Index
-from aerialdojo_gen.learning.pictures import Frames, Source
+from aerialdojo_gen.learning.pictures import Frames, Source, empty_frames, take
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.atomic import make_folder
 
@@ -51,30 +51,16 @@ class CachedFrames:
 
     def __init__(
         self, source: Source, index: Index, sensors: Sensors, store: CacheOptions, meshes: dict[str, str]
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._source, self._index, self._sensors = source, index, sensors
         self._store, self._meshes = store, meshes
-        self._codec = pa.Codec("lz4_raw")
         self._full = False
         self._used: int | None = None
         self._since = 0
 
-    def __getstate__(self) -> dict[str, object]:
-        """Leave out the codec, which cannot be sent to another process."""
-        return {name: value for name, value in self.__dict__.items() if name != "_codec"}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Make the codec anew."""
-        self.__dict__.update(state)
-        self._codec = pa.Codec("lz4_raw")
-
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Read what is there, draw the rest, and keep what was drawn while there is room; see `Source`."""
-        s = self._sensors
-        shape = (len(steps), len(s.views), s.height, s.width)
-        out = Frames(
-            np.empty((*shape, 3), np.uint8) if s.rgb else None, np.empty(shape, np.float32) if s.depth else None
-        )
+        out = empty_frames(self._sensors, len(steps))
         missing = []
         for k in np.unique(trajectories):
             rows = np.flatnonzero(trajectories == k)
@@ -85,10 +71,17 @@ class CachedFrames:
                 n = int(self._index.steps[k])
                 whole = self._source.frames(np.full(n, k), np.arange(n))
                 self._keep(k, whole)
-                _place(out, rows, whole.take(steps[rows]))
-                continue
-            _place(out, rows, self._source.frames(trajectories[rows], steps[rows]))
+                drawn = take(whole, steps[rows])
+            else:
+                drawn = self._source.frames(trajectories[rows], steps[rows])
+            for name, seen in drawn.items():
+                out[name][rows] = seen
         return out
+
+    @property
+    def _codec(self) -> pa.Codec:
+        # Not kept: it cannot be sent to another process.
+        return pa.Codec("lz4_raw")
 
     @cached_property
     def _folder(self) -> Path:
@@ -112,32 +105,27 @@ class CachedFrames:
                     at, length, crc = _ENTRY.unpack_from(head, len(_MAGIC) + step * _ENTRY.size)
                     file.seek(at)
                     packed = file.read(length)
-                    if len(packed) != length or zlib.crc32(packed) != crc or not self._unpack(packed, row, out):
+                    if len(packed) != length or zlib.crc32(packed) != crc:
                         return False
+                    self._unpack(packed, row, out)
         except OSError:
             return False
         return True
 
-    def _unpack(self, packed: bytes, row: int, out: Frames) -> bool:
-        pixels = len(self._sensors.views) * self._sensors.height * self._sensors.width
-        size = pixels * (3 * (out.rgb is not None) + 4 * (out.depth_m is not None))
-        plain = np.frombuffer(self._codec.decompress(packed, size), np.uint8)
-        at = 0
-        if out.rgb is not None:
-            at = 3 * pixels
-            out.rgb[row] = plain[:at].reshape(out.rgb[row].shape)
-        if out.depth_m is not None:
+    def _unpack(self, packed: bytes, row: int, out: Frames) -> None:
+        sizes = {name: seen[row].nbytes for name, seen in out.items()}
+        plain = np.frombuffer(self._codec.decompress(packed, sum(sizes.values())), np.uint8)
+        if "rgb" in out:
+            out["rgb"][row] = plain[: sizes["rgb"]].reshape(out["rgb"][row].shape)
+        if "depth_m" in out:
             # The bytes of one significance together, which are alike: see `_pack`.
-            planes = np.ascontiguousarray(plain[at:].reshape(4, pixels).T)
-            out.depth_m[row] = planes.view("<f4").reshape(out.depth_m[row].shape)
-        return True
+            planes = np.ascontiguousarray(plain[-sizes["depth_m"] :].reshape(4, -1).T)
+            out["depth_m"][row] = planes.view("<f4").reshape(out["depth_m"][row].shape)
 
     def _pack(self, frames: Frames, row: int) -> bytes:
-        parts = []
-        if frames.rgb is not None:
-            parts.append(frames.rgb[row].tobytes())
-        if frames.depth_m is not None:
-            parts.append(frames.depth_m[row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
+        parts = [frames["rgb"][row].tobytes()] if "rgb" in frames else []
+        if "depth_m" in frames:
+            parts.append(frames["depth_m"][row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
         return bytes(self._codec.compress(b"".join(parts), asbytes=True))
 
     def _keep(self, k: int, frames: Frames) -> None:
@@ -182,13 +170,6 @@ def pictures_folder(store: CacheOptions, sensors: Sensors) -> Path:
     folder = store.base / hashlib.sha256(text.encode()).hexdigest()[:16]
     make_folder(folder)
     return folder
-
-
-def _place(out: Frames, rows: NDArray[np.int64], frames: Frames) -> None:
-    if out.rgb is not None and frames.rgb is not None:
-        out.rgb[rows] = frames.rgb
-    if out.depth_m is not None and frames.depth_m is not None:
-        out.depth_m[rows] = frames.depth_m
 
 
 def _sizes(folder: Path) -> Iterator[int]:

@@ -21,10 +21,7 @@ _SAME_M = 0.25
 
 
 def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.uint8]:
-    """Join colours (..., H, W, 3) and depth in metres to (..., H, W, 4) uint8.
-
-    Depth as 255 times the root of depth over range.
-    """
+    """Join colours (..., H, W, 3) and depth, as 255 times the root of depth over range, to (..., H, W, 4) uint8."""
     near = np.sqrt(np.clip(depth_m / np.float32(sensors.max_depth_m), 0.0, 1.0), dtype=np.float32)
     return np.concatenate([rgb, np.rint(near * 255.0).astype(np.uint8)[..., None]], axis=-1)
 

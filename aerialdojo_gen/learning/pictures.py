@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -27,25 +26,26 @@ from aerialdojo_gen.store.root import DataRoot
 _OPEN = 16
 
 
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """What the chosen views show at some poses."""
+# What the chosen views show at n poses, of "rgb" and "depth_m" those asked for: (n, views, H, W, 3) uint8, sRGB, and
+# planar depth, (n, views, H, W) float32, metres, 0 where there is nothing within range.
+Frames = dict[str, NDArray[Any]]
 
-    rgb: NDArray[np.uint8] | None  # (n, views, H, W, 3) uint8 or None; sRGB
-    depth_m: NDArray[np.float32] | None  # Planar depth, metres; 0 where there is nothing within range
 
-    def take(self, rows: NDArray[np.int64]) -> Frames:
-        """Keep some poses, in their order."""
-        return Frames(
-            None if self.rgb is None else self.rgb[rows], None if self.depth_m is None else self.depth_m[rows]
-        )
+def take(frames: Frames, rows: NDArray[np.int64]) -> Frames:
+    """Keep some poses, in their order."""
+    return {name: seen[rows] for name, seen in frames.items()}
 
-    @classmethod
-    def join(cls, parts: Sequence[Frames]) -> Frames:
-        """Join poses, in their order."""
-        rgb = [p.rgb for p in parts if p.rgb is not None]
-        depth_m = [p.depth_m for p in parts if p.depth_m is not None]
-        return cls(np.concatenate(rgb) if rgb else None, np.concatenate(depth_m) if depth_m else None)
+
+def join(parts: Sequence[Frames]) -> Frames:
+    """Join poses, in their order."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def empty_frames(sensors: Sensors, n: int) -> Frames:
+    """Make room for what sensors see at n poses."""
+    shape = (n, len(sensors.views), sensors.height, sensors.width)
+    rgb = {"rgb": np.empty((*shape, 3), np.uint8)} if sensors.rgb else {}
+    return rgb | ({"depth_m": np.empty(shape, np.float32)} if sensors.depth else {})
 
 
 class Source(Protocol):
@@ -69,7 +69,8 @@ class RenderedFrames:
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        return Frames(rgb if sensors.rgb else None, clip_depth(depth_m, sensors) if sensors.depth else None)
+        seen = {"rgb": rgb} if sensors.rgb else {}
+        return seen | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
 
 
 class RecordedFrames:
@@ -102,23 +103,24 @@ class RecordedFrames:
             rows = rows[np.lexsort((steps[rows], trajectories[rows]))]
             parts.append((rows, self._read(trajectories[rows], steps[rows])))
         back = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        return Frames.join([frames for _, frames in parts]).take(back)
+        return take(join([frames for _, frames in parts]), back)
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
-        shape = (len(steps), len(s.views), s.height, s.width)
-        rgb = np.empty((*shape, 3), np.uint8) if s.rgb else None
-        depth_m = np.empty(shape, np.float32) if s.depth else None
+        out = empty_frames(s, len(steps))
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
             root, scene = index.scene_of(k)
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for v, view in enumerate(s.views):
-                if rgb is not None:
-                    rgb[row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
-                if depth_m is not None:
+                if s.rgb:
+                    out["rgb"][row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
+                if s.depth:
                     # The nearest value, not a mean: between two surfaces there is none.
-                    depth_m[row, v] = _smaller(recording.depth_m[view][step], s, cv2.INTER_NEAREST_EXACT)
-        return Frames(rgb, None if depth_m is None else clip_depth(depth_m, s))
+                    depth_m = recording.depth_m[view][step]
+                    out["depth_m"][row, v] = _smaller(depth_m, s, cv2.INTER_NEAREST_EXACT)
+        if s.depth:
+            clip_depth(out["depth_m"], s)
+        return out
 
 
 def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
@@ -128,10 +130,7 @@ def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.flo
 
 
 def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, int]:
-    """Count, by ``nav_id``, the frames of recordings that have all views asked for.
-
-    One frame a pose and no quality flags.
-    """
+    """Count the frames of recordings that have all views, one a pose, without quality flags, by ``nav_id``."""
     if not root.list("recordings", f"{scene}/*.parquet"):
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")
