@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -59,20 +60,15 @@ class OutcomeTable:
         columns["malls"] = np.where(np.isin(columns["scene"], MALLS), "malls", "other scenes")
         columns["run"] = np.repeat(np.arange(len(runs)), [len(run.episodes) for run in runs])
         self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
-        self._values: dict[tuple[Profile, bool], Floats] = {}
-        self._summaries: dict[Cut, Summary] = {}
-        self._intervals: dict[Cut, Sequence[tuple[float, float]]] = {}
+        self.judged, self.summary, self.intervals = cache(self._judged), cache(self._summary), cache(self._interval)
 
-    def judged(self, profile: Profile, along_way: bool = False) -> Floats:
+    def _judged(self, profile: Profile, along_way: bool = False) -> Floats:
         """Return the `METRICS` of every episode, (n, 6), by a profile."""
-        key = profile, along_way
-        if key not in self._values:
-            logs = [run.episodes for run in self.runs]
-            if along_way:
-                nearest = [run.path_clearance_to_goal_m for run in self.runs]
-                logs = [replace(log, min_distance_m=m) for log, m in zip(logs, nearest, strict=True) if m is not None]
-            self._values[key] = np.concatenate([values_of(outcomes(log, profile)) for log in logs])
-        return self._values[key]
+        logs = [run.episodes for run in self.runs]
+        if along_way:
+            nearest = [run.path_clearance_to_goal_m for run in self.runs]
+            logs = [replace(log, min_distance_m=m) for log, m in zip(logs, nearest, strict=True) if m is not None]
+        return np.concatenate([values_of(outcomes(log, profile)) for log in logs])
 
     def mask(self, cut: Cut) -> Bools:
         """Select the episodes of a cut."""
@@ -86,21 +82,16 @@ class OutcomeTable:
         there = set(self.columns[name][self.mask(cut)].tolist()) - {""}
         return sorted(there) if order is None else [value for value in order if value in there]
 
-    def summary(self, cut: Cut) -> Summary:
+    def _summary(self, cut: Cut) -> Summary:
         """Average a cut by scene, family and overall."""
-        if cut not in self._summaries:
-            mask = self.mask(cut)
-            assert cut.profile is not None
-            values = self.judged(cut.profile, cut.along_way)[mask]
-            scene, family = (self.columns[name][mask] for name in ("scene", "family"))
-            self._summaries[cut] = summarize_values(values, scene, family)
-        return self._summaries[cut]
+        mask = self.mask(cut)
+        assert cut.profile is not None
+        scene, family = (self.columns[name][mask] for name in ("scene", "family"))
+        return summarize_values(self.judged(cut.profile, cut.along_way)[mask], scene, family)
 
-    def intervals(self, cut: Cut) -> Sequence[tuple[float, float]]:
+    def _interval(self, cut: Cut) -> Sequence[tuple[float, float]]:
         """Return the 95 % intervals of a cut's overall metrics, in the order of `METRICS`."""
-        if cut not in self._intervals:
-            self._intervals[cut] = score_intervals(self.summary(cut))
-        return self._intervals[cut]
+        return score_intervals(self.summary(cut))
 
     def score(self, cut: Cut) -> Score:
         """Average a cut to one score."""

@@ -55,7 +55,7 @@ class OracleAgent(_ListAgent):
         self._actions = [action for action in actions if action != APPROACH]
 
 
-class RandomAgent(AgentBase):
+class RandomAgent(_ListAgent):
     """Draws among the 16 actions, Stop as likely as any other.
 
     Parameters
@@ -65,8 +65,6 @@ class RandomAgent(AgentBase):
     stop_probability : float, optional
         Chance of Stop at each step; the other actions share the rest. One in 16 where absent.
     """
-
-    sensors = BLIND
 
     def __init__(self, seed: int = 0, stop_probability: float | None = None) -> None:
         p = 1.0 / N_ACTIONS if stop_probability is None else float(stop_probability)
@@ -82,10 +80,6 @@ class RandomAgent(AgentBase):
         words = (goal.modality, goal.target_name, goal.landmark, goal.direction, goal.description or "", budget)
         draws = rng.generator(self._seed, "random-agent", *words)
         self._actions = draws.choice(N_ACTIONS, size=budget, p=self._p).tolist()
-
-    def act(self, observation: Observation) -> int:
-        """Draw an action."""
-        return int(self._actions[observation.step])
 
 
 class StopAgent(_ListAgent):
@@ -117,7 +111,7 @@ NO_ACTION = "-"
 SYMBOLS = f"0123456789abcdef{NO_ACTION}"
 
 
-class SubmittedAgent(AgentBase):
+class SubmittedAgent(_ListAgent):
     """Replays submitted actions; the runner says which task comes next, and says so to no other agent.
 
     Parameters
@@ -126,23 +120,16 @@ class SubmittedAgent(AgentBase):
         JSON: the actions of every task, a character of `SYMBOLS` each, by task id.
     """
 
-    sensors = BLIND
-
     def __init__(self, file: str) -> None:
         self._by_task: dict[str, str] = read_json(Path(file))
-        self._actions = ""
 
     def follow(self, task_id: str) -> None:
         """Take the actions of the next episode."""
-        self._actions = self._by_task[task_id]
-
-    def reset(self, goal: Goal) -> None:
-        """Begin an episode."""
+        self._actions = [SYMBOLS.index(symbol) for symbol in self._by_task[task_id]]
 
     def act(self, observation: Observation) -> int:
         """Do what was submitted for this step; Stop where the list has ended and the episode has not."""
-        if observation.step >= len(self._actions):
-            return STOP
-        if self._actions[observation.step] == NO_ACTION:
+        action = super().act(observation)
+        if SYMBOLS[action] == NO_ACTION:
             raise InvalidAnswer("submitted as an answer that names no action")
-        return SYMBOLS.index(self._actions[observation.step])
+        return action
