@@ -27,7 +27,11 @@ def _bins(*edges: float) -> _Parts:
     """Bins of numbers; a rounding error below the lowest edge belongs to the first bin."""
     heads = [f"{low:g} to {high:g}" for low, high in pairwise(edges)] + [f"{edges[-1]:g} and more"]
     bounds = zip((-math.inf, *edges[1:]), (*edges[1:], math.inf), strict=True)
-    return {head: lambda value, b=b: b[0] <= value < b[1] for head, b in zip(heads, bounds, strict=True)}
+    return {head: _within(*ends) for head, ends in zip(heads, bounds, strict=True)}
+
+
+def _within(low: float, high: float) -> Callable[[Any], bool]:
+    return lambda value: low <= value < high
 
 
 @dataclass(frozen=True)
