@@ -5,6 +5,7 @@ Undo and redo are based on it, so that they survive restarts of the server and r
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,24 +44,20 @@ class History:
     def refresh(self) -> None:
         """Read new records; an incomplete last line, left by a crash, is ignored."""
         with self._lock:
-            self._read_on()
-
-    def _read_on(self) -> None:
-        size = self.path.stat().st_size if self.path.exists() else 0
-        if size < self.whole:
-            self.records, self.whole = [], 0
-        if size == self.whole:
-            return
-        with self.path.open("rb") as file:
-            file.seek(self.whole)
-            tail = file.read()
-        end = tail.rfind(b"\n") + 1
-        for line in tail[:end].splitlines():
-            try:
-                self.records.append(Record.model_validate_json(line))
-            except ValidationError:
-                continue  # of another version, or damaged: it only cannot be undone
-        self.whole += end
+            size = self.path.stat().st_size if self.path.exists() else 0
+            if size < self.whole:
+                self.records, self.whole = [], 0
+            if size == self.whole:
+                return
+            with self.path.open("rb") as file:
+                file.seek(self.whole)
+                tail = file.read()
+            end = tail.rfind(b"\n") + 1
+            for line in tail[:end].splitlines():
+                # Of another version, or damaged: it only cannot be undone.
+                with contextlib.suppress(ValidationError):
+                    self.records.append(Record.model_validate_json(line))
+            self.whole += end
 
     def stacks(self, client: str) -> tuple[list[Record], list[Record]]:
         """Return a tab's undo and redo stacks, the next one last."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from typing import Any, TypeVar
 
 import cv2
@@ -61,15 +60,14 @@ class SceneCache:
 
     def __init__(self, root: DataRoot, names: Sequence[str]) -> None:
         self.root, self.names = root, tuple(names)
-        self._open: OrderedDict[str, SceneData] = OrderedDict()
-        self._thumbs: dict[tuple[str, int], bytes] = {}
-        self._pictures: dict[str, bytes] = {}
-        self._lock = threading.Lock()
+        self._load = lru_cache(_MAX_OPEN)(partial(SceneData, root))
         # Renderers belong to their thread and FCL's manager is not thread-safe; dropping a scene closes both.
         # So one thread does everything that touches a mesh.
         self._worker = ThreadPoolExecutor(1, "scenes")
         self._render_lock, self._read_lock = threading.Lock(), threading.Lock()
-        self._images = lru_cache(maxsize=_MAX_OPEN)(self._read_images)
+        self._images = lru_cache(_MAX_OPEN)(self._read_images)
+        self._kept_thumb = cache(self._thumb)
+        self._kept_picture = cache(lambda name: self.run(name, lambda data: _picture(data.model)))
 
     def require(self, name: str) -> None:
         """Raise a UsageError if there is no such scene."""
@@ -81,27 +79,19 @@ class SceneCache:
         self.require(name)
         return self._worker.submit(lambda: what(self._load(name))).result()
 
-    def _load(self, name: str) -> SceneData:
-        with self._lock:
-            data = self._open.pop(name, None) or SceneData(self.root, name)
-            self._open[name] = data
-            while len(self._open) > _MAX_OPEN:
-                self._open.popitem(last=False)
-            return data
-
     def thumb(self, name: str, object_id: int) -> bytes:
         """Return an object's reference image as a thumbnail, JPEG; UsageError if it has none."""
         self.require(name)
         with self._read_lock:
-            key = (name, object_id)
-            if key not in self._thumbs:
-                image = decode_rgb(self._images(name).get(object_id))
-                if image is None:
-                    raise UsageError(f"object {object_id} of {name} has no reference image")
-                scale = THUMB_PX / max(image.shape[:2])
-                small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-                self._thumbs[key] = encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
-            return self._thumbs[key]
+            return self._kept_thumb(name, object_id)
+
+    def _thumb(self, name: str, object_id: int) -> bytes:
+        image = decode_rgb(self._images(name).get(object_id))
+        if image is None:
+            raise UsageError(f"object {object_id} of {name} has no reference image")
+        scale = THUMB_PX / max(image.shape[:2])
+        small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        return encode_jpeg(np.asarray(small, dtype=np.uint8), GALLERY_JPEG)
 
     def _read_images(self, name: str) -> dict[int, bytes | None]:
         table = store.read_scene(self.root, "release/objects", name, ["object_id", "reference_image"])
@@ -111,9 +101,7 @@ class SceneCache:
         """Return a picture of a scene from the south-west, JPEG, like the initial view of its page."""
         # One at a time: the start page requests many, and other requests must not wait for all of them.
         with self._render_lock:
-            if name not in self._pictures:
-                self._pictures[name] = self.run(name, lambda data: _picture(data.model))
-            return self._pictures[name]
+            return self._kept_picture(name)
 
 
 def _picture(scene: Scene) -> bytes:
