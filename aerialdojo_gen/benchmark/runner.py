@@ -23,9 +23,9 @@ from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
 from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
+from aerialdojo_gen.benchmark.flight import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
-from aerialdojo_gen.benchmark.viewpoints import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk

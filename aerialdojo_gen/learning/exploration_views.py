@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.shared import Embodiment
+from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.parts import Exploration, Part, blocked_at, pictures

@@ -18,8 +18,7 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
-from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.benchmark.tasks import Selection, check_paraphrase, select, texts_of_tasks
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store import shards as store

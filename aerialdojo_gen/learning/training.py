@@ -280,7 +280,7 @@ class _Training:
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
         if phase < 0 and self._exploration is not None:
-            from aerialdojo_gen.learning.recognition import train_patch_classifier
+            from aerialdojo_gen.learning.imitation import train_patch_classifier
 
             log = self._log("sight", self._recipe.sight.epochs)
             train_patch_classifier(self._learner, self._exploration, self._about.named, log)
