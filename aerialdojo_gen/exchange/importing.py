@@ -17,7 +17,7 @@ from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
 from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
 from aerialdojo_gen.exchange.report import Report
-from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, Tables
+from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, IMPORTED_ROUTES, IMPORTED_TASKS, Tables
 from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.store.root import Where, open_root
@@ -30,8 +30,7 @@ class Objects:
     """Collects what tasks say about their targets; pictures are read at the end, so memory holds none."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[str, object], int] = {}
-        self._counts: dict[str, int] = {}
+        self._numbers: dict[str, dict[object, int]] = {}
         self._rows: dict[tuple[str, int], dict[str, Any]] = {}
         self._pictures: dict[tuple[str, int], dict[str, Path]] = {}
         self._owners: dict[str, tuple[str, int]] = {}
@@ -42,11 +41,8 @@ class Objects:
             return int(task.known["target_object_id"])
         if task.object_key is None:
             return None
-        key = (task.scene, task.object_key)
-        if key not in self._numbers:
-            self._counts[task.scene] = count = self._counts.get(task.scene, 0) + 1
-            self._numbers[key] = _OURS_FROM + count - 1
-        return self._numbers[key]
+        own = self._numbers.setdefault(task.scene, {})
+        return own.setdefault(task.object_key, _OURS_FROM + len(own))
 
     def add(self, task: Task, number: int) -> list[str | None]:
         """Take in what the task says about its target and its start."""
@@ -86,12 +82,10 @@ class Objects:
         for scene, number in sorted(self._rows):
             empty = dict.fromkeys(IMPORTED_OBJECTS.schema.names)
             row = empty | self._rows[scene, number] | {"scene": scene, "object_id": number}
-            pictures = self._pictures.get((scene, number))
-            if not pictures:
-                tables.object({**row, "reference_image_id": ""})
-            for name in sorted(pictures or ()):
-                picture = (pictures or {})[name]
-                tables.object({**row, "reference_image_id": name, "reference_image": picture.read_bytes()})
+            pictures = self._pictures.get((scene, number), {})
+            for name, picture in sorted(pictures.items()) or [("", None)]:
+                data = None if picture is None else picture.read_bytes()
+                tables.add(IMPORTED_OBJECTS, {**row, "reference_image_id": name, "reference_image": data})
 
 
 MARKER = "import.json"
@@ -157,7 +151,9 @@ def import_benchmark(
         for task, source in _tasks(sources, chosen, frame, options, report, bad):
             _write(task, source, tables, objects, report)
         if report.n_bad and not options.skip_bad:
-            raise _refusal(report)
+            more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
+            head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written"
+            raise ImportRefused("\n  ".join([f"{head} (--skip-bad keeps the rest):", *report.bad, *more]))
         objects.write(tables)
         tables.close()
         report.rows = dict(tables.written)
@@ -252,14 +248,8 @@ def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects,
         task.known["target_object_id"] = number
         pictures = objects.add(task, number)
     for row in task_rows(task, nav_id, source, pictures):
-        tables.task(row)
+        tables.add(IMPORTED_TASKS, row)
     if task.has_route_row:
-        tables.route(route_row(task, nav_id, source))
+        tables.add(IMPORTED_ROUTES, route_row(task, nav_id, source))
         if task.route is not None:
             report.replayed(task.route.replay_error_m)
-
-
-def _refusal(report: Report) -> ImportRefused:
-    more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
-    head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written (--skip-bad keeps the rest):"
-    return ImportRefused("\n  ".join([head, *report.bad, *more]))

@@ -94,10 +94,9 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
     episodes: list[dict[str, Stats]] = []
     sums: Counts = {}
     with ExitStack() as stack:
+        s = options.sensors
         clips = {
-            key: stack.enter_context(
-                Clip(folder / f"{key}.mp4", kind, options.sensors.width, options.sensors.height, FPS)
-            )
+            key: stack.enter_context(Clip(folder / f"{key}.mp4", kind, s.width, s.height, FPS))
             for key, kind in video_kinds(options).items()
         }
         sample_frames = SampleFrames(root, part, options)

@@ -41,11 +41,11 @@ def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
     if len(done) != len(poses) - 1:
         context.notes["not one action a pose: action is null, source_action has them"] += 1
         return Route(poses, None, names, error)
-    ours = [m.ours for m in done]
-    if any(action is None for action in ours):
+    ours = [m.ours for m in done if m.ours is not None]
+    if len(ours) < len(done):
         context.notes["has actions that are none of ours: action is null, source_action has them"] += 1
         return Route(poses, None, names, error)
-    return Route(poses, [a for a in ours if a is not None] + [0], names, error)
+    return Route(poses, [*ours, 0], names, error)
 
 
 def read_aerialvln(record: Fields, context: Context) -> Task:

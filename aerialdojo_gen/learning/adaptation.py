@@ -32,15 +32,13 @@ class InitialWeights:
     def check_fit(self, sensors: Sensors, model: ModelConfig) -> None:
         """Refuse a recipe with other views or sizes; UsageError names the key."""
         own = self.about.sensors
-        sizes = model.model_dump(mode="json")
-        theirs = {"[data] views": list(own.views), "[data] size_px": own.width}
-        theirs |= {f"[model] {key}": self.about.shape[key] for key in sizes}
-        ours = {"[data] views": list(sensors.views), "[data] size_px": sensors.width}
-        ours |= {f"[model] {key}": value for key, value in sizes.items()}
-        for key, value in ours.items():
-            if theirs[key] != value:
+        pairs = {"[data] views": (list(own.views), list(sensors.views)), "[data] size_px": (own.width, sensors.width)}
+        sizes = model.model_dump(mode="json").items()
+        pairs |= {f"[model] {key}": (self.about.shape[key], value) for key, value in sizes}
+        for key, (its, ours) in pairs.items():
+            if its != ours:
                 raise UsageError(
-                    f"{self.path} does not fit the recipe: its {key} is {theirs[key]}, and the recipe's is {value}"
+                    f"{self.path} does not fit the recipe: its {key} is {its}, and the recipe's is {ours}"
                 )
 
     def vocabulary(self, own: Vocabulary) -> Vocabulary:

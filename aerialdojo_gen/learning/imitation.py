@@ -41,10 +41,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: mean loss and accuracy of the steps trained on, and what `Learner.assess` finds.
-
-    The loss and this accuracy are those of choices that are told where the goal is.
-    """
+    """What came of an epoch: loss and accuracy of choices told where the goal is, and what `Learner.assess` finds."""
 
     phase: int
     number: int
@@ -76,10 +73,7 @@ class TrainingLog:
 def epoch_batches(
     lengths: NDArray[np.int64], most_steps: int, seed: int, phase: int, epoch: int
 ) -> list[NDArray[np.int64]]:
-    """Batches of episodes of like lengths, shuffled by (seed, phase, epoch).
-
-    At most `most_steps` steps each, padding included.
-    """
+    """Batches of episodes of like lengths, shuffled, of at most `most_steps` steps each, padding included."""
     draw = rng.generator(seed, "learning batches", phase, epoch)
     order = draw.permutation(np.flatnonzero(lengths > 0))
     size = max(1, int(_CHUNK * most_steps / max(float(lengths.mean()), 1.0)))
@@ -181,10 +175,7 @@ class Learner:
         log: TrainingLog, *, step: Callable[[NDArray[np.int64], float], tuple[float, float, int]],
         assess: Callable[[], Assessment | None] = lambda: None,
     ) -> None:  # fmt: skip
-        """Go through epochs of so many batches each, from where the progress is.
-
-        `step` learns from a batch at a rate, and returns its mean loss, how many were right, and of how many.
-        """
+        """Go on through epochs; `step` learns a batch, and returns its mean loss, how many are right, of how many."""
         p = self.progress
         total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         started, first = time.monotonic(), done
@@ -263,11 +254,8 @@ class Learner:
         return out
 
     def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[PolicyOutput, LocalizationOutput]:
-        """Guess where goals are, and choose by that guess, or by where they are where the choice is told.
-
-        A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them,
-        and who searches, or has a better map later, has a choice that does not follow.
-        """
+        """Guess where goals are, and choose by that guess, or by where they are where the choice is told."""
+        # A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them.
         network = self.network
         with self.autocast():
             goal = network.understand(batch["tokens"], batch["images"], batch["told_by_image"])

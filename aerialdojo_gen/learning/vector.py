@@ -75,11 +75,8 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
         observation, reward, terminated, truncated, info = self.env.step(action)
         before, after = self._left_m, self._goal_distance_m()
         # Where no way is known, in a nook that the grid does not enter, there is no progress either.
-        if np.isfinite(after):
-            self._left_m = after
-        else:
-            after = before
-        gained = self._scale * (before - self._discount * after) - self._action_cost
+        self._left_m = after if np.isfinite(after) else before
+        gained = self._scale * (before - self._discount * self._left_m) - self._action_cost
         if info["reason"] == "collision":
             gained -= self._collision_cost
         return observation, float(reward) + gained, terminated, truncated, {**info, "goal_distance_m": self._left_m}
@@ -162,25 +159,21 @@ def make_vec(
     scenes = make_env(data, scene=scene, **{**options, "views": (), "sensors": None}).scenes
     shares = [tuple(scenes[k % len(scenes) :: num_envs]) if spread_scenes else () for k in range(num_envs)]
     shaping = {} if progress is True else progress or None
-    makers = [partial(_make_one, root.url, scene, share, shaping, tuple(wrappers), options) for share in shares]
+    shaped = [] if shaping is None else [partial(ProgressReward, **shaping)]
+    makers = [
+        partial(
+            _make_one, root.url, {**options, "scene": scene},
+            [*([partial(OwnScenes, scenes=share)] if share else []), *shaped, *wrappers],
+        )
+        for share in shares
+    ]  # fmt: skip
     if vectorization_mode == "sync":
         return SyncVectorEnv(makers)
     return AsyncVectorEnv(makers, context=context or "spawn")
 
 
-def _make_one(
-    data: str,
-    scene: str | Sequence[str],
-    own: tuple[str, ...],
-    shaping: dict[str, float] | None,
-    wrappers: tuple[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]], ...],
-    options: dict[str, Any],
-) -> gymnasium.Env[Any, Any]:
-    env: gymnasium.Env[Any, Any] = make_env(data, scene=scene, **options)
-    if own:
-        env = OwnScenes(env, own)
-    if shaping is not None:
-        env = ProgressReward(env, **shaping)
+def _make_one(data: str, options: dict[str, Any], wrappers: Sequence[Callable[..., Any]]) -> gymnasium.Env[Any, Any]:
+    env: gymnasium.Env[Any, Any] = make_env(data, **options)
     for wrap in wrappers:
         env = wrap(env)
     return env
