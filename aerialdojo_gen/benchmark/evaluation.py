@@ -148,10 +148,7 @@ class BudgetTracker:
 
 
 def agent_code_digest(agent: str) -> str:
-    """Digest the code that flies an agent.
-
-    Unlike stages, libraries do not count: an update must not end a run whose episodes have cost money.
-    """
+    """Digest the code that flies an agent; libraries do not count: an update must not end a run that cost money."""
     module = BUILT_IN.get(agent, agent).partition(":")[0]
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
     if module.split(".")[0] == "aerialdojo_gen":

@@ -87,10 +87,7 @@ def view_of(scene: Scene, node: str, viewpoints: Floats, goal: Point, position: 
 
 
 class Flight:
-    """Flies tasks: the evaluator's side of the closed loop.
-
-    An agent never gets this object, only the `goal` and what `observe` returns.
-    """
+    """Flies tasks: the evaluator's side. An agent gets only the `goal` and what `observe` returns."""
 
     task: Task  # Current, from `begin` on; so are the following
     goal: Goal

@@ -171,10 +171,7 @@ class Outcomes:
 
 
 def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
-    """Judge every episode by a profile.
-
-    An episode that starts at its goal has L = 0: its SPL is 1 where it succeeds without moving, 0 where it moved.
-    """
+    """Judge every episode by a profile; one that starts at its goal has SPL 1 if it succeeds without moving, else 0."""
     final, nearest = distances(episodes, profile)
     may = may_succeed(episodes, profile)
     success = may & (final <= profile.radius_m)

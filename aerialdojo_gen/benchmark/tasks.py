@@ -45,10 +45,7 @@ _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m
 
 @dataclass(frozen=True)
 class Selection:
-    """Which tasks; an empty field chooses all.
-
-    ``train`` and ``test`` stand for the splits of both partitions, ``all`` for all, and become their names.
-    """
+    """Which tasks; an empty field chooses all. ``train``, ``test`` and ``all`` become the names of splits."""
 
     splits: tuple[str, ...] = ()  # Of `aerialdojo_gen.store.schemas.SUBSETS`
     settings: tuple[str, ...] = ()
@@ -259,10 +256,7 @@ def texts_of_tasks(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[s
 
 
 class TaskSampler:
-    """Samples tasks uniformly with replacement, in blocks of one scene.
-
-    The first of a block is drawn from all tasks, the others from its scene.
-    """
+    """Samples tasks with replacement, in blocks of one scene: the first from all tasks, the others from its scene."""
 
     def __init__(self, scenes: Sequence[str], run_length: int = 1) -> None:
         self._scenes = scenes

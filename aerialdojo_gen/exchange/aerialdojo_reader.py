@@ -55,10 +55,7 @@ def label(path: Path) -> str | None:
 
 
 class Reader:
-    """Reads tasks, and each trajectory once for both of its instances.
-
-    One a whole import: it knows the navigation tasks that it has met.
-    """
+    """Reads tasks of one import, and each trajectory once for both of its instances."""
 
     def __init__(self) -> None:
         self._partition: tuple[str, ...] = ()

@@ -114,10 +114,7 @@ _COORDINATES = "ProjectAirSim NED"
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
-    """Write a scene's tasks, pictures and trajectories.
-
-    As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
-    """
+    """Write a scene's tasks, pictures and trajectories; a partition without tasks is an empty list."""
     objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
     draw = RerenderedImages(data, scene, picture_px) if picture_px else None
     pictures = _Pictures(scene, objects, draw)

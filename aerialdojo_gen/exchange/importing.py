@@ -131,10 +131,7 @@ def import_benchmark(
     name: str | None = None,
     force: bool = False,
 ) -> Report:
-    """Import others' task files as tables.
-
-    Nothing is written where a file is damaged, or bad records are not to be skipped.
-    """
+    """Import others' task files as tables; for damaged files, or bad records that are not skipped, write nothing."""
     options = options or Options()
     if format_name not in FORMATS:
         raise UsageError(unknown("no format", format_name, FORMATS))

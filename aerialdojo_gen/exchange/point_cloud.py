@@ -20,12 +20,7 @@ _PLY = {"<f4": "float", "|u1": "uchar", "<i4": "int"}
 
 
 def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
-    """Draw points from all surfaces of a scene, hidden ones too, without the backdrop.
-
-    Each instance has a random stream of its own: its points depend on it, the scene's name and the density alone.
-    They are a structured array of `POINT`: metres in the world frame, sRGB of the material without light, and
-    ``instance`` as in recordings, the place of the node in the scene, from 1.
-    """
+    """Draw `POINT`s (world metres, sRGB) from all surfaces but the backdrop, each instance by a stream of its own."""
     expected = points_per_m2 * float(_areas(*soup(scene.instances)).sum()) if scene.instances else 0.0
     if expected > MOST_POINTS:
         raise UsageError(

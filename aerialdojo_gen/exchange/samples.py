@@ -176,10 +176,7 @@ class SampleFrames:
             yield begin, self._source.frames(np.full(len(steps), k), steps)
 
     def goal(self, k: int) -> NDArray[np.uint8]:
-        """Return the goal's picture of trajectory k: (H, W, 3) uint8, as wide and high as the views'.
-
-        A trajectory without an image instance has a black one.
-        """
+        """Return trajectory k's goal picture, (H, W, 3) uint8, as large as the views'; black where there is none."""
         s = self._sensors
         named = self._part.index.goal_columns["reference_image_id"][k]
         if named is None:

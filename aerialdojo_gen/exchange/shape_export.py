@@ -40,11 +40,7 @@ def export_shapes(
     force: bool = False,
     reporter: Reporter | None = None,
 ) -> dict[str, int]:
-    """Write a point cloud or an occupancy grid of each scene whose mesh is there; no release is needed.
-
-    A folder ``SCENE.ply`` and ``SCENE.nodes.json``, or ``SCENE.npz``, and ``export.json``: whole or not at all.
-    Returns the numbers of scenes and points, or of scenes, voxels and occupied ones.
-    """
+    """Write a point cloud or an occupancy grid of each scene with a mesh; no release is needed."""
     if format_name not in SHAPES:
         raise UsageError(unknown("no format", format_name, SHAPES))
     if not points_per_m2 > 0.0 or not np.isfinite(points_per_m2):

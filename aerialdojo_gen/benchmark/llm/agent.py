@@ -34,10 +34,7 @@ _STATUS = re.compile(r": HTTP (\d{3}): ")
 
 
 def refused(error: UsageError, model: str, key_variable: str) -> ServiceDown:
-    """Make the error that ends a run from a service's refusal of all requests.
-
-    Not what was asked for is wrong, as a `UsageError` says, but what stands behind it: the exit code is 1.
-    """
+    """Make the error of a service's refusal of all requests; its exit code is 1: what was asked for is not wrong."""
     status = _STATUS.search(str(error))
     code = status[1] if status else ""
     if code == "404":

@@ -260,11 +260,7 @@ def rewrite_scene(
     name: str, roots: ProjectPaths, agent: LanguageModelAgent, limits: Limits | None, *, again: bool = False,
     say: Callable[[str], object] = lambda line: None,
 ) -> Rewriting | None:  # fmt: skip
-    """Rewrite the descriptions in a scene's annotation file, those of people only if `again`.
-
-    Without limits it says what would be sent, and sends nothing: None. Where the service refuses all requests
-    (ServiceDown) the file stays as it is.
-    """
+    """Rewrite descriptions in an annotation file, people's only if `again`; without limits it sends nothing: None."""
     path = roots.annotations / f"{name}.json"
     if not path.exists():
         raise AnnotationError(f"{path} does not exist: there is nothing to rewrite")
