@@ -61,7 +61,7 @@ class DeadReckoning:
 
     @property
     def back(self) -> NDArray[np.bool_]:
-        """Actions, (16,) bool, that no route has here: to a pose of before, or turns beyond half a circle in place."""
+        """Actions, (16,) bool, that no route has here: to earlier poses, or turns beyond half a circle in place."""
         turned = self._turns >= N_HEADINGS // 2
         found = [(turned and bool(TURNS[a])) or _pose(*self._after(a)) in self._been for a in range(N_ACTIONS)]
         found[STOP] = False

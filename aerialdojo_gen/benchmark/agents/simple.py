@@ -47,7 +47,7 @@ class OracleAgent(_ListAgent):
 
 
 class RandomAgent(_ListAgent):
-    """Draws among the 16 actions by `seed` and the goal's words; Stop as often as others, or by `stop_probability`."""
+    """Draws among the 16 actions by `seed` and the goal's words; Stop as often as each, or by `stop_probability`."""
 
     def __init__(self, seed: int = 0, stop_probability: float | None = None) -> None:
         p = 1.0 / N_ACTIONS if stop_probability is None else float(stop_probability)

@@ -33,19 +33,16 @@ _BY_KIND = {
 _STATUS = re.compile(r": HTTP (\d{3}): ")
 
 
-def refused(error: UsageError, model: str, key_variable: str) -> ServiceDown:
-    """Make the error of a service's refusal of all requests; its exit code is 1: what was asked for is not wrong."""
+def _mend_of(error: UsageError, model: str, key_variable: str) -> str:
     status = _STATUS.search(str(error))
     code = status[1] if status else ""
     if code == "404":
-        mend = f"is --option model={model} served there, and is base_url right?"
-    elif code.startswith("3"):
-        mend = "it sends requests elsewhere: is base_url right?"
-    elif code in ("402", "429"):
-        mend = "has the account anything left to spend?"
-    else:
-        mend = f"is the key in {key_variable} right, and may it use model={model}?"
-    return ServiceDown(f"{error}: {mend}")
+        return f"is --option model={model} served there, and is base_url right?"
+    if code.startswith("3"):
+        return "it sends requests elsewhere: is base_url right?"
+    if code in ("402", "429"):
+        return "has the account anything left to spend?"
+    return f"is the key in {key_variable} right, and may it use model={model}?"
 
 
 # An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
@@ -203,7 +200,8 @@ class LanguageModelAgent(AgentBase):
             return self.ask(system, messages, retries, schema)
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
-            raise refused(error, self.options.model, variable) from None
+            # Not what was asked for is wrong, but what stands behind it: the exit code is 1.
+            raise ServiceDown(f"{error}: {_mend_of(error, self.options.model, variable)}") from None
 
     def settled(self) -> dict[str, Any]:
         """Return options that `check` has settled, for the agents that fly."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import hmac
 import time
@@ -46,13 +47,18 @@ class TokenGate:
             after = [(b"retry-after", str(int(wait) + 1).encode())]
             await _respond(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
             return
-        token = _token_of(scope)
+        token = cookie = ""
+        with contextlib.suppress(ValueError):
+            query = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8)
+            token = query.get("token", [""])[0]
+        with contextlib.suppress(CookieError):
+            morsel = SimpleCookie(headers.get(b"cookie", "")).get(COOKIE)
+            cookie = morsel.value if morsel else ""
         if scope["path"] == "/" and self._is_token(token):
             self._known.add(address)
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
             await _respond(send, 303, "", [(b"location", b"/"), (b"set-cookie", kept.encode())])
             return
-        cookie = _cookie(headers.get(b"cookie", ""))
         if not self._is_token(cookie):
             for given in filter(None, (token, cookie)):
                 self._record_guess(address, given)
@@ -93,22 +99,6 @@ class _Guesses:
         self.seen = self.seen if left > 0.0 else set()
         self.level, self.since = left + (digest not in self.seen), now
         self.seen.add(digest)
-
-
-def _token_of(scope: Message) -> str:
-    try:
-        query = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8)
-    except ValueError:
-        return ""
-    return query.get("token", [""])[0]
-
-
-def _cookie(header: str) -> str:
-    try:
-        morsel = SimpleCookie(header).get(COOKIE)
-    except CookieError:
-        return ""
-    return morsel.value if morsel else ""
 
 
 async def _respond(send: Send, status: int, text: str, headers: Sequence[tuple[bytes, bytes]] = ()) -> None:

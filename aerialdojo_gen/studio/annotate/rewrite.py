@@ -26,6 +26,7 @@ from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageError
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.load import load_agent, read_options
+from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Reply
 from aerialdojo_gen.benchmark.llm.answer import read_as
 from aerialdojo_gen.pipeline.stage import ProjectPaths
@@ -82,14 +83,6 @@ class _Read(BaseModel):
 
     said: list[int]
     besides: list[str]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Where rewriting stops."""
-
-    tokens: int | None = None
-    cost_usd: float | None = None
 
 
 @dataclass

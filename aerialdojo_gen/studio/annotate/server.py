@@ -154,20 +154,20 @@ def _add_document(app: FastAPI, session: AnnotationSession) -> None:
             # A full disk or a half-written file is not the client's fault: it retries.
             return JSONResponse({"error": one_line(str(error))}, status_code=503)
 
+    def saved(change: Any, body: AuthoredRequest, if_match: str | None, *content: bytes) -> Response:
+        return _with_version(session.saved(change(_required(if_match), body.author, *content), body.author))
+
     @app.post("/api/undo")
     def undo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.saved(session.storage.undo(_required(if_match), body.author), body.author))
+        return saved(session.storage.undo, body, if_match)
 
     @app.post("/api/redo")
     def redo(body: AuthoredRequest, if_match: _Match = None) -> Response:
-        return _with_version(session.saved(session.storage.redo(_required(if_match), body.author), body.author))
+        return saved(session.storage.redo, body, if_match)
 
     @app.post("/api/import")
     def import_file(body: ImportRequest, if_match: _Match = None) -> Response:
-        raw = body.text.encode("utf-8", "replace")
-        return _with_version(
-            session.saved(session.storage.replace(_required(if_match), body.author, raw), body.author)
-        )
+        return saved(session.storage.replace, body, if_match, body.text.encode("utf-8", "replace"))
 
     @app.post("/api/draft")
     def draft(body: OperationRequest) -> dict[str, Any]:

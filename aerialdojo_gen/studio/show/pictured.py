@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -93,14 +94,7 @@ class PicturedTask:
     @property
     def actions(self) -> list[tuple[str, int]]:
         """The reference actions, run-length encoded."""
-        runs: list[tuple[str, int]] = []
-        for action in self.task.route["action"]:
-            name = schemas.ACTION_NAMES[action]
-            if runs and runs[-1][0] == name:
-                runs[-1] = (name, runs[-1][1] + 1)
-            else:
-                runs.append((name, 1))
-        return runs
+        return [(schemas.ACTION_NAMES[a], len(list(run))) for a, run in groupby(self.task.route["action"])]
 
 
 def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -> PicturedTask:
