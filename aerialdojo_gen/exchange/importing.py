@@ -82,8 +82,9 @@ class Objects:
         for scene, number in sorted(self._rows):
             empty = dict.fromkeys(IMPORTED_OBJECTS.schema.names)
             row = empty | self._rows[scene, number] | {"scene": scene, "object_id": number}
-            pictures = self._pictures.get((scene, number), {})
-            for name, picture in sorted(pictures.items()) or [("", None)]:
+            found = sorted(self._pictures.get((scene, number), {}).items())
+            pictures: list[tuple[str, Path | None]] = [*found] or [("", None)]
+            for name, picture in pictures:
                 data = None if picture is None else picture.read_bytes()
                 tables.add(IMPORTED_OBJECTS, {**row, "reference_image_id": name, "reference_image": data})
 

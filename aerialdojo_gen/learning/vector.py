@@ -158,7 +158,7 @@ def make_vec(
     root = open_root(data)
     scenes = make_env(data, scene=scene, **{**options, "views": (), "sensors": None}).scenes
     shares = [tuple(scenes[k % len(scenes) :: num_envs]) if spread_scenes else () for k in range(num_envs)]
-    shaping = {} if progress is True else progress or None
+    shaping: Any = {} if progress is True else progress or None
     shaped = [] if shaping is None else [partial(ProgressReward, **shaping)]
     makers = [
         partial(
