@@ -22,14 +22,17 @@ from aerialdojo_gen.exchange.aerialdojo_layout import (
     parse_partition,
 )
 from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of, quaternions_of, shown
-from aerialdojo_gen.exchange.folder import check_picture, inside
+from aerialdojo_gen.exchange.folder import inside
 from aerialdojo_gen.exchange.jsonstream import small_document
-from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest, picture_at
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _STEP = ("position_ned_m", "quaternion_xyzw")
 _KNOWN = {"action", *_STEP}
+_STATED = {
+    "geodesic_distance": "stated_length_m", "euclidean_distance": "euclidean_m", "complexity": "detour_ratio",
+}  # fmt: skip
 _START_FAR_M = 0.01
 _EXACT = 1e-6
 
@@ -109,7 +112,9 @@ class Reader:
         }
         record.optional_text("coordinate_system")
         if record.has("info"):
-            known |= _stated(record.child("info"))
+            # What a task states of its own route; a trajectory's poses overrule it.
+            info = record.child("info")
+            known |= {ours: info.number(theirs) for theirs, ours in _STATED.items() if info.has(theirs)}
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
         if modality == "image":
@@ -127,10 +132,7 @@ class Reader:
             return None
         if image is None:
             raise BadField("image", "is missing")
-        try:
-            return check_picture(inside(context.file.parent, image))
-        except ValueError as error:
-            raise BadField("image", str(error)) from None
+        return picture_at(context.file.parent, image, "image")
 
     def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None) -> None:
         """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
@@ -220,16 +222,6 @@ def _attitude(pose: Fields) -> NDArray[np.float64]:
     if np.abs(found[-1] - found[0]).max() > _EXACT:
         raise BadField(pose.path(names[1]), f"is not {names[0]}")
     return found[0]
-
-
-def _stated(info: Fields) -> dict[str, Any]:
-    """What a task states of its own route; a trajectory's poses overrule it."""
-    names = {
-        "geodesic_distance": "stated_length_m",
-        "euclidean_distance": "euclidean_m",
-        "complexity": "detour_ratio",
-    }
-    return {ours: info.number(theirs) for theirs, ours in names.items() if info.has(theirs)}
 
 
 def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:

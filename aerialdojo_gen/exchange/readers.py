@@ -13,8 +13,7 @@ import numpy as np
 
 from aerialdojo_gen.exchange.actions import Move, move, replay, replay_error_m
 from aerialdojo_gen.exchange.fields import BadField, Fields, Floats, rows_of, shown
-from aerialdojo_gen.exchange.folder import check_picture, inside
-from aerialdojo_gen.exchange.task import Context, Instance, Route, Task
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, picture_at
 
 AERIALVLN_MOVES = {
     0: move("stop"), 1: move("forward 5 m", forward=5), 2: move("turn left 15°", turn_deg=15),
@@ -136,11 +135,7 @@ def read_cityavos(record: Fields, context: Context) -> Task:
     instances = [Instance("semantic", text)]
     if context.pictures is not None:
         name = record.text("target_image_path", empty=False)
-        try:
-            picture = check_picture(inside(context.pictures, name))
-        except ValueError as error:
-            raise BadField("target_image_path", str(error)) from None
-        instances.append(Instance("image", picture=picture))
+        instances.append(Instance("image", picture=picture_at(context.pictures, name, "target_image_path")))
     return Task(
         source_id=record.name("mission_id"),
         scene=record.name("scene_id"),

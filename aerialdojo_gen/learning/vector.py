@@ -20,6 +20,12 @@ from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 
+def _innermost(env: gymnasium.Env[Any, Any], what: str) -> AerialDojoEnv:
+    if not isinstance(env.unwrapped, AerialDojoEnv):
+        raise UsageError(f"{what}, not of {env.unwrapped}")
+    return env.unwrapped
+
+
 class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):
     """Adds to the reward what an action brings the body nearer to the goal, on ways that it can fly.
 
@@ -53,11 +59,9 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
         discount: float = 1.0,
     ) -> None:
         super().__init__(env)
-        if not isinstance(env.unwrapped, AerialDojoEnv):
-            raise UsageError(f"progress is of AerialDojo-v0's episodes, not of {env.unwrapped}")
+        self._own = _innermost(env, "progress is of AerialDojo-v0's episodes")
         if not 0.0 <= discount <= 1.0:
             raise UsageError(f"a discount is from 0 to 1, not {discount}")
-        self._own: AerialDojoEnv = env.unwrapped
         self._scale, self._action_cost, self._collision_cost = scale, action_cost, collision_cost
         self._discount = discount
         self._left_m = 0.0
@@ -99,10 +103,7 @@ class OwnScenes(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.i
 
     def __init__(self, env: gymnasium.Env[dict[str, Any], np.int64], scenes: Sequence[str]) -> None:
         super().__init__(env)
-        own = env.unwrapped
-        if not isinstance(own, AerialDojoEnv):
-            raise UsageError(f"scenes are of AerialDojo-v0's tasks, not of {own}")
-        own.draw_from(scenes)
+        _innermost(env, "scenes are of AerialDojo-v0's tasks").draw_from(scenes)
 
 
 def make_vec(
@@ -195,9 +196,7 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
 
     def __init__(self, env: gymnasium.Env[dict[str, Any], np.int64], vocabulary: Vocabulary | None = None) -> None:
         super().__init__(env)
-        own = env.unwrapped
-        if not isinstance(own, AerialDojoEnv):
-            raise UsageError(f"observations are of AerialDojo-v0, not of {own}")
+        own = _innermost(env, "observations are of AerialDojo-v0")
         self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.goals_in_words())
         seen = own.observation_space
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)

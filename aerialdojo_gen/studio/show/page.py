@@ -9,6 +9,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from aerialdojo_gen.base.pictures import PAGE_JPEG, data_url, encode_jpeg, encode_png
@@ -42,7 +43,7 @@ def render_page(task: PicturedTask) -> str:
             (k, schemas.ACTION_NAMES[action], *pose)
             for k, (action, pose) in enumerate(zip(route["action"], task.poses.tolist(), strict=True))
         ],
-        clearances=[(m, _hex(CLEARANCE_COLOURS(float(CLEARANCE_SCALE(m))))) for m in _STOPS_M],
+        clearances=[(m, to_hex(CLEARANCE_COLOURS(float(CLEARANCE_SCALE(m))))) for m in _STOPS_M],
     )
 
 
@@ -55,10 +56,6 @@ def _to_data_url(
     buffer = io.BytesIO()
     figure.savefig(buffer, format="jpeg", pil_kwargs={"quality": 86})
     return data_url(buffer.getvalue())
-
-
-def _hex(rgba: tuple[float, float, float, float]) -> str:
-    return "#" + "".join(f"{round(255 * c):02x}" for c in rgba[:3])
 
 
 def write_page(task: PicturedTask, path: Path) -> Path:
