@@ -23,12 +23,12 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.adaptation import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part
+from aerialdojo_gen.learning.policy import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly

@@ -20,11 +20,19 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
-from aerialdojo_gen.learning.cached import CachedFrames, CacheOptions
 from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
-from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source, join, take
+from aerialdojo_gen.learning.pictures import (
+    CachedFrames,
+    CacheOptions,
+    Frames,
+    RecordedFrames,
+    RenderedFrames,
+    Source,
+    join,
+    take,
+)
 from aerialdojo_gen.learning.words import PADDING, Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
