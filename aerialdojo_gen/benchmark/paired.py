@@ -13,15 +13,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import Column, TextTable
 from aerialdojo_gen.benchmark.intervals import RESAMPLES, bootstrap, scene_scores
-from aerialdojo_gen.benchmark.metrics import (
-    MEASURES,
-    METRICS,
-    Floats,
-    Profile,
-    knows_views,
-    outcomes,
-    summarize,
-)
+from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Floats, Profile, knows_views, outcomes, summarize
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.tables import NONE, profile_head, text
 

@@ -16,9 +16,8 @@ from aerialdojo_gen.base.text_table import TextTable
 from aerialdojo_gen.benchmark import tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
 from aerialdojo_gen.benchmark.metrics import METRICS, at_radius
-from aerialdojo_gen.benchmark.outcome_table import Cut
 from aerialdojo_gen.benchmark.runs import ADAPTED, GROUP_OF, UPPER_BOUND, Run
-from aerialdojo_gen.benchmark.tables import Cell, ReportRequest, Row, TableSpec, make_table, profile_head
+from aerialdojo_gen.benchmark.tables import Cell, Cut, ReportRequest, Row, TableSpec, make_table, profile_head
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 PARTITIONS = ("ID", "OOD", ADAPTED)

@@ -17,17 +17,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
+from aerialdojo_gen.exchange import aerialdojo_layout as layout
 from aerialdojo_gen.exchange.actions import words_of
-from aerialdojo_gen.exchange.aerialdojo_layout import (
-    IMAGE,
-    SCHEMA_VERSION,
-    SEMANTIC,
-    SETTING_WORDS,
-    TASK_FILE,
-    TRAJECTORIES,
-    Partition,
-    partition_of,
-)
 from aerialdojo_gen.exchange.folder import link_or_copy
 from aerialdojo_gen.exchange.frames import NED
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
@@ -122,13 +113,13 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
     for subset in ("train", "test"):
         tasks = store.read_scene(data, f"tasks/{subset}", scene)
         routes = store.read_scene(data, f"routes/{subset}", scene)
-        for setting in SETTING_WORDS:
+        for setting in layout.SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
             episodes = {nav_id: str(k) for k, nav_id in enumerate(chosen["nav_id"].to_pylist())}
             mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
-            partition = partition_of(scene, setting, store.partition(scene).upper(), subset)
+            partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
             ends = {row["nav_id"]: row for row in chosen.select(_ENDS).to_pylist()}
-            for kind, modality in ((SEMANTIC, "semantic"), (IMAGE, "image")):
+            for kind, modality in ((layout.SEMANTIC, "semantic"), (layout.IMAGE, "image")):
                 rows = [row for row in mine if row["modality"] == modality]
                 folder = root / kind / partition.path
                 folder.mkdir(parents=True)
@@ -136,7 +127,7 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
                     _text(_task(row, episodes[row["nav_id"]], ends[row["nav_id"]], objects, pictures, folder))
                     for row in rows
                 )
-                (folder / TASK_FILE).write_text(f"[\n{lines}\n]\n" if rows else "[]\n", encoding="utf-8")
+                (folder / layout.TASK_FILE).write_text(f"[\n{lines}\n]\n" if rows else "[]\n", encoding="utf-8")
                 counts["task files"] += 1
                 counts["tasks"] += len(rows)
             counts["trajectories"] += _write_trajectories(root, partition, chosen, episodes, objects)
@@ -161,7 +152,7 @@ def _task(
         "trajectory_id": row["nav_id"],
         "map_name": row["scene"],
         "coordinate_system": _COORDINATES,
-        "task": SETTING_WORDS[row["setting"]][2],
+        "task": layout.SETTING_WORDS[row["setting"]][2],
         "used-in-train": int(row["subset"] == "train"),
         "start_true_name": start_object["name"],
         "goal_true_name": row["target_name"],
@@ -221,18 +212,18 @@ class _Pictures:
 
 def _write_trajectories(
     root: Path,
-    partition: Partition,
+    partition: layout.Partition,
     routes: pa.Table,
     episodes: Mapping[str, str],
     objects: Mapping[int, Mapping[str, Any]],
 ) -> int:
-    folder = root / TRAJECTORIES / partition.path
+    folder = root / layout.TRAJECTORIES / partition.path
     folder.mkdir(parents=True)
     for row, poses, actions in _poses(routes):
         positions = NED.positions_from_world(poses[:, :3]).tolist()
         quaternions = NED.quaternion_from_world_yaw(poses[:, 3]).tolist()
         document = {
-            "schema_version": SCHEMA_VERSION,
+            "schema_version": layout.SCHEMA_VERSION,
             "map_name": partition.scene,
             "task_id": f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}",
             "status": "planned",

@@ -22,16 +22,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
-from aerialdojo_gen.studio.annotate.document import (
-    ConflictError,
-    Edit,
-    Kind,
-    Operation,
-    apply,
-    describe,
-    difference,
-    edits_of,
-)
+from aerialdojo_gen.studio.annotate import document
+from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Kind, Operation
 
 Action = Literal["do", "undo", "redo", "import", "outside"]
 
@@ -164,13 +156,16 @@ class Storage:
         """Apply an operation and save it."""
         kind = operation.kind
         return self._commit(
-            version, author, "do", lambda state: edits_of(operation, state.annotations, self._next_id(state, kind))
+            version,
+            author,
+            "do",
+            lambda state: document.edits_of(operation, state.annotations, self._next_id(state, kind)),
         )
 
     def replace(self, version: str, author: Author, raw: bytes) -> tuple[State, Record | None]:
         """Replace the file by another one, as a change that can be undone; `AnnotationError` if it is invalid."""
         after = parse_whole(raw, self.scene, "the file")
-        return self._commit(version, author, "import", lambda state: difference(state.annotations, after))
+        return self._commit(version, author, "import", lambda state: document.difference(state.annotations, after))
 
     def undo(self, version: str, author: Author) -> tuple[State, Record | None]:
         """Undo the last change of the author's tab; `ConflictError` if the entry has changed since."""
@@ -203,14 +198,14 @@ class Storage:
             if state.version != version:
                 raise StaleError(state)
             edits = tuple(edits_of_state(state))
-            after = apply(state.annotations, edits)
+            after = document.apply(state.annotations, edits)
             if not edits:
                 return state, None
             raw = format_annotations(after).encode("utf-8")
             digest = hashlib.sha256(raw).hexdigest()
             now = datetime.now(UTC).isoformat(timespec="seconds")
             record = Record(
-                time=now, who=author.who, client=author.client, action=action, what=describe(edits),
+                time=now, who=author.who, client=author.client, action=action, what=document.describe(edits),
                 before=state.version, after=digest, edits=edits,
             )  # fmt: skip
             lines = [record]
