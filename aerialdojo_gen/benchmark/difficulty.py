@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -19,13 +20,14 @@ DIFFICULTY, SEEN = "difficulty", "seen"
 
 # Parts of a breakdown: which values of a column belong to each, by its heading.
 _Parts = Mapping[str, Callable[[Any], bool]]
+_Columns = dict[str, dict[str, Any]]
 
 
 def _bins(*edges: float) -> _Parts:
     """Bins of numbers; a rounding error below the lowest edge belongs to the first bin."""
     heads = [f"{low:g} to {high:g}" for low, high in pairwise(edges)] + [f"{edges[-1]:g} and more"]
-    bounds = pairwise((-math.inf, *edges[1:], math.inf))
-    return {head: _within(low, high) for head, (low, high) in zip(heads, bounds, strict=True)}
+    bounds = zip((-math.inf, *edges[1:]), (*edges[1:], math.inf), strict=True)
+    return {head: _within(*ends) for head, ends in zip(heads, bounds, strict=True)}
 
 
 def _within(low: float, high: float) -> Callable[[Any], bool]:
@@ -33,39 +35,46 @@ def _within(low: float, high: float) -> Callable[[Any], bool]:
 
 
 @dataclass(frozen=True)
-class _BreakdownSpec:
-    """How to break episodes down: by which columns of which release table, into which parts."""
+class Breakdown:
+    """A breakdown of episodes by columns of a release table."""
 
-    kind: str
+    kind: str  # `DIFFICULTY` or `SEEN`
     columns: tuple[str, ...]
-    title: str
-    parts: _Parts
+    title: str  # Of its table
+    conditions: _Parts
     table: str = "routes"
     note: str = ""
+    labels: tuple[Strings, ...] = ()  # Which part every episode belongs to, (n,) a run; empty for none
 
     @property
     def name(self) -> str:
+        """The column, or two of them."""
         return " and ".join(self.columns)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Headings of the parts that have episodes."""
+        return tuple(head for head in self.conditions if any((own == head).any() for own in self.labels))
 
 
 _SPECS = (
-    _BreakdownSpec(
+    Breakdown(
         DIFFICULTY, ("plan_detour",), "Detour of the route (plan_detour)", _bins(1.0, 1.05, 1.2, 1.5),
         note="plan_detour: length of the route over that of the shortest one without obstacles.",
     ),
-    _BreakdownSpec(
+    Breakdown(
         DIFFICULTY, ("target_visible_at_start",), "Targets in view at the start",
         {"out of view": lambda share: float(share) <= 0.0, "in view": lambda share: float(share) > 0.0},
         note="In view: one of the four views shows some of the target before the first action.",
     ),
-    _BreakdownSpec(
+    Breakdown(
         DIFFICULTY, ("straight_line_free",), "The straight way to the goal",
         {"free": lambda free: free is True, "blocked": lambda free: free is False},
     ),
-    _BreakdownSpec(DIFFICULTY, ("climb_m",), "Climb of the route, m", _bins(0.0, 1.0, 3.0, 6.0)),
-    _BreakdownSpec(DIFFICULTY, ("detour_ratio",), "Detour of the route (κ)", _bins(1.0, 1.1, 1.25, 1.5)),
+    Breakdown(DIFFICULTY, ("climb_m",), "Climb of the route, m", _bins(0.0, 1.0, 3.0, 6.0)),
+    Breakdown(DIFFICULTY, ("detour_ratio",), "Detour of the route (κ)", _bins(1.0, 1.1, 1.25, 1.5)),
     *(
-        _BreakdownSpec(
+        Breakdown(
             SEEN, (f"{what}_seen_in_train",), f"{title} that training shows",
             {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
         )
@@ -74,11 +83,11 @@ _SPECS = (
             ("shape", "Shapes of targets"),
         )
     ),
-    _BreakdownSpec(
+    Breakdown(
         SEEN, ("target_split",), "The split by target",
         {"train": lambda side: side == "train", "test": lambda side: side == "test"}, "tasks",
     ),
-    _BreakdownSpec(
+    Breakdown(
         SEEN, ("target_held_out", "start_held_out"), "Objects held out from the split by target",
         {
             "neither": lambda both: both == (False, False), "target alone": lambda both: both == (True, False),
@@ -86,18 +95,6 @@ _SPECS = (
         }, "tasks",
     ),
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Breakdown:
-    """Episodes broken down by a column."""
-
-    kind: str  # `DIFFICULTY` or `SEEN`
-    name: str  # The column, or two of them
-    title: str  # Of its table
-    note: str
-    parts: tuple[str, ...]  # Headings of those that have episodes
-    labels: tuple[Strings, ...]  # Which part every episode belongs to, (n,) a run; empty for none
 
 
 @dataclass(frozen=True)
@@ -121,16 +118,15 @@ class Breakdowns:
 
 def find_breakdowns(root: DataRoot, runs: Sequence[Run]) -> Breakdowns:
     """Break the episodes of runs down by columns of the log, or of the release."""
-    released = _ReleasedTasks(root)
+    released = cache(partial(_released, root))
     found, missing = [], []
     for b in _SPECS:
         values = [_values(run, b, released) for run in runs]
         if any(v is None for v in values):
             missing.append(b.name)
             continue
-        labels = tuple(np.array([_label(value, b.parts) for value in v or []], dtype=np.str_) for v in values)
-        filled = tuple(head for head in b.parts if any((own == head).any() for own in labels))
-        found.append(Breakdown(b.kind, b.name, b.title, b.note, filled, labels))
+        labels = tuple(np.array([_label(value, b.conditions) for value in v or []], dtype=np.str_) for v in values)
+        found.append(replace(b, labels=labels))
     return Breakdowns(tuple(found), tuple(missing))
 
 
@@ -138,7 +134,7 @@ def _label(value: Any, parts: _Parts) -> str:
     return "" if value is None else next((head for head, belongs in parts.items() if belongs(value)), "")
 
 
-def _values(run: Run, breakdown: _BreakdownSpec, released: _ReleasedTasks) -> list[Any] | None:
+def _values(run: Run, breakdown: Breakdown, released: Callable[[str, str, str], _Columns]) -> list[Any] | None:
     """Return a column's values for a run's episodes, from its log or the release; None if neither has it."""
     if breakdown.columns == ("detour_ratio",):
         straight, flown = run.episodes.euclidean_m, run.episodes.reference_length_m
@@ -149,7 +145,7 @@ def _values(run: Run, breakdown: _BreakdownSpec, released: _ReleasedTasks) -> li
             column = run.table[name].to_pylist()
         else:
             keys = zip(*(run.table[key].to_pylist() for key in ("scene", "subset", "nav_id")), strict=True)
-            column = [released.value(breakdown.table, scene, side, nav_id, name) for scene, side, nav_id in keys]
+            column = [released(breakdown.table, scene, side).get(name, {}).get(nav) for scene, side, nav in keys]
         if all(value is None for value in column):
             return None
         columns.append(column)
@@ -158,37 +154,24 @@ def _values(run: Run, breakdown: _BreakdownSpec, released: _ReleasedTasks) -> li
     return [None if None in row else row for row in zip(*columns, strict=True)]
 
 
-class _ReleasedTasks:
-    """Columns of a release's tasks and routes, read per scene; empty where there is no release."""
+def _released(root: DataRoot, table: str, scene: str, subset: str) -> _Columns:
+    """Read a release's columns, by navigation task; none where there is no release."""
+    wanted = [name for b in _SPECS if b.table == table for name in b.columns if name != "detour_ratio"]
+    found = _stored(root, table, scene, subset, wanted)
+    if table == "tasks" and "target_seen_in_train" not in found:
+        # An older release lacks the column: derived from the targets of its routes.
+        targets, own = (
+            _stored(root, "routes", scene, side, ["target_object_id"]).get("target_object_id", {})
+            for side in ("train", subset)
+        )
+        known = set(targets.values())
+        found["target_seen_in_train"] = {nav_id: target in known for nav_id, target in own.items()}
+    return found
 
-    def __init__(self, root: DataRoot) -> None:
-        self._root = root
-        self._columns: dict[tuple[str, str, str], dict[str, dict[str, Any]]] = {}
 
-    def value(self, table: str, scene: str, subset: str, nav_id: str, name: str) -> Any:
-        key = (table, scene, subset)
-        if key not in self._columns:
-            self._columns[key] = self._read(*key)
-        return self._columns[key].get(name, {}).get(nav_id)
-
-    def _read(self, table: str, scene: str, subset: str) -> dict[str, dict[str, Any]]:
-        wanted = [name for b in _SPECS if b.table == table for name in b.columns if name != "detour_ratio"]
-        found = self._stored(table, scene, subset, wanted)
-        if table == "tasks" and "target_seen_in_train" not in found:
-            # An older release lacks the column: derived from the targets of its routes.
-            in_train = self._stored("routes", scene, "train", ["target_object_id"]).get("target_object_id", {})
-            own = self._stored("routes", scene, subset, ["target_object_id"]).get("target_object_id", {})
-            targets = set(in_train.values())
-            found["target_seen_in_train"] = {nav_id: target in targets for nav_id, target in own.items()}
-        return found
-
-    def _stored(self, table: str, scene: str, subset: str, names: Sequence[str]) -> dict[str, dict[str, Any]]:
-        if not store.shards(self._root, f"{table}/{subset}", scene):
-            return {}
-        read = store.read_stored(self._root, f"{table}/{subset}", scene, ["nav_id", *names])
-        ids = read["nav_id"].to_pylist()
-        return {
-            name: dict(zip(ids, read[name].to_pylist(), strict=True))
-            for name in read.column_names
-            if name != "nav_id"
-        }
+def _stored(root: DataRoot, table: str, scene: str, subset: str, names: Sequence[str]) -> _Columns:
+    if not store.shards(root, f"{table}/{subset}", scene):
+        return {}
+    read = store.read_stored(root, f"{table}/{subset}", scene, ["nav_id", *names]).to_pydict()
+    ids = read.pop("nav_id")
+    return {name: dict(zip(ids, values, strict=True)) for name, values in read.items()}

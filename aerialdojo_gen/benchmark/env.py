@@ -17,10 +17,10 @@ from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.constants import MODALITIES, SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.benchmark import tasks
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.observations import GoalText, mosaic, observed_goal, render_views
-from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
 from aerialdojo_gen.benchmark.tasks import Selection, Task, TaskSampler, check_tell, image_shape, read_tasks, select
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.scenes.context import SEVERAL
@@ -133,7 +133,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self._data = open_root(data)
         self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height, light=light)
         self._tell = check_tell(_names(tell))
-        self._paraphrase = check_paraphrase(paraphrase)
+        self._paraphrase = tasks.check_paraphrase(paraphrase)
         self._flight = Flight(
             self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell, scenes_in_memory
         )
@@ -172,7 +172,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         """Return the descriptions that a task may have in an episode: of an image goal, None."""
         if self._paraphrase == "task" or row["description"] is None:
             return (row["description"],)
-        return texts_of_tasks(self._data, row["scene"], row["subset"])[row["nav_id"]]
+        return tasks.texts_of_tasks(self._data, row["scene"], row["subset"])[row["nav_id"]]
 
     @property
     def n_tasks(self) -> int:

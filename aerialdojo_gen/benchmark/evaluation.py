@@ -65,8 +65,7 @@ class Evaluation:
         }
 
     def _logged(self, options: Mapping[str, Any]) -> dict[str, Any]:
-        cleaned: dict[str, Any] = Secrets(self.options).options(options)
-        return cleaned
+        return dict(Secrets(self.options).options(options))
 
 
 @dataclass(frozen=True)
@@ -97,11 +96,8 @@ class Outcome:
         cost = f"; {self.cost_usd:.2f} USD" if self.cost_usd else ""
         tokens = f"; {self.tokens:,} tokens" if self.tokens else ""
         failed = f", {self.failed:,} failed" if self.failed else ""
-        success = (
-            f", success rate {self.successes / self.finished:.1%}"
-            if self.finished and self.successes is not None
-            else ""
-        )
+        known = self.finished and self.successes is not None
+        success = f", success rate {(self.successes or 0) / self.finished:.1%}" if known else ""
         return (
             f"{self.finished:,} of {self.episodes:,} episodes finished{failed}{success}; "
             f"{self.flown:,} flown now in {self.seconds:.1f} s{rate}{tokens}{cost}"
@@ -133,10 +129,6 @@ class BudgetTracker:
         self._limits = limits
         self.total = Finished(cost_usd=cost_usd, tokens=tokens)
 
-    def add(self, finished: Finished) -> None:
-        """Add finished episodes."""
-        self.total += finished
-
     @property
     def failing(self) -> Failed | None:
         """The failure that has occurred too often in a row; None if there is none."""
@@ -156,10 +148,7 @@ class BudgetTracker:
 
 
 def agent_code_digest(agent: str) -> str:
-    """Digest the code that flies an agent.
-
-    Unlike stages, libraries do not count: an update must not end a run whose episodes have cost money.
-    """
+    """Digest the code that flies an agent; libraries do not count: an update must not end a run that cost money."""
     module = BUILT_IN.get(agent, agent).partition(":")[0]
     parts = dict(code_of("aerialdojo_gen.benchmark.worker").parts)
     if module.split(".")[0] == "aerialdojo_gen":

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import secrets
 import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
-from types import TracebackType
 from typing import Any
 
 from aerialdojo_gen.base.errors import Malformed, StoreError, disk_error
@@ -34,7 +34,8 @@ class Journal:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.touch()
             self.done = frozenset(str(record.get("task_id")) for record in read_journal(path))
-            _cut_short_line(path)
+            # A last line that a kill cut short goes.
+            os.truncate(path, sum(map(len, _whole_lines(path))))
             self._file = path.open("a", encoding="utf-8")
         except OSError as error:
             raise disk_error(error, path) from None
@@ -51,17 +52,9 @@ class Journal:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the file."""
         self._file.close()
-
-
-def _cut_short_line(path: Path) -> None:
-    """Take away a last line that a kill cut short."""
-    with path.open("r+b") as file:
-        file.truncate(sum(len(line) for line in file if line.endswith(b"\n")))
 
 
 def read_journal(path: Path) -> Iterator[dict[str, Any]]:
@@ -90,7 +83,12 @@ class Journals:
     def __init__(self, root: DataRoot, run: str) -> None:
         self._root, self._name = root, f"runs/{check_run_name(run)}/journal"
         self._committed = not isinstance(root, LocalRoot)
-        self.folder = root.path / self._name if isinstance(root, LocalRoot) else _working_folder(root, run)
+        if isinstance(root, LocalRoot):
+            self.folder = root.path / self._name
+        else:
+            # Of this machine: the same for the same URL and name.
+            self.folder = cache_folder() / "journals" / hashlib.sha256(root.url.encode()).hexdigest()[:16] / run
+            make_folder(self.folder)
         self._sent: dict[Path, int] = {}
         self._call, self._batches = secrets.token_hex(4), 0
         self._last = time.monotonic()
@@ -148,14 +146,7 @@ class Journals:
                 self._sent[path] = begun + len(lines)
 
 
-def _whole_lines(path: Path, begun: int) -> Iterator[bytes]:
+def _whole_lines(path: Path, begun: int = 0) -> Iterator[bytes]:
     with path.open("rb") as file:
         file.seek(begun)
         yield from (line for line in file if line.endswith(b"\n"))
-
-
-def _working_folder(root: DataRoot, run: str) -> Path:
-    """Return the folder of this machine that a run's journals lie in, made: the same for the same URL and name."""
-    folder = cache_folder() / "journals" / hashlib.sha256(root.url.encode()).hexdigest()[:16] / run
-    make_folder(folder)
-    return folder

@@ -74,7 +74,8 @@ def write_leaderboard(folder: Path, page: Path) -> int:
         raise StoreError(
             f"{folder} has no scored run (*/{SCORE}): score a submission with score FILE --into {folder}"
         )
-    heads = [head for head in _HEADS if _has(cards, head)]
+    scored = [(card, row) for card in cards for row in card.rows]
+    heads = [head for head in _HEADS if any(_has(head, row, card.adapted) for card, row in scored)]
     groups = [(group, len(list(part))) for group, part in groupby(heads, key=lambda head: head.group)]
     tables = {_TITLES[setting]: _lines(cards, setting, heads) for setting in (*SETTINGS, "all")}
     text = (
@@ -96,14 +97,9 @@ def write_leaderboard(folder: Path, page: Path) -> int:
     return len(cards)
 
 
-def _has(cards: Sequence[ScoreCard], head: Head) -> bool:
-    """Whether any run has a figure in a column."""
-    return any(
-        _cell(head, row, card.adapted).value is not None
-        for card in cards
-        for row in card.rows
-        if (row.partition, row.radius_m) == (head.partition, head.radius_m)
-    )
+def _has(head: Head, row: ScoreRow, adapted: bool) -> bool:
+    at = row.partition, row.radius_m
+    return at == (head.partition, head.radius_m) and _cell(head, row, adapted).value is not None
 
 
 def _lines(cards: Sequence[ScoreCard], setting: str, heads: Sequence[Head]) -> list[Line]:

@@ -128,7 +128,13 @@ def episodes_of(table: pa.Table) -> Episodes:
     """Take the metrics' columns out of a table of episodes, and check them."""
     names = [field.name for field in fields(Episodes) if field.name != "view_distance_m"]
     columns = {name: np.asarray(table[name].to_pylist(), dtype=_KINDS.get(name, np.float64)) for name in names}
-    episodes = Episodes(**columns, view_distance_m=_view_distance_m(table))
+    # A table that an older version has written may lack the views.
+    distance, sight = (
+        table[name].to_pylist() if name in table.column_names else [None] * table.num_rows
+        for name in ("viewpoint_distance_m", "target_in_sight")
+    )
+    seen = [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)]
+    episodes = Episodes(**columns, view_distance_m=np.array(seen, dtype=np.float64))
     if np.isnan(episodes.euclidean_m).any():
         raise StoreError(
             "these episodes have no scores: the release withholds the goals; its owner scores a submission"
@@ -145,19 +151,6 @@ def episodes_of(table: pa.Table) -> Episodes:
     return episodes
 
 
-def _view_distance_m(table: pa.Table) -> Floats:
-    """Take `Episodes.view_distance_m` out of a table, which an older version may have written."""
-    unknown = [None] * table.num_rows
-    distance, sight = (
-        table[name].to_pylist() if name in table.column_names else unknown
-        for name in ("viewpoint_distance_m", "target_in_sight")
-    )
-    return np.array(
-        [np.nan if d is None or s is None else d if s else np.inf for d, s in zip(distance, sight, strict=True)],
-        dtype=np.float64,
-    )
-
-
 @dataclass(frozen=True)
 class Outcomes:
     """Outcomes of every episode under a profile."""
@@ -171,10 +164,7 @@ class Outcomes:
 
 
 def outcomes(episodes: Episodes, profile: Profile) -> Outcomes:
-    """Judge every episode by a profile.
-
-    An episode that starts at its goal has L = 0: its SPL is 1 where it succeeds without moving, 0 where it moved.
-    """
+    """Judge every episode by a profile; one that begins at its goal has SPL 1 if it succeeds unmoved, else 0."""
     final, nearest = distances(episodes, profile)
     may = may_succeed(episodes, profile)
     success = may & (final <= profile.radius_m)

@@ -80,10 +80,7 @@ def render_views(
     scene: Scene, sensors: Sensors, position: Point, yaw_rad: float, renderer: str = "auto",
     light: Light | None = None,
 ) -> tuple[Pictures, Depths]:  # fmt: skip
-    """Render the views of a body (world metres, radians), by the scene's own light without another.
-
-    RGB (H, W, 3) uint8 and planar depth (H, W) metres, by view.
-    """
+    """Render RGB (H, W, 3) uint8 and planar depth (H, W) metres of a body (world metres, radians), by view."""
     rgb: Pictures = {}
     depth_m: Depths = {}
     if sensors.blind:
@@ -114,11 +111,7 @@ _read = read_from_shared_memory.dispatch(Text)
 
 
 class GoalText(Text):
-    """A `gymnasium.spaces.Text` for asynchronous vector environments.
-
-    Those read shared memory once, and count on arrays to be views of it from then on; strings are not (Gymnasium
-    1.4).
-    """
+    """A text whose values live in shared memory, which asynchronous environments read once (Gymnasium 1.4)."""
 
 
 class _LiveTexts(Sequence[str]):

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from scipy import stats
 
+from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import Column, TextTable
-from aerialdojo_gen.benchmark.intervals import Paired, paired
-from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views
+from aerialdojo_gen.benchmark.intervals import RESAMPLES, bootstrap, scene_scores
+from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Floats, Profile, knows_views, outcomes, summarize
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.benchmark.tables import NONE, profile_head, text
 
@@ -20,52 +23,76 @@ def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Text
     if len(runs) != 2:
         named = ", ".join(run.name for run in runs)
         raise UsageError(f"--paired compares two runs, not {len(runs)} ({named}): name two")
-    first, second = _same_tasks(*runs)
-    return [_table(first, second, profile) for profile in profiles]
-
-
-def _same_tasks(first: Run, second: Run) -> tuple[Run, Run]:
-    """Cut two runs down to the tasks that both have flown, in one order."""
-    tasks = [np.array(run.table["task_id"].to_pylist(), dtype=np.str_) for run in (first, second)]
+    first, second = runs
+    tasks = [np.array(run.table["task_id"].to_pylist(), dtype=np.str_) for run in runs]
     both = np.intersect1d(tasks[0], tasks[1])
     if not len(both):
         raise UsageError(f"{first.name} and {second.name} have no task in common: fly both on the same ones")
-    cut = []
-    for run, ids in zip((first, second), tasks, strict=True):
-        order = np.argsort(ids)
-        cut.append(run.where(order[np.searchsorted(ids[order], both)]))
-    return cut[0], cut[1]
+    orders = [np.argsort(ids) for ids in tasks]
+    cut = [
+        run.where(order[np.searchsorted(ids[order], both)])
+        for run, ids, order in zip(runs, tasks, orders, strict=True)
+    ]
+    return [_table(cut[0], cut[1], profile) for profile in profiles]
 
 
 def _table(first: Run, second: Run, profile: Profile) -> TextTable:
-    result = paired(first.episodes, second.episodes, profile)
+    """Compare two logs of the same tasks, row by row."""
+    summaries = [summarize(run.episodes, profile) for run in (first, second)]
+    one, other = (scene_scores(summary) for summary in summaries)
+    families = [y - x for x, y in zip(one, other, strict=True)]
+    low, high = bootstrap(families)
+    # A scene's share of the overall mean: its family's among the families, its own within its family.
+    weight = np.concatenate([np.full(len(part), 1.0 / (len(part) * len(families))) for part in families])
+    p = _chances(np.concatenate(one), np.concatenate(other), weight)
+    x, y = (outcomes(run.episodes, profile).success for run in (first, second))
+    only_first, only_second = int(np.sum(x & ~y)), int(np.sum(y & ~x))
+    torn = only_first + only_second
+    exact = float(stats.binomtest(only_first, torn).pvalue) if torn else 1.0
     known = any(knows_views(run.episodes, profile) for run in (first, second))
-    rows = [(MEASURES[m].head, _cells(result, k, m)) for k, m in enumerate(METRICS) if known or m != "sr_view"]
+    rows = []
+    for k, metric in enumerate(METRICS):
+        if not known and metric == "sr_view":
+            continue
+        a, b = (summary.overall[1 + k] for summary in summaries)
+        ends = [text(metric, float(end[k]), signed=True) for end in (low, high)]
+        interval = NONE if math.isnan(low[k]) else f"[{', '.join(ends)}]"
+        cells = (text(metric, a), text(metric, b), text(metric, b - a, signed=True), interval, _p(float(p[k])))
+        rows.append((MEASURES[metric].head, cells))
     notes = [
-        f"{result.tasks:,} tasks of {result.scenes} scenes, flown by both. The interval draws scenes anew within "
-        "their family; p is that of a permutation test which exchanges the two agents scene by scene, two-sided.",
-        f"Solved by {first.label} alone: {result.only_first:,}; by {second.label} alone: {result.only_second:,} "
-        f"(McNemar's exact p {_p(result.p_mcnemar)}, which takes episodes for independent).",
+        f"{len(first.episodes):,} tasks of {len(weight)} scenes, flown by both. The interval draws scenes anew "
+        "within their family; p is that of a permutation test which exchanges the two agents scene by scene, "
+        "two-sided.",
+        f"Solved by {first.label} alone: {only_first:,}; by {second.label} alone: {only_second:,} "
+        f"(McNemar's exact p {_p(exact)}, which takes episodes for independent).",
     ]
     gap = f"{second.label} − {first.label}"
-    columns = [
+    heads = [
         Column(first.label),
         Column(second.label),
         *(Column(h, gap) for h in ("difference", "95 % interval", "p")),
     ]
     title = f"{second.label} against {first.label}, {profile_head(profile)}"
-    return TextTable("measure", columns, rows, title, notes)
+    return TextTable("measure", heads, rows, title, notes)
 
 
-def _cells(result: Paired, k: int, metric: str) -> tuple[str, ...]:
-    low, high = float(result.low[k]), float(result.high[k])
-    return (
-        text(metric, float(result.first[k])),
-        text(metric, float(result.second[k])),
-        text(metric, float(result.difference[k]), signed=True),
-        NONE if math.isnan(low) else f"[{text(metric, low, signed=True)}, {text(metric, high, signed=True)}]",
-        _p(float(result.p[k])),
-    )
+def _chances(a: Floats, b: Floats, weight: Floats) -> Floats:
+    """How often a difference as large arises where two runs are exchanged scene by scene: exact for few exchanges."""
+
+    def weighted(x: Any, y: Any, axis: int) -> Any:
+        # Rounded: sums in another order differ in their last digits, and would count as other differences.
+        return np.round(np.sum((y - x) * weight, axis=axis), 12)
+
+    p = np.ones(len(METRICS))
+    for k in range(len(METRICS)) if len(a) > 1 else ():
+        if not (np.isfinite(a[:, k]) & np.isfinite(b[:, k])).all():
+            p[k] = math.nan
+            continue
+        p[k] = stats.permutation_test(
+            (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=RESAMPLES,
+            rng=rng.generator(0, "permutation"),
+        ).pvalue  # fmt: skip
+    return p
 
 
 def _p(p: float) -> str:

@@ -13,12 +13,11 @@ from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.text_table import TextTable
-from aerialdojo_gen.benchmark.counts import CountSpec, conduct_cells, count_table, visit_cells
+from aerialdojo_gen.benchmark import tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
 from aerialdojo_gen.benchmark.metrics import METRICS, at_radius
-from aerialdojo_gen.benchmark.outcome_table import Cut
 from aerialdojo_gen.benchmark.runs import ADAPTED, GROUP_OF, UPPER_BOUND, Run
-from aerialdojo_gen.benchmark.tables import Cell, ReportRequest, Row, TableSpec, make_table, profile_head
+from aerialdojo_gen.benchmark.tables import Cell, Cut, ReportRequest, Row, TableSpec, make_table, profile_head
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 PARTITIONS = ("ID", "OOD", ADAPTED)
@@ -243,7 +242,7 @@ def in_setting(runs: Sequence[Run], setting: str) -> list[Run]:
 
 def result_tables(request: ReportRequest) -> list[TextTable]:
     """Make a table per length setting that any run has flown, in the form of the paper's."""
-    tables = []
+    made = []
     for setting in SETTINGS:
         runs = in_setting(request.runs, setting)
         if not runs:
@@ -270,8 +269,8 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
         table = make_table(spec, replace(request, runs=runs), intervals=request.intervals)
         if any(not label for label, _ in table.rows):
             notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
-        tables.append(replace(table, notes=[*notes, *caveats(runs)]))
-    return tables
+        made.append(replace(table, notes=[*notes, *caveats(runs)]))
+    return made
 
 
 def radius_tables(request: ReportRequest) -> list[TextTable]:
@@ -283,7 +282,7 @@ def radius_tables(request: ReportRequest) -> list[TextTable]:
 
 def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
     """Make a table per breakdown of a kind that has at least two parts with episodes."""
-    tables = []
+    made = []
     for found in request.breakdowns.found:
         if found.kind != kind or len(found.parts) < 2:
             continue
@@ -294,11 +293,11 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
         cuts = {part: Cut(where=((found.name, part),)) for part in found.parts}
         cells = _cells(cuts, request.shown(_RATES))
         spec = TableSpec(found.title, run_rows, lambda _, own=cells: own)  # type: ignore[misc]
-        tables.append(replace(make_table(spec, request, request.broken_down), notes=[note] if note else []))
-    return tables
+        made.append(replace(make_table(spec, request, request.broken_down), notes=[note] if note else []))
+    return made
 
 
-_TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
+_TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
     "overall": TableSpec(
         "Overall", _headline_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes", "hints"),
         headed=False, notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
@@ -318,11 +317,11 @@ _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTa
     ),
     "modality": TableSpec("By modality", run_rows, _by("modality")),
     "radius": radius_tables,
-    "visits": CountSpec(
+    "visits": tables.CountSpec(
         "Where visits are lost", {
             "episodes": ("flown", "visited", "solved", "lost"),
             "lost: how they ended, %": ("too far", "collided", "ran out", "no Stop"),
-        }, _setting_rows, visit_cells,
+        }, _setting_rows, tables.visit_cells,
         "Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out: "
         "of actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
         "averaged.",
@@ -330,11 +329,11 @@ _TABLES: dict[str, TableSpec | CountSpec | Callable[[ReportRequest], list[TextTa
     ),
     "difficulty": partial(breakdown_tables, kind=DIFFICULTY),
     "seen": partial(breakdown_tables, kind=SEEN),
-    "conduct": CountSpec(
+    "conduct": tables.CountSpec(
         "How episodes went", {
             "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
             "service": ("requests", "tokens in", "tokens out", "USD"),
-        }, run_rows, conduct_cells,
+        }, run_rows, tables.conduct_cells,
     ),
     "type": TableSpec("By scene type", _type_rows, _by_run, "scene type"),
     "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),
@@ -348,7 +347,7 @@ def _made(request: ReportRequest, name: str) -> list[TextTable]:
     spec = _TABLES[name]
     if isinstance(spec, TableSpec):
         return [make_table(spec, request, request.broken_down)]
-    return [count_table(spec, request)] if isinstance(spec, CountSpec) else spec(request)
+    return [tables.count_table(spec, request)] if isinstance(spec, tables.CountSpec) else spec(request)
 
 
 def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:

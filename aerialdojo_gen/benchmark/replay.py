@@ -24,7 +24,7 @@ from aerialdojo_gen.benchmark.observations import render_views
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.orthographic import orthographic_pictures
-from aerialdojo_gen.store.root import DataRoot, Where, open_root
+from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 _MAP_PX = 640
@@ -114,28 +114,21 @@ def replays(
         target = scene.object(route["target_object_id"])
         flights = [_flight(scene, run, row, steps[run.name], frames) for run, row in flown]
         low, high = _extent(flights, route, target)
+        extent = (low[0], high[0], low[1], high[1])
+        seen = orthographic_pictures(scene.model).from_above(extent, float(high[0] - low[0]) / _MAP_PX)
+        places = (("goal", route, "goal_"), ("target", target, ""), ("size", target, "size_"))
         yield Replay(
             instances[0],
-            {f"goal_{a}_m": route[f"goal_{a}_m"] for a in "xyz"}
-            | {f"target_{a}_m": target[f"{a}_m"] for a in "xyz"}
-            | {f"size_{a}_m": target[f"size_{a}_m"] for a in "xyz"},
+            {f"{what}_{a}_m": of[f"{name}{a}_m"] for what, of, name in places for a in "xyz"},
             {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")},
             (float(low[0]), float(low[1])),
             (float(high[0]), float(high[1])),
-            data_url(encode_jpeg(_map(scene, low, high), MAP_JPEG)),
+            data_url(encode_jpeg(seen, MAP_JPEG)),
             flights,
         )
 
 
-@lru_cache(maxsize=4)
-def _scene(root: DataRoot, name: str) -> ReleasedScene:
-    return ReleasedScene(root, name)
-
-
-def _map(scene: ReleasedScene, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.uint8]:
-    return orthographic_pictures(scene.model).from_above(
-        (low[0], high[0], low[1], high[1]), float(high[0] - low[0]) / _MAP_PX
-    )
+_scene = lru_cache(maxsize=4)(ReleasedScene)
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:

@@ -85,7 +85,11 @@ def html(
         profiles=request.profiles,
         tables=[table for name, made in tables.items() if name not in _FOLDED for table in made],
         folded=[table for name in _FOLDED for table in tables.get(name, [])],
-        figures=[{"url": _svg_url(figures[name]), "caption": caption} for name, caption in captions.items()],
+        # Images and not inline: the page's policy has no room for the styles that matplotlib writes.
+        figures=[
+            {"url": f"data:image/svg+xml;base64,{base64.b64encode(figures[name]).decode()}", "caption": caption}
+            for name, caption in captions.items()
+        ],
         replays=replays,
         missing_note=request.breakdowns.missing_note,
         **page_parts(["report.css"], "report.js"),
@@ -109,16 +113,8 @@ def page_parts(styles: Sequence[str], script: str) -> dict[str, str]:
     folder = resources.files("aerialdojo_gen.benchmark").joinpath("templates")
     style = "".join(folder.joinpath(name).read_text("utf-8") for name in styles)
     code = folder.joinpath(script).read_text("utf-8")
-    return {"style": style, "script": code, "style_hash": _hash(style), "script_hash": _hash(code)}
-
-
-def _hash(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
-
-
-def _svg_url(svg: bytes) -> str:
-    # An image and not inline: the page's policy has no room for the styles that matplotlib writes.
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+    hashes = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (style, code)]
+    return {"style": style, "script": code, "style_hash": hashes[0], "script_hash": hashes[1]}
 
 
 def _json_in_html(text: str) -> markupsafe.Markup:

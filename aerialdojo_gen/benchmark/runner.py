@@ -11,10 +11,8 @@ import hashlib
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -25,9 +23,9 @@ from aerialdojo_gen.base.safe_parse import read_json
 from aerialdojo_gen.benchmark import episodes
 from aerialdojo_gen.benchmark.agents import ServiceDown, agent_class, load_agent
 from aerialdojo_gen.benchmark.evaluation import BudgetTracker, Evaluation, Limits, Outcome, agent_code_digest
+from aerialdojo_gen.benchmark.flight import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.journal import Journals
 from aerialdojo_gen.benchmark.tasks import goals_withheld, select
-from aerialdojo_gen.benchmark.viewpoints import no_viewpoints_message, viewpoints_content
 from aerialdojo_gen.benchmark.worker import Finished, WorkUnit
 from aerialdojo_gen.benchmark.workers import fly_units
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
@@ -63,12 +61,8 @@ def evaluate(
     folder = log.below(f"runs/{check_run_name(evaluation.run)}")
     rows = select(root, evaluation.selection)
     run = RunLog(root, log, folder, evaluation, rows)
-    made = make_executor(
-        executor,
-        workers,
-        address,
-        SharedPaths(on_disk(root, below="release"), (), (run.journal_folder,), reporter.line),
-    )
+    paths = SharedPaths(on_disk(root, below="release"), (), (run.journals.folder,), reporter.line)
+    made = make_executor(executor, workers, address, paths)
     with folder.lock(), Interrupts() as interrupts:
         if restart:
             run.drop()
@@ -83,7 +77,7 @@ def evaluate(
         with reporter.bar(evaluation.label, todo.num_rows, "episodes") as bar:
 
             def on_finished(finished: Finished) -> None:
-                budget.add(finished)
+                budget.total += finished
                 bar.advance(finished.episodes)
 
             def stopped() -> bool:
@@ -93,7 +87,9 @@ def evaluate(
 
             try:
                 # The processes have ended when their journals are flushed.
-                with run.flushing(), made as pool:
+                with ExitStack() as stack:
+                    stack.callback(run.flush_journals)
+                    pool = stack.enter_context(made)
                     units = run.units(todo, pool.workers if todo.num_rows else 1)
                     for scene in fly_units(root, evaluation, units, pool, on_finished, stopped):
                         run.flush_journals(scene)
@@ -119,7 +115,7 @@ class RunLog:
         self, data: DataRoot, out: DataRoot, folder: DataRoot, evaluation: Evaluation, rows: pa.Table
     ) -> None:
         self._out, self._folder, self._name = out, folder, evaluation.run
-        self._journals = Journals(out, evaluation.run)
+        self.journals = Journals(out, evaluation.run)
         self._uncommitted = ""
         self._rows = rows
         self._scenes: list[str] = rows["scene"].unique().to_pylist()
@@ -141,7 +137,7 @@ class RunLog:
 
     def check_settings(self) -> None:
         """Write the run's settings; UsageError if it was begun with others."""
-        begun = episodes.run_scenes(self._out, self._name) or self._journals
+        begun = episodes.run_scenes(self._out, self._name) or self.journals
         advice = "give another --run, or --restart"
         # A run without finished episodes may change: an agent's options may have been wrong.
         if begun and self._folder.exists(_SETTINGS):
@@ -159,42 +155,29 @@ class RunLog:
         with self._folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
-    @property
-    def journal_folder(self) -> Path:
-        """Folder that workers write finished episodes to."""
-        return self._journals.folder
-
     def drop(self) -> None:
         """Remove the run."""
         episodes.remove_run(self._out, self._name)
-        self._journals.drop()
+        self.journals.drop()
         self._folder.delete(_SETTINGS)
 
     def flush_journals(self, scene: str = "*") -> None:
         """Move the journals of a scene, or of all, into the tables."""
-        for name in self._journals.scenes(scene):
-            records = self._journals.records(name)
+        for name in self.journals.scenes(scene):
+            records = self.journals.records(name)
             if records:
                 episodes.add_records(self._out, self._name, name, records, self._fingerprint)
-            self._journals.remove(name)
+            self.journals.remove(name)
 
     def checkpoint(self, reporter: Reporter) -> None:
         """Commit finished episodes to an object store from time to time; report an unreachable store once."""
         try:
-            self._journals.checkpoint()
+            self.journals.checkpoint()
             self._uncommitted = ""
         except StoreError as error:
             if not self._uncommitted:
-                reporter.line(f"{error}; finished episodes are kept in {self._journals.folder} meanwhile")
+                reporter.line(f"{error}; finished episodes are kept in {self.journals.folder} meanwhile")
             self._uncommitted = str(error)
-
-    @contextmanager
-    def flushing(self) -> Iterator[None]:
-        """Flush the journals, however the block ends."""
-        try:
-            yield
-        finally:
-            self.flush_journals()
 
     def todo(self, rerun_failed: bool) -> pa.Table:
         """Rows still to be flown, or exactly those that failed."""
@@ -244,7 +227,7 @@ class RunLog:
             parts = 1 if len(by_scene) >= 4 * workers else -(-rows.num_rows // share)
             size = -(-rows.num_rows // parts)
             for k in range(parts):
-                units.append(WorkUnit(scene, rows.slice(k * size, size), self._journals.path(scene, k)))
+                units.append(WorkUnit(scene, rows.slice(k * size, size), self.journals.path(scene, k)))
         return units
 
 

@@ -25,10 +25,7 @@ STEP_COLUMNS = ("task_id", "step", "x_m", "y_m", "z_m", "distance_m")
 
 
 def path_clearances(episodes: pa.Table, steps: pa.Table) -> Floats:
-    """Smallest distance to the goal over the flown segments, (n,) metres.
-
-    A segment and its end distances fix a triangle.
-    """
+    """Smallest distance to the goal over flown segments, (n,) metres: each and its end distances fix a triangle."""
     nearest = np.array(episodes["min_distance_m"].to_numpy(), dtype=np.float64)
     owner = pc.index_in(steps["task_id"], value_set=episodes["task_id"].combine_chunks())
     flown = steps.filter(pc.is_valid(owner))

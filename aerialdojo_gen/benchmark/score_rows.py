@@ -11,8 +11,7 @@ from typing import Any
 
 from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.benchmark.metrics import METRICS
-from aerialdojo_gen.benchmark.outcome_table import Cut
-from aerialdojo_gen.benchmark.tables import ReportRequest
+from aerialdojo_gen.benchmark.tables import Cut, ReportRequest
 from aerialdojo_gen.store.schemas import SETTINGS
 
 _HEAD = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name", "episodes")

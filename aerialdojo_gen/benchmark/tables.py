@@ -7,17 +7,112 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
 
 from aerialdojo_gen.base.paper_figures import PaperResult
 from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
 from aerialdojo_gen.benchmark.difficulty import Breakdowns, find_breakdowns
-from aerialdojo_gen.benchmark.metrics import MEASURES, METRICS, Profile, knows_views
-from aerialdojo_gen.benchmark.outcome_table import Cut, OutcomeTable
+from aerialdojo_gen.benchmark.intervals import score_intervals
+from aerialdojo_gen.benchmark.metrics import (
+    MEASURES,
+    METRICS,
+    Bools,
+    Floats,
+    Profile,
+    Score,
+    Summary,
+    knows_views,
+    outcomes,
+    score,
+    summarize_values,
+    values_of,
+)
 from aerialdojo_gen.benchmark.runs import Run
 from aerialdojo_gen.dataset.protocol import Sample
 from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.schemas import TERMINATIONS
+
+GROUPS = ("scene", "family", "scene_type", "partition", "setting", "modality")
+# They have 29 % of the paper's tasks.
+MALLS = ("U_Mall_0", "U_Mall_1")
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Some episodes, and how they are judged and averaged; what is None or empty is left to another cut."""
+
+    run: int | None = None
+    profile: Profile | None = None
+    where: tuple[tuple[str, str], ...] = ()  # Column and value
+    weighted: bool = False  # Whether every episode has the same weight, else every family
+    along_way: bool = False  # Whether the smallest distance is that of the way, else that of the poses
+
+    def __or__(self, other: Cut) -> Cut:
+        """Combine two cuts."""
+        return Cut(
+            self.run if other.run is None else other.run,
+            other.profile or self.profile,
+            self.where + other.where,
+            self.weighted or other.weighted,
+            self.along_way or other.along_way,
+        )
+
+
+class OutcomeTable:
+    """Episodes of some runs, their groups as columns; judged by a profile when it is first needed."""
+
+    def __init__(self, runs: Sequence[Run], labels: Mapping[str, Sequence[Any]] | None = None) -> None:
+        self.runs = runs
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(run.episodes, name) for run in runs]) for name in GROUPS
+        }
+        columns["malls"] = np.where(np.isin(columns["scene"], MALLS), "malls", "other scenes")
+        columns["run"] = np.repeat(np.arange(len(runs)), [len(run.episodes) for run in runs])
+        self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
+        self.judged, self.summary, self.intervals = cache(self._judged), cache(self._summary), cache(self._interval)
+
+    def _judged(self, profile: Profile, along_way: bool = False) -> Floats:
+        """Return the `METRICS` of every episode, (n, 6), by a profile."""
+        logs = [run.episodes for run in self.runs]
+        if along_way:
+            nearest = [run.path_clearance_to_goal_m for run in self.runs]
+            logs = [replace(log, min_distance_m=m) for log, m in zip(logs, nearest, strict=True) if m is not None]
+        return np.concatenate([values_of(outcomes(log, profile)) for log in logs])
+
+    def mask(self, cut: Cut) -> Bools:
+        """Select the episodes of a cut."""
+        mask = np.ones(len(self.columns["run"]), np.bool_)
+        for name, value in (*cut.where, *([] if cut.run is None else [("run", cut.run)])):
+            mask &= self.columns[name] == value
+        return mask
+
+    def values(self, name: str, cut: Cut, order: Sequence[str] | None = None) -> list[str]:
+        """List the values of a column that a cut has, in an order."""
+        there = set(self.columns[name][self.mask(cut)].tolist()) - {""}
+        return sorted(there) if order is None else [value for value in order if value in there]
+
+    def _summary(self, cut: Cut) -> Summary:
+        """Average a cut by scene, family and overall."""
+        mask = self.mask(cut)
+        assert cut.profile is not None
+        scene, family = (self.columns[name][mask] for name in ("scene", "family"))
+        return summarize_values(self.judged(cut.profile, cut.along_way)[mask], scene, family)
+
+    def _interval(self, cut: Cut) -> Sequence[tuple[float, float]]:
+        """Return the 95 % intervals of a cut's overall metrics, in the order of `METRICS`."""
+        return score_intervals(self.summary(cut))
+
+    def score(self, cut: Cut) -> Score:
+        """Average a cut to one score."""
+        if not cut.weighted:
+            return self.summary(cut).overall
+        assert cut.profile is not None
+        return score(self.judged(cut.profile, cut.along_way)[self.mask(cut)])
+
 
 NONE = "–"
 DEFAULT_RADII_M = (3.0, 5.0)
@@ -172,3 +267,62 @@ def _marks(groups: Mapping[str, Sequence[tuple[float, int]]]) -> dict[int, str]:
         named = dict(zip(levels, (BEST, SECOND) if len(levels) > 2 else (BEST,), strict=False))
         marks.update({i: named[value] for value, i in ranked if value in named and len(levels) > 1})
     return marks
+
+
+@dataclass(frozen=True)
+class CountSpec:
+    """How a table of counts is made, a row a run."""
+
+    title: str
+    groups: Mapping[str, Sequence[str]]
+    rows: Callable[[ReportRequest], Sequence[Row]]
+    cells: Callable[[Run, Profile], tuple[str, ...]]
+    note: str = ""
+    headed: bool = False
+
+
+def count_table(spec: CountSpec, request: ReportRequest) -> TextTable:
+    """Make a table of counts, a row a run: visits that end as failures, or how episodes went."""
+    profile, rows = request.profiles[0], spec.rows(request)
+    lines = []
+    for row in rows:
+        assert row.cut.run is not None
+        run = request.runs[row.cut.run]
+        for name, value in row.cut.where:
+            run = run.where(getattr(run.episodes, name) == value)
+        lines.append((row.label, spec.cells(run, profile)))
+    sections = {k: row.section for k, row in enumerate(rows) if row.section != (rows[k - 1].section if k else "")}
+    heads = [Column(head, group) for group, names in spec.groups.items() for head in names]
+    title = f"{spec.title}, {profile.radius_m:g} m" if spec.headed else spec.title
+    notes = [spec.note.format(radius=f"{profile.radius_m:g} m")] if spec.note else []
+    return TextTable("agent", heads, lines, title, notes, sections)
+
+
+def visit_cells(run: Run, profile: Profile) -> tuple[str, ...]:
+    """Count episodes that were within the radius and are no success, by how they ended."""
+    e = run.episodes
+    judged = outcomes(e, profile)
+    lost = judged.oracle_success & ~judged.success
+    within = judged.distance_m <= profile.radius_m
+    stopped = e.stop_called & ~e.collision & (e.n_actions <= e.action_budget)
+    unstopped = ~stopped & ~e.collision
+    n = int(lost.sum())
+    counts = (len(e), int(judged.oracle_success.sum()), int(judged.success.sum()), n)
+    ends = (stopped, e.collision, unstopped & ~within, unstopped & within)
+    shares = (f"{100.0 * int((lost & end).sum()) / n:.1f}" if n else NONE for end in ends)
+    return (*(f"{count:,}" for count in counts), *shares)
+
+
+def conduct_cells(run: Run, _: Profile) -> tuple[str, ...]:
+    """Say how episodes ended, and what a language-model service used."""
+    ends = run.table["termination"].to_pylist()
+    cells = [f"{100 * (ends.count(how) / len(ends)):.1f}" for how in TERMINATIONS]
+    cells.append(f"{run.episodes.n_actions.mean():.1f}")
+    for name, form in (
+        ("n_refused", ",.0f"), ("n_invalid", ",.0f"), ("n_requests", ",.0f"), ("input_tokens", ",.0f"),
+        ("output_tokens", ",.0f"), ("cost_usd", ",.2f"),
+    ):  # fmt: skip
+        column = run.table[name]
+        # A sum is not known where any episode does not know its part.
+        cells.append(NONE if column.null_count else f"{math.fsum(column.to_pylist()):{form}}")
+    return tuple(cells)

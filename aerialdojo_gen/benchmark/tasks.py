@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.language.sides import of_side
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.constants import MODALITIES
@@ -44,10 +45,7 @@ _FACTS = ("nav_id", "goal_x_m", "goal_y_m", "goal_z_m", "euclidean_m", "length_m
 
 @dataclass(frozen=True)
 class Selection:
-    """Which tasks; an empty field chooses all.
-
-    ``train`` and ``test`` stand for the splits of both partitions, ``all`` for all, and become their names.
-    """
+    """Which tasks; an empty field chooses all. ``train``, ``test`` and ``all`` become the names of splits."""
 
     splits: tuple[str, ...] = ()  # Of `aerialdojo_gen.store.schemas.SUBSETS`
     settings: tuple[str, ...] = ()
@@ -162,10 +160,7 @@ def _facts(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[float, ..
 def reference_actions(
     root: DataRoot, scene: str, subsets: Sequence[str], column: str = "action"
 ) -> dict[str, list[int]]:
-    """Read the reference trajectories' actions, by navigation task: for the oracle alone.
-
-    `column` is one of `routes`: ``action``, or ``agent_action``, which an older release lacks.
-    """
+    """Read a list of actions of `routes`, by navigation task: for the oracle alone; an older release may lack it."""
     found: dict[str, list[int]] = {}
     for subset in subsets:
         routes = store.read_stored(root, f"routes/{subset}", scene, ("nav_id", column))
@@ -235,11 +230,33 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
         raise StoreError(f"the mesh {told} is missing: run {command('build-scenes', scene=scene)}") from None
 
 
-class TaskSampler:
-    """Samples tasks uniformly with replacement, in blocks of one scene.
+# The descriptions that a task may have: its own, or one of its target's drawn for an episode.
+_PARAPHRASES = ("task", "random")
 
-    The first of a block is drawn from all tasks, the others from its scene.
-    """
+
+def check_paraphrase(choice: str) -> str:
+    """Return the choice; UsageError for an unknown one."""
+    if choice not in _PARAPHRASES:
+        raise UsageError(unknown("no choice of paraphrase", choice, _PARAPHRASES))
+    return choice
+
+
+@lru_cache(maxsize=100)
+def texts_of_tasks(root: DataRoot, scene: str, subset: str) -> dict[str, tuple[str, ...]]:
+    """Read the texts that tasks of a subset may have, by navigation task: of test tasks those that are held out."""
+    objects = store.read_stored(root, "release/objects", scene, ("object_id", "paraphrases"))
+    if "paraphrases" not in objects.column_names:
+        raise StoreError(f"the objects of {scene} in {root}/release have no paraphrases: an older version made them")
+    texts = {
+        row["object_id"]: tuple(text["text"] for text in of_side(row["paraphrases"], held_out=subset == "test"))
+        for row in objects.to_pylist()
+    }
+    routes = store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "target_object_id"))
+    return {row["nav_id"]: texts[row["target_object_id"]] for row in routes.to_pylist()}
+
+
+class TaskSampler:
+    """Samples tasks with replacement, in blocks of one scene: the first from all tasks, the others from its scene."""
 
     def __init__(self, scenes: Sequence[str], run_length: int = 1) -> None:
         self._scenes = scenes

@@ -99,29 +99,18 @@ def _fly(work: _Work, link: WorkerChannel) -> str:
         at_end(_worker_of_process.clear)
         at_end(stack.close)
         _worker_of_process["worker"] = stack.enter_context(worker(work.data, work.evaluation, link))
-    with _ProgressSender(link) as progress:
-        _worker_of_process["worker"].fly(work.unit, progress.add, link.stopped)
+    unsent, last = Finished(), time.monotonic()
+
+    def add(finished: Finished) -> None:
+        nonlocal unsent, last
+        unsent += finished
+        if time.monotonic() - last >= link.every_s:
+            link.send(unsent)
+            unsent, last = Finished(), time.monotonic()
+
+    try:
+        _worker_of_process["worker"].fly(work.unit, add, link.stopped)
+    finally:
+        if unsent.episodes:
+            link.send(unsent)
     return work.scene
-
-
-class _ProgressSender:
-    """Sends progress to the parent, at most once per `every_s` seconds, and the rest at the end."""
-
-    def __init__(self, link: WorkerChannel) -> None:
-        self._link, self._sum, self._last = link, Finished(), time.monotonic()
-
-    def add(self, finished: Finished) -> None:
-        self._sum += finished
-        if time.monotonic() - self._last >= self._link.every_s:
-            self._send()
-
-    def _send(self) -> None:
-        if self._sum.episodes:
-            self._link.send(self._sum)
-        self._sum, self._last = Finished(), time.monotonic()
-
-    def __enter__(self) -> _ProgressSender:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._send()

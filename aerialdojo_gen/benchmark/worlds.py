@@ -21,10 +21,7 @@ from aerialdojo_gen.store.cache import Cache
 
 
 class WorldMaker:
-    """Makes releases of worlds, each once: a folder of the cache that `aerialdojo_gen.store.cache` bounds.
-
-    `WorldsEnv` documents the parameters; `folder` is its `cache`.
-    """
+    """Makes releases of worlds in the cache, each once; parameters as of `WorldsEnv`, where `folder` is ``cache``."""
 
     def __init__(
         self, types: str | Sequence[str], start_seed: int = 1000, num_worlds: int = 1, *,
@@ -97,10 +94,7 @@ class WorldMaker:
 
 
 def make_worlds(types: str | Sequence[str], **options: Any) -> list[Path]:
-    """Return the data directories of worlds, each made where it is not there; parameters and errors of `WorldMaker`.
-
-    This process keeps the cache from removing them, as long as it lives.
-    """
+    """Return the data directories of worlds, made where they are not there; this process keeps them in the cache."""
     maker = WorldMaker(types, **options)
     try:
         return [maker.root(world) for world in maker.worlds]

@@ -18,7 +18,6 @@ from aerialdojo_gen.cli import (
     config,
     evaluate,
     exchange,
-    fly,
     leaderboard,
     places,
     release,
@@ -93,7 +92,7 @@ def _program(
 
 
 _GROUPS = (
-    stages, render, sources, places, evaluate, fly, release, validate, exchange, report, leaderboard
+    stages, render, sources, places, evaluate, release, validate, exchange, report, leaderboard
 )  # fmt: skip
 for _group in _GROUPS:
     app.add_typer(_group.app)

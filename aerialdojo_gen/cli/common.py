@@ -51,7 +51,7 @@ def merge_scenes(scenes: list[str] | None, scene: list[str] | None) -> list[str]
 
 
 def selection(
-    scenes: list[str] | None, *, split: Sequence[str] | None, setting: list[str] | None, modality: list[str] | None,
+    scenes: list[str] | None, split: Sequence[str] | None, setting: list[str] | None, modality: list[str] | None,
     protocol: str | None, limit: int | None, seed: int,
 ) -> Selection:  # fmt: skip
     """Make the selection of tasks that the options of `evaluate`, `fly` and `score` name."""

@@ -1,4 +1,4 @@
-"""Commands that evaluate and train agents."""
+"""Commands that evaluate and train agents, and let a person fly."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -145,13 +146,11 @@ def evaluate(
     from aerialdojo_gen.benchmark.runner import Evaluation
     from aerialdojo_gen.benchmark.runner import evaluate as run_evaluation
     from aerialdojo_gen.benchmark.worker import RetryPolicy
+    from aerialdojo_gen.dataset.protocol import sample_shortfall
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
-    chosen = selection(
-        merge_scenes(scenes, scene), split=split, setting=setting, modality=modality, protocol=protocol,
-        limit=limit, seed=seed,
-    )  # fmt: skip
+    chosen = selection(merge_scenes(scenes, scene), split, setting, modality, protocol, limit, seed)
     with _tracebacks(traceback):
         name, given = _agent(agent, preset, key_values(option or []))
         evaluation = Evaluation(
@@ -160,7 +159,8 @@ def evaluate(
             RetryPolicy(attempts, tolerate=tolerate), requests_per_minute, tell=tuple(tell or ()),
             withheld=submission is not None,
         )  # fmt: skip
-    _warn_of_sample(data, protocol)
+    if protocol and (less := sample_shortfall(data)):
+        print(f"--protocol {protocol}: {less}", file=sys.stderr)
     if estimate:
         from aerialdojo_gen.benchmark.estimate import estimate as estimate_cost
 
@@ -182,14 +182,6 @@ def evaluate(
         known = outcome.successes is not None
         withheld = "" if known else "; the goals are withheld: score it with the whole release"
         reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes{withheld}")
-
-
-def _warn_of_sample(data: str, protocol: str | None) -> None:
-    """Say what a release lacks of the sample that a protocol asks for."""
-    from aerialdojo_gen.dataset.protocol import sample_shortfall
-
-    if protocol and (less := sample_shortfall(data)):
-        print(f"--protocol {protocol}: {less}", file=sys.stderr)
 
 
 def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
@@ -253,7 +245,8 @@ def _sensors(
 def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str | None = None) -> str:
     """Return this process's command with all its options, quoted for a shell."""
     kept = [argument for argument in sys.argv[1:] if argument not in without]
-    if data is not None and os.environ.get("AERIALDOJO_DATA") and not _names(kept, "--data"):
+    named = any(argument == "--data" or argument.startswith("--data=") for argument in kept)
+    if data is not None and os.environ.get("AERIALDOJO_DATA") and not named:
         kept += ["--data", data]
     kept += [argument for argument in more if argument not in kept]
     called = cli_context.program(sys.argv[0])
@@ -261,8 +254,52 @@ def rerun_command(more: Sequence[str], *, without: Sequence[str] = (), data: str
     return Secrets().text(shlex.join([*program, *kept]))
 
 
-def _names(arguments: Sequence[str], option: str) -> bool:
-    return any(argument == option or argument.startswith(f"{option}=") for argument in arguments)
+@app.command("fly")
+def fly(
+    name: Annotated[
+        str,
+        typer.Option("--name", help="The pilot's name in the tables: small letters, digits and -; any name does."),
+    ],
+    scenes: options.Scenes = None,
+    data: options.Data = "data",
+    run: Annotated[str | None, typer.Option("--run", help="Name of the run.  (default: human-NAME)")] = None,
+    split: options.Split = None,
+    setting: options.Setting = None,
+    modality: options.Modality = None,
+    protocol: options.Protocol = None,
+    scene: options.Scene = None,
+    limit: options.TaskLimit = None,
+    seed: options.SelectionSeed = 0,
+    renderer: options.RendererName = "auto",
+    tell: options.Tell = None,
+    out: options.Out = None,
+    submission: options.SubmissionFile = None,
+    restart: Annotated[bool, typer.Option("--restart", help="Delete the run's earlier flights.")] = False,
+    port: options.Port = 0,
+    browser: options.Browser = True,
+    pipeline: options.PipelineFile = None,
+) -> None:
+    """Fly released tasks yourself in the browser; finished flights are kept, as episodes of human:NAME."""
+    from aerialdojo_gen.studio.web.serving import require_web
+
+    require_web()
+    from aerialdojo_gen.benchmark.evaluation import Evaluation
+    from aerialdojo_gen.studio.fly.server import serve_session
+    from aerialdojo_gen.studio.fly.session import agent_name
+
+    config, _ = open_pipeline(pipeline, data, reads=True)
+    chosen = selection(merge_scenes(scenes, scene), split, setting, modality, protocol, limit, seed)
+    evaluation = Evaluation(
+        run or f"human-{name}", agent_name(name), selection=chosen, embodiment=config.embodiment, renderer=renderer,
+        tell=tuple(tell or ()),
+    )  # fmt: skip
+    say = partial(print, flush=True)
+    serve_session(data, evaluation, out=out, restart=restart, port=port, browser=browser, say=say)
+    if submission is not None:
+        from aerialdojo_gen.benchmark.submission import write_submission
+
+        size = write_submission(data, out or data, evaluation.run, submission)
+        say(f"{submission}: {size:,} bytes")
 
 
 @app.command("train")

@@ -51,9 +51,7 @@ def score(
     from aerialdojo_gen.pipeline.progress import Reporter
 
     config, _ = open_pipeline(pipeline, data, reads=True)
-    chosen = selection(
-        scene, split=split or ["test"], setting=setting, modality=modality, protocol=protocol, limit=limit, seed=seed
-    )
+    chosen = selection(scene, split or ["test"], setting, modality, protocol, limit, seed)
     reporter = Reporter(quiet=quiet)
     with interruptible(f"{into} is as it was"):
         card = scoring.score(
@@ -61,10 +59,8 @@ def score(
             replace=replace, workers=workers, reporter=reporter,
         )  # fmt: skip
     whole = card.rows[0]
-    known = {
-        MEASURES[metric].head[:-2]: text(metric, value) for metric, value in whole.mean.items() if value is not None
-    }
-    scores = ", ".join(f"{head} {value}" for head, value in known.items())
+    known = ((MEASURES[m].head[:-2], text(m, value)) for m, value in whole.mean.items() if value is not None)
+    scores = ", ".join(f"{head} {value}" for head, value in known)
     reporter.line(f"score {card.name}: {whole.episodes:,} episodes replay; {scores}; added to {into}")
 
 

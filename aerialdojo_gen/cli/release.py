@@ -117,8 +117,7 @@ def show(
     """Draw one task: goal, route in its scene, clearance, reference image, views along the route."""
     from aerialdojo_gen.base.text_table import facts, terminal_width
     from aerialdojo_gen.dataset.lookup import find_task
-    from aerialdojo_gen.studio.show.figure import write_png
-    from aerialdojo_gen.studio.show.page import write_page
+    from aerialdojo_gen.studio.show.figure import write_page, write_png
     from aerialdojo_gen.studio.show.pictured import picture_task
 
     found = find_task(data, task_id)

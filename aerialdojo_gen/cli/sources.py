@@ -188,9 +188,10 @@ def annotate_draft(
     if fresh:
         print(draft_scene(scene, config, roots, options, force=force, reporter=reporter))
     if agent is not None:
-        from aerialdojo_gen.studio.annotate.rewrite import Limits, rewrite_scene
+        from aerialdojo_gen.benchmark.evaluation import Limits
+        from aerialdojo_gen.studio.annotate.rewrite import rewrite_scene
 
-        limits = Limits(max_tokens, max_cost) if yes or (max_tokens, max_cost) != (None, None) else None
+        limits = Limits(max_cost, max_tokens) if yes or (max_tokens, max_cost) != (None, None) else None
         rewrite_scene(scene, roots, agent, limits, again=fresh, say=print)
         if limits is None:
             print("nothing was sent: --yes sends it; --max-tokens or --max-cost sends it up to a limit")

@@ -10,26 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.exchange import aerialdojo_layout as layout
 from aerialdojo_gen.exchange.actions import WORDS, actions_of
-from aerialdojo_gen.exchange.aerialdojo_layout import (
-    KINDS,
-    SCHEMA_VERSION,
-    SETTING_OF,
-    SETTING_WORDS,
-    TASK_FILE,
-    TRAJECTORIES,
-    Partition,
-    parse_partition,
-)
 from aerialdojo_gen.exchange.fields import BadField, Fields, plain, positions_of, quaternions_of, shown
-from aerialdojo_gen.exchange.folder import check_picture, inside
+from aerialdojo_gen.exchange.folder import inside
 from aerialdojo_gen.exchange.jsonstream import small_document
-from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest, picture_at
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
 _STEP = ("position_ned_m", "quaternion_xyzw")
 _KNOWN = {"action", *_STEP}
+_STATED = {
+    "geodesic_distance": "stated_length_m", "euclidean_distance": "euclidean_m", "complexity": "detour_ratio",
+}  # fmt: skip
 _START_FAR_M = 0.01
 _EXACT = 1e-6
 
@@ -39,26 +33,25 @@ def task_files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     root = path.resolve()
-    found = [p for p in path.rglob(TASK_FILE) if p.resolve().is_relative_to(root)]
+    found = [p for p in path.rglob(layout.TASK_FILE) if p.resolve().is_relative_to(root)]
     if not found:
-        raise UsageError(f"{path} has no {TASK_FILE} below it: name the folder that holds {' and '.join(KINDS)}")
+        raise UsageError(
+            f"{path} has no {layout.TASK_FILE} below it: name the folder that holds {' and '.join(layout.KINDS)}"
+        )
     # A partition's two files come one after the other, so that its trajectories are read once.
     return sorted(found, key=lambda p: (p.parent.parts[-3:], p.parts))
 
 
 def label(path: Path) -> str | None:
     """Name a task file by its place in the layout, whatever part of it is imported; None where it has none."""
-    partition = parse_partition(path.parent)
-    if partition is None or path.parents[3].name not in KINDS:
+    partition = layout.parse_partition(path.parent)
+    if partition is None or path.parents[3].name not in layout.KINDS:
         return None
     return (Path(path.parents[3].name) / partition.path / path.name).as_posix()
 
 
 class Reader:
-    """Reads tasks, and each trajectory once for both of its instances.
-
-    One a whole import: it knows the navigation tasks that it has met.
-    """
+    """Reads tasks of one import, and each trajectory once for both of its instances."""
 
     def __init__(self) -> None:
         self._partition: tuple[str, ...] = ()
@@ -69,8 +62,8 @@ class Reader:
     def read(self, record: Fields, context: Context) -> Task:
         """Read a task and, where there is one, its trajectory."""
         folder = context.file.absolute().parent
-        partition = parse_partition(folder)
-        kind = KINDS.get(folder.parents[2].name) if partition else None
+        partition = layout.parse_partition(folder)
+        kind = layout.KINDS.get(folder.parents[2].name) if partition else None
         episode = record.name("episode_id")
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", episode):
             raise BadField("episode_id", f"{shown(episode)} cannot name a file")
@@ -82,8 +75,8 @@ class Reader:
         except StoreError as error:
             raise BadField("map_name", str(error)) from None
         word = record.text("task")
-        if word not in SETTING_OF:
-            raise BadField("task", f"{shown(word)} is none of {', '.join(SETTING_OF)}")
+        if word not in layout.SETTING_OF:
+            raise BadField("task", f"{shown(word)} is none of {', '.join(layout.SETTING_OF)}")
         trains = record.flag("used-in-train")
         if partition is not None:
             _agree(partition, scene, word, trains)
@@ -108,11 +101,13 @@ class Reader:
             "scene_type": scene_type,
             "partition": partition.partition if partition else by_name,
             "subset": "train" if trains else "test",
-            "setting": SETTING_OF[word],
+            "setting": layout.SETTING_OF[word],
         }
         record.optional_text("coordinate_system")
         if record.has("info"):
-            known |= _stated(record.child("info"))
+            # What a task states of its own route; a trajectory's poses overrule it.
+            info = record.child("info")
+            known |= {ours: info.number(theirs) for theirs, ours in _STATED.items() if info.has(theirs)}
         image = record.optional_text("image")
         modality = kind or ("image" if image else "semantic")
         if modality == "image":
@@ -130,12 +125,11 @@ class Reader:
             return None
         if image is None:
             raise BadField("image", "is missing")
-        try:
-            return check_picture(inside(context.file.parent, image))
-        except ValueError as error:
-            raise BadField("image", str(error)) from None
+        return picture_at(context.file.parent, image, "image")
 
-    def _join(self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None) -> None:
+    def _join(
+        self, task: Task, context: Context, folder: Path, partition: layout.Partition | None, own: str | None
+    ) -> None:
         """Give the task its trajectory, or what its other instance brought already; `own` is its trajectory's id."""
         place = folder.parts[-3:] if partition else (context.label,)
         if place != self._partition:
@@ -157,17 +151,17 @@ class Reader:
             task.route = met.pop("route")
 
     def _trajectory(
-        self, task: Task, context: Context, folder: Path, partition: Partition | None, own: str | None
+        self, task: Task, context: Context, folder: Path, partition: layout.Partition | None, own: str | None
     ) -> dict[str, Any]:
         met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
         met["target"] = task.object_key
         pair = None
         if partition is not None:
-            root = folder.parents[3] / TRAJECTORIES
+            root = folder.parents[3] / layout.TRAJECTORIES
             if (root / partition.path).is_dir():
                 pair = self._read(root, partition, task, context, met)
             else:
-                context.notes[f"no folder in {TRAJECTORIES} for its partition: no route"] += 1
+                context.notes[f"no folder in {layout.TRAJECTORIES} for its partition: no route"] += 1
         # Ours bring their name; of others the objects make it, so that any part of a dataset gives the same names.
         name = f"{task.scene}-{digest(task.scene, pair)}" if pair else None
         if own and re.fullmatch(rf"{re.escape(task.scene)}-[A-Za-z0-9]{{1,64}}", own):
@@ -180,11 +174,11 @@ class Reader:
         return met | {"nav_id": name}
 
     def _read(
-        self, root: Path, partition: Partition, task: Task, context: Context, met: dict[str, Any]
+        self, root: Path, partition: layout.Partition, task: Task, context: Context, met: dict[str, Any]
     ) -> str | None:
         """Read a trajectory into `met`; returns its pair of objects where it names one."""
         relative = partition.path / f"{task.source_id}.json"
-        label = f"{TRAJECTORIES}/{relative.as_posix()}"
+        label = f"{layout.TRAJECTORIES}/{relative.as_posix()}"
         try:
             document = Fields(small_document(inside(root, relative.as_posix())), label)
         except OSError as error:
@@ -192,8 +186,8 @@ class Reader:
         except ValueError as error:
             raise BadField("episode_id", f"{label}: {error}") from None
         version = document.text("schema_version")
-        if version != SCHEMA_VERSION:
-            raise BadField(document.path("schema_version"), f"{shown(version)}, expected {SCHEMA_VERSION!r}")
+        if version != layout.SCHEMA_VERSION:
+            raise BadField(document.path("schema_version"), f"{shown(version)}, expected {layout.SCHEMA_VERSION!r}")
         if document.text("map_name") != task.scene:
             raise BadField(document.path("map_name"), f"is not the task's, {task.scene}")
         if document.has("status") and document.text("status") != "planned":
@@ -225,21 +219,11 @@ def _attitude(pose: Fields) -> NDArray[np.float64]:
     return found[0]
 
 
-def _stated(info: Fields) -> dict[str, Any]:
-    """What a task states of its own route; a trajectory's poses overrule it."""
-    names = {
-        "geodesic_distance": "stated_length_m",
-        "euclidean_distance": "euclidean_m",
-        "complexity": "detour_ratio",
-    }
-    return {ours: info.number(theirs) for theirs, ours in names.items() if info.has(theirs)}
-
-
-def _agree(partition: Partition, scene: str, word: str, trains: bool) -> None:
+def _agree(partition: layout.Partition, scene: str, word: str, trains: bool) -> None:
     """Refuse a task that is not of the folder in which it stands, as the authors' loader does."""
     if scene != partition.scene:
         raise BadField("map_name", f"{shown(scene)} in a folder of {partition.scene}")
-    if word != SETTING_WORDS[partition.setting][2]:
+    if word != layout.SETTING_WORDS[partition.setting][2]:
         raise BadField("task", f"{shown(word)} in {partition.path.as_posix()}")
     if trains != (partition.subset == "train"):
         raise BadField("used-in-train", f"{int(trains)} in {partition.path.as_posix()}")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,17 +17,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError, StoreError
 from aerialdojo_gen.base.pictures import REFERENCE_PNG, decode_rgb, encode_png
+from aerialdojo_gen.exchange import aerialdojo_layout as layout
 from aerialdojo_gen.exchange.actions import words_of
-from aerialdojo_gen.exchange.aerialdojo_layout import (
-    IMAGE,
-    SCHEMA_VERSION,
-    SEMANTIC,
-    SETTING_WORDS,
-    TASK_FILE,
-    TRAJECTORIES,
-    Partition,
-    partition_of,
-)
+from aerialdojo_gen.exchange.folder import link_or_copy
 from aerialdojo_gen.exchange.frames import NED
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
@@ -109,15 +99,14 @@ LOST: Mapping[str, Sequence[str]] = {
     "scenes": ["all but the name"],
 }  # fmt: skip
 
+_ENDS = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m", "length_m",
+         "euclidean_m", "detour_ratio"]  # fmt: skip
 _PICTURES = "Images"
 _COORDINATES = "ProjectAirSim NED"
 
 
 def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> dict[str, int]:
-    """Write a scene's tasks, pictures and trajectories.
-
-    As in the authors' data every scene has all of its partitions: one without tasks is an empty list.
-    """
+    """Write a scene's tasks, pictures and trajectories; a partition without tasks is an empty list."""
     objects = {row["object_id"]: row for row in store.read_scene(data, "release/objects", scene).to_pylist()}
     draw = RerenderedImages(data, scene, picture_px) if picture_px else None
     pictures = _Pictures(scene, objects, draw)
@@ -125,31 +114,25 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
     for subset in ("train", "test"):
         tasks = store.read_scene(data, f"tasks/{subset}", scene)
         routes = store.read_scene(data, f"routes/{subset}", scene)
-        for setting in SETTING_WORDS:
+        for setting in layout.SETTING_WORDS:
             chosen = routes.filter(pa.compute.equal(routes["setting"], setting)).sort_by("nav_id")
             episodes = {nav_id: str(k) for k, nav_id in enumerate(chosen["nav_id"].to_pylist())}
             mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
-            partition = partition_of(scene, setting, store.partition(scene).upper(), subset)
-            ends = _ends(chosen)
-            for kind, modality in ((SEMANTIC, "semantic"), (IMAGE, "image")):
+            partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
+            ends = {row["nav_id"]: row for row in chosen.select(_ENDS).to_pylist()}
+            for kind, modality in ((layout.SEMANTIC, "semantic"), (layout.IMAGE, "image")):
                 rows = [row for row in mine if row["modality"] == modality]
                 folder = root / kind / partition.path
                 folder.mkdir(parents=True)
-                records = [
-                    _task(row, episodes[row["nav_id"]], ends[row["nav_id"]], objects, pictures, folder)
+                lines = ",\n".join(
+                    _text(_task(row, episodes[row["nav_id"]], ends[row["nav_id"]], objects, pictures, folder))
                     for row in rows
-                ]
-                _write_list(folder / TASK_FILE, records)
+                )
+                (folder / layout.TASK_FILE).write_text(f"[\n{lines}\n]\n" if rows else "[]\n", encoding="utf-8")
                 counts["task files"] += 1
-                counts["tasks"] += len(records)
+                counts["tasks"] += len(rows)
             counts["trajectories"] += _write_trajectories(root, partition, chosen, episodes, objects)
-    return counts | {"pictures": pictures.written}
-
-
-def _ends(routes: pa.Table) -> dict[str, dict[str, Any]]:
-    columns = ["nav_id", "start_object_id", "target_object_id", "goal_x_m", "goal_y_m", "goal_z_m"]
-    columns += ["length_m", "euclidean_m", "detour_ratio"]
-    return {row["nav_id"]: row for row in routes.select(columns).to_pylist()}
+    return counts | {"pictures": len(pictures.first)}
 
 
 def _task(
@@ -170,7 +153,7 @@ def _task(
         "trajectory_id": row["nav_id"],
         "map_name": row["scene"],
         "coordinate_system": _COORDINATES,
-        "task": SETTING_WORDS[row["setting"]][2],
+        "task": layout.SETTING_WORDS[row["setting"]][2],
         "used-in-train": int(row["subset"] == "train"),
         "start_true_name": start_object["name"],
         "goal_true_name": row["target_name"],
@@ -198,9 +181,8 @@ def _task(
     return record
 
 
-def _write_list(path: Path, records: Sequence[Mapping[str, Any]]) -> None:
-    lines = ",\n".join(json.dumps(record, ensure_ascii=False, allow_nan=False) for record in records)
-    path.write_text(f"[\n{lines}\n]\n" if records else "[]\n", encoding="utf-8")
+def _text(record: Mapping[str, Any]) -> str:
+    return json.dumps(record, ensure_ascii=False, allow_nan=False)
 
 
 class _Pictures:
@@ -208,13 +190,7 @@ class _Pictures:
 
     def __init__(self, scene: str, objects: Mapping[int, Mapping[str, Any]], draw: RerenderedImages | None) -> None:
         self._scene, self._objects, self._draw = scene, objects, draw
-        self._first: dict[int, Path] = {}
-        self._placed: set[Path] = set()
-
-    @property
-    def written(self) -> int:
-        """Pictures, each counted once."""
-        return len(self._first)
+        self.first: dict[int, Path] = {}
 
     def place(self, folder: Path, object_id: int) -> str:
         """Put a picture below a task file's folder; returns its path relative to it."""
@@ -222,42 +198,33 @@ class _Pictures:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
             raise StoreError(f"objects of {self._scene}: reference_image_id {name!r} cannot name a file")
         path = folder / _PICTURES / f"{name}.png"
-        if path not in self._placed:
-            path.parent.mkdir(exist_ok=True)
-            self._put(path, object_id)
-            self._placed.add(path)
-        return f"{_PICTURES}/{path.name}"
-
-    def _put(self, path: Path, object_id: int) -> None:
-        first = self._first.get(object_id)
-        if first is None:
+        if object_id not in self.first:
             picture = self._objects[object_id]["reference_image"]
             if picture is None:
                 raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
                                  f"run {command('split', scene=self._scene)}")  # fmt: skip
+            path.parent.mkdir(exist_ok=True)
             path.write_bytes(self._draw.picture(object_id) if self._draw else picture)
-            self._first[object_id] = path
-            return
-        try:
-            os.link(first, path)
-        except OSError:
-            shutil.copyfile(first, path)
+            self.first[object_id] = path
+        elif not path.exists():
+            link_or_copy(self.first[object_id], path)
+        return f"{_PICTURES}/{path.name}"
 
 
 def _write_trajectories(
     root: Path,
-    partition: Partition,
+    partition: layout.Partition,
     routes: pa.Table,
     episodes: Mapping[str, str],
     objects: Mapping[int, Mapping[str, Any]],
 ) -> int:
-    folder = root / TRAJECTORIES / partition.path
+    folder = root / layout.TRAJECTORIES / partition.path
     folder.mkdir(parents=True)
     for row, poses, actions in _poses(routes):
         positions = NED.positions_from_world(poses[:, :3]).tolist()
         quaternions = NED.quaternion_from_world_yaw(poses[:, 3]).tolist()
         document = {
-            "schema_version": SCHEMA_VERSION,
+            "schema_version": layout.SCHEMA_VERSION,
             "map_name": partition.scene,
             "task_id": f"{row['start_object_id']}_{row['start_anchor_id']}__{row['target_object_id']}",
             "status": "planned",
@@ -267,8 +234,7 @@ def _write_trajectories(
                 for word, position, quaternion in zip(words_of(actions, poses), positions, quaternions, strict=True)
             ],
         }
-        text = json.dumps(document, ensure_ascii=False, allow_nan=False)
-        (folder / f"{episodes[row['nav_id']]}.json").write_text(text, encoding="utf-8")
+        (folder / f"{episodes[row['nav_id']]}.json").write_text(_text(document), encoding="utf-8")
     return routes.num_rows
 
 

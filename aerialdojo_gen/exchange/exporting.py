@@ -87,11 +87,7 @@ def check_room(target: Path, needed: int) -> None:
 
 
 def pack_tar(folder: Path, archive: Path) -> None:
-    """Move all files below a folder into a tar archive, by name; the folder is gone afterwards.
-
-    Owners, times and modes are the same for all: the archive depends on names and contents alone. Files that are
-    links to one another stay so.
-    """
+    """Move a folder's files into a tar archive that depends on names and contents alone; the folder goes."""
     with tarfile.open(archive, "w", format=tarfile.PAX_FORMAT) as tar:
         for path in sorted(folder.rglob("*")):
             entry = tar.gettarinfo(path, path.relative_to(folder).as_posix())

@@ -157,13 +157,6 @@ def part_folder(unfinished: Path, number: int) -> Path:
     return unfinished / "parts" / f"{number:06d}"
 
 
-@contextlib.contextmanager
-def whole_part(unfinished: Path, number: int) -> Iterator[Path]:
-    """Fill the folder of a part, which appears whole or not at all."""
-    with atomic_folder(part_folder(unfinished, number), unfinished) as folder:
-        yield folder
-
-
 def link_or_copy(source: Path, target: Path) -> None:
     """Give a finished file its place in the export, without copying it where the disk can."""
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -6,9 +6,7 @@ between them is a turn: distances, angles and handedness stay.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -65,17 +63,10 @@ class Frame:
 
 
 NED = Frame("ned", ((0, 1, 0), (1, 0, 0), (0, 0, -1)))
-FRAMES: Mapping[str, Frame] = MappingProxyType(
-    {
-        frame.name: frame
-        for frame in (
-            Frame("enu", ((1, 0, 0), (0, 1, 0), (0, 0, 1))),
-            Frame("nwu", ((0, -1, 0), (1, 0, 0), (0, 0, 1))),
-            NED,
-            Frame("esd", ((1, 0, 0), (0, -1, 0), (0, 0, -1))),
-        )
-    }
-)
+_ENU = Frame("enu", ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+_NWU = Frame("nwu", ((0, -1, 0), (1, 0, 0), (0, 0, 1)))
+_ESD = Frame("esd", ((1, 0, 0), (0, -1, 0), (0, 0, -1)))
+FRAMES = {frame.name: frame for frame in (_ENU, _NWU, NED, _ESD)}
 
 
 def frame_named(name: str) -> Frame:

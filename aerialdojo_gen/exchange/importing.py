@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
+
+import numpy as np
 
 from aerialdojo_gen.base.errors import ImportRefused, StoreError, UsageError, brief
 from aerialdojo_gen.base.names import unknown
@@ -16,11 +20,103 @@ from aerialdojo_gen.exchange.fields import BadField, Fields
 from aerialdojo_gen.exchange.folder import whole_folder_below, write_json
 from aerialdojo_gen.exchange.frames import FRAMES, Frame, frame_named
 from aerialdojo_gen.exchange.jsonstream import RECORD_LIMIT, records
-from aerialdojo_gen.exchange.report import Report
-from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, Tables
+from aerialdojo_gen.exchange.tables import IMPORTED_OBJECTS, IMPORTED_ROUTES, IMPORTED_TASKS, Tables
 from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_rows
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.store.root import Where, open_root
+
+_MOST_NAMED = 1000
+_FAR_M = 3.0
+
+
+@dataclass
+class Report:
+    """Counts over all files of an import."""
+
+    format: str  # As asked or as the format fixes it
+    frame: str
+    files: list[str] = field(default_factory=list)
+    records: int = 0  # Records read, good and bad
+    bad: list[str] = field(default_factory=list)  # A line a bad record, the first thousand
+    n_bad: int = 0  # All of them
+    bad_fields: Counter[str] = field(default_factory=Counter)  # How many by field
+    unmapped: Counter[str] = field(default_factory=Counter)
+    notes: Counter[str] = field(default_factory=Counter)  # Else worth knowing, and of how many records
+    rows: dict[str, int] = field(default_factory=dict)
+    empty: dict[str, int] = field(default_factory=dict)
+    _errors: array[float] = field(default_factory=lambda: array("d"))
+
+    def refuse(self, label: str, row: int, error: BadField) -> str:
+        """Count a bad record; returns its line."""
+        line = f"{label}: row {row}: {error.field}: {error.why}"
+        self.n_bad += 1
+        self.bad_fields[error.field.split("[")[0]] += 1
+        if len(self.bad) < _MOST_NAMED:
+            self.bad.append(line)
+        return line
+
+    def left(self, names: Iterable[str]) -> None:
+        """Count the fields of a record that found no place."""
+        for name in names:
+            known = name in self.unmapped or len(self.unmapped) < _MOST_NAMED
+            self.unmapped[name if known else "(others)"] += 1
+
+    def replayed(self, error_m: float | None) -> None:
+        """Count a route's replay error."""
+        if error_m is not None:
+            self._errors.append(error_m)
+
+    def replay(self) -> dict[str, Any] | None:
+        """Summarise the replay errors, metres; None where no record has actions and poses."""
+        if not self._errors:
+            return None
+        errors = np.asarray(self._errors)
+        return {
+            "routes": len(errors),
+            "median_m": round(float(np.median(errors)), 6),
+            "max_m": round(float(errors.max()), 6),
+            f"over_{_FAR_M:g}_m": int((errors > _FAR_M).sum()),
+        }
+
+    def document(self) -> dict[str, Any]:
+        """All of it, for ``import.json``."""
+        return {
+            "format": self.format,
+            "frame": self.frame,
+            "files": self.files,
+            "records": self.records,
+            "rows": self.rows,
+            "bad_records": self.n_bad,
+            "bad_fields": dict(sorted(self.bad_fields.items())),
+            "not_mapped": dict(sorted(self.unmapped.items())),
+            "null_columns": dict(sorted(self.empty.items())),
+            "notes": dict(sorted(self.notes.items())),
+            "replay_error": self.replay(),
+        }
+
+    def lines(self) -> list[str]:
+        """All of it, for a person."""
+        made = ", ".join(f"{n:,} {name}" for name, n in sorted(self.rows.items(), reverse=True))
+        lines = [f"{self.format}, frame {self.frame}: {self.records:,} records in {len(self.files)} files; {made}"]
+        if self.n_bad:
+            fields = ", ".join(f"{name} {n:,}" for name, n in self.bad_fields.most_common())
+            lines.append(f"left out: {self.n_bad:,} bad records ({fields}): see bad_records.txt")
+        if self.unmapped:
+            lines.append("not mapped: " + ", ".join(f"{name} {n:,}" for name, n in sorted(self.unmapped.items())))
+        for table, rows in sorted(self.rows.items(), reverse=True):
+            names = [
+                c.split(".")[1] for c, n in sorted(self.empty.items()) if c.startswith(f"{table}.") and n == rows
+            ]
+            if names:
+                lines.append(f"always null in {table}: {', '.join(names)}")
+        lines += [f"{n:,} x {note}" for note, n in sorted(self.notes.items())]
+        if (replay := self.replay()) is not None:
+            lines.append(
+                f"replay_error_m over {replay['routes']:,} routes: median {replay['median_m']:g}, "
+                f"largest {replay['max_m']:g}, over {_FAR_M:g} m {replay[f'over_{_FAR_M:g}_m']:,}"
+            )
+        return lines
+
 
 # Numbers of ours, where other objects of the scene have the file's: out of their way.
 _OURS_FROM = 1_000_000
@@ -30,8 +126,7 @@ class Objects:
     """Collects what tasks say about their targets; pictures are read at the end, so memory holds none."""
 
     def __init__(self) -> None:
-        self._numbers: dict[tuple[str, object], int] = {}
-        self._counts: dict[str, int] = {}
+        self._numbers: dict[str, dict[object, int]] = {}
         self._rows: dict[tuple[str, int], dict[str, Any]] = {}
         self._pictures: dict[tuple[str, int], dict[str, Path]] = {}
         self._owners: dict[str, tuple[str, int]] = {}
@@ -42,11 +137,8 @@ class Objects:
             return int(task.known["target_object_id"])
         if task.object_key is None:
             return None
-        key = (task.scene, task.object_key)
-        if key not in self._numbers:
-            self._counts[task.scene] = count = self._counts.get(task.scene, 0) + 1
-            self._numbers[key] = _OURS_FROM + count - 1
-        return self._numbers[key]
+        own = self._numbers.setdefault(task.scene, {})
+        return own.setdefault(task.object_key, _OURS_FROM + len(own))
 
     def add(self, task: Task, number: int) -> list[str | None]:
         """Take in what the task says about its target and its start."""
@@ -86,12 +178,11 @@ class Objects:
         for scene, number in sorted(self._rows):
             empty = dict.fromkeys(IMPORTED_OBJECTS.schema.names)
             row = empty | self._rows[scene, number] | {"scene": scene, "object_id": number}
-            pictures = self._pictures.get((scene, number))
-            if not pictures:
-                tables.object({**row, "reference_image_id": ""})
-            for name in sorted(pictures or ()):
-                picture = (pictures or {})[name]
-                tables.object({**row, "reference_image_id": name, "reference_image": picture.read_bytes()})
+            found = sorted(self._pictures.get((scene, number), {}).items())
+            pictures: list[tuple[str, Path | None]] = [*found] or [("", None)]
+            for name, picture in pictures:
+                data = None if picture is None else picture.read_bytes()
+                tables.add(IMPORTED_OBJECTS, {**row, "reference_image_id": name, "reference_image": data})
 
 
 MARKER = "import.json"
@@ -137,10 +228,7 @@ def import_benchmark(
     name: str | None = None,
     force: bool = False,
 ) -> Report:
-    """Import others' task files as tables.
-
-    Nothing is written where a file is damaged, or bad records are not to be skipped.
-    """
+    """Import others' task files as tables; for damaged files, or bad records that are not skipped, write nothing."""
     options = options or Options()
     if format_name not in FORMATS:
         raise UsageError(unknown("no format", format_name, FORMATS))
@@ -157,7 +245,9 @@ def import_benchmark(
         for task, source in _tasks(sources, chosen, frame, options, report, bad):
             _write(task, source, tables, objects, report)
         if report.n_bad and not options.skip_bad:
-            raise _refusal(report)
+            more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
+            head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written"
+            raise ImportRefused("\n  ".join([f"{head} (--skip-bad keeps the rest):", *report.bad, *more]))
         objects.write(tables)
         tables.close()
         report.rows = dict(tables.written)
@@ -252,14 +342,8 @@ def _write(task: Task, source: dict[str, Any], tables: Tables, objects: Objects,
         task.known["target_object_id"] = number
         pictures = objects.add(task, number)
     for row in task_rows(task, nav_id, source, pictures):
-        tables.task(row)
+        tables.add(IMPORTED_TASKS, row)
     if task.has_route_row:
-        tables.route(route_row(task, nav_id, source))
+        tables.add(IMPORTED_ROUTES, route_row(task, nav_id, source))
         if task.route is not None:
             report.replayed(task.route.replay_error_m)
-
-
-def _refusal(report: Report) -> ImportRefused:
-    more = [f"and {report.n_bad - len(report.bad):,} more"] if report.n_bad > len(report.bad) else []
-    head = f"{report.n_bad:,} of {report.records:,} records are bad, nothing is written (--skip-bad keeps the rest):"
-    return ImportRefused("\n  ".join([head, *report.bad, *more]))

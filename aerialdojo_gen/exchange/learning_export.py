@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +19,13 @@ from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
-from aerialdojo_gen.exchange.folder import PartialExport, check_target, whole_folder, whole_part, write_json
+from aerialdojo_gen.exchange.folder import PartialExport, check_target, part_folder, whole_folder, write_json
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, plan_parts
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import atomic_folder
 from aerialdojo_gen.store.files import size_of
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
@@ -191,7 +193,7 @@ class _Job:
 
 
 def _write(job: _Job) -> int:
-    with whole_part(job.unfinished, job.part.number) as folder:
+    with atomic_folder(part_folder(job.unfinished, job.part.number), job.unfinished) as folder:
         WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.options, folder)
     return job.part.frames
 
@@ -204,7 +206,7 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
         "format": format_name,
         "version": __version__,
         "code": code_of(f"aerialdojo_gen.exchange.{format_name}_writer").digest,
-        "wanted": _plain(dataclasses.asdict(options)),
+        "wanted": _wanted(options),
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
@@ -212,10 +214,8 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
     }
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    return [_plain(inner) for inner in value] if isinstance(value, list | tuple) else value
+def _wanted(options: ExportOptions) -> Any:
+    return json.loads(json.dumps(dataclasses.asdict(options)))
 
 
 def _recordings(root: DataRoot, scene: str) -> list[str]:
@@ -233,7 +233,7 @@ def _marker(
         "frame": FRAME,
         "scenes": sorted({part.scene for part in parts}),
         "counts": counts,
-        "wanted": _plain(dataclasses.asdict(options)),
+        "wanted": _wanted(options),
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
         "lost": LOST,
     }

@@ -13,8 +13,7 @@ import numpy as np
 
 from aerialdojo_gen.exchange.actions import Move, move, replay, replay_error_m
 from aerialdojo_gen.exchange.fields import BadField, Fields, Floats, rows_of, shown
-from aerialdojo_gen.exchange.folder import check_picture, inside
-from aerialdojo_gen.exchange.task import Context, Instance, Route, Task
+from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, picture_at
 
 AERIALVLN_MOVES = {
     0: move("stop"), 1: move("forward 5 m", forward=5), 2: move("turn left 15°", turn_deg=15),
@@ -41,11 +40,11 @@ def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
     if len(done) != len(poses) - 1:
         context.notes["not one action a pose: action is null, source_action has them"] += 1
         return Route(poses, None, names, error)
-    ours = [m.ours for m in done]
-    if any(action is None for action in ours):
+    ours = [m.ours for m in done if m.ours is not None]
+    if len(ours) < len(done):
         context.notes["has actions that are none of ours: action is null, source_action has them"] += 1
         return Route(poses, None, names, error)
-    return Route(poses, [a for a in ours if a is not None] + [0], names, error)
+    return Route(poses, [*ours, 0], names, error)
 
 
 def read_aerialvln(record: Fields, context: Context) -> Task:
@@ -136,11 +135,7 @@ def read_cityavos(record: Fields, context: Context) -> Task:
     instances = [Instance("semantic", text)]
     if context.pictures is not None:
         name = record.text("target_image_path", empty=False)
-        try:
-            picture = check_picture(inside(context.pictures, name))
-        except ValueError as error:
-            raise BadField("target_image_path", str(error)) from None
-        instances.append(Instance("image", picture=picture))
+        instances.append(Instance("image", picture=picture_at(context.pictures, name, "target_image_path")))
     return Task(
         source_id=record.name("mission_id"),
         scene=record.name("scene_id"),

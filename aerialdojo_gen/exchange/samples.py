@@ -9,14 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
-from aerialdojo_gen.learning.trajectories import SOURCES
+from aerialdojo_gen.learning.trajectories import SOURCES, recorded_alone
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
@@ -109,7 +108,7 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
         for scene in chosen.scenes:
             mesh_of(root, scene)  # a scene without a mesh is named before the first picture
     else:
-        chosen = _recorded(chosen, options)
+        chosen = recorded_alone(chosen, options.sensors, "--source render")
     texts = [IMAGE_TASK if modalities else goal_text(*said) for said in zip(
         *(chosen.goal_columns[name] for name in ("target_name", "landmark", "direction", "description")), strict=True
     )]  # fmt: skip
@@ -142,17 +141,6 @@ def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptio
         nav_id for rows in by_scene.values() for nav_id in choose_trajectories(rows, options.limit, options.seed)
     }
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
-
-
-def _recorded(index: Index, options: ExportOptions) -> Index:
-    recorded = RecordedFrames(index, options.sensors, RenderedFrames(index, options.sensors, options.renderer))
-    has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
-    if not len(has):
-        raise UsageError(
-            f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
-            f"{command('render')}, or choose --source render"
-        )
-    return index.take(has)
 
 
 def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
@@ -188,10 +176,7 @@ class SampleFrames:
             yield begin, self._source.frames(np.full(len(steps), k), steps)
 
     def goal(self, k: int) -> NDArray[np.uint8]:
-        """Return the goal's picture of trajectory k: (H, W, 3) uint8, as wide and high as the views'.
-
-        A trajectory without an image instance has a black one.
-        """
+        """Return trajectory k's goal picture, (H, W, 3) uint8, as large as the views'; black where there is none."""
         s = self._sensors
         named = self._part.index.goal_columns["reference_image_id"][k]
         if named is None:

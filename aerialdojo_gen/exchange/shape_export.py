@@ -7,19 +7,100 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 import numpy as np
+from numpy.typing import NDArray
 
+from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.exchange.folder import whole_folder, write_json
-from aerialdojo_gen.exchange.point_cloud import ply_bytes, sample_surface
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.occupancy import Occupancy
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
+
+# About a gigabyte.
+MOST_POINTS = 50_000_000
+_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+POINT = np.dtype(
+    [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("instance", "<i4")]
+)
+_PLY = {"<f4": "float", "|u1": "uchar", "<i4": "int"}
+
+
+def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
+    """Draw `POINT`s (world metres, sRGB) from all surfaces but the backdrop, each instance by a stream of its own."""
+    expected = points_per_m2 * float(_areas(*soup(scene.instances)).sum()) if scene.instances else 0.0
+    if expected > MOST_POINTS:
+        raise UsageError(
+            f"{scene.name}: {expected:,.0f} points are more than {MOST_POINTS:,}: choose a smaller --points-per-m2"
+        )
+    parts = [_sample(scene, k, points_per_m2) for k in range(len(scene.instances))]
+    return np.concatenate([np.empty(0, POINT), *parts])
+
+
+def ply_bytes(points: NDArray[np.void], comment: str) -> bytes:
+    """Encode points, a structured array, as binary little-endian PLY."""
+    fields = [f"property {_PLY[points.dtype[name].str]} {name}" for name in points.dtype.names or ()]
+    head = ["ply", "format binary_little_endian 1.0", f"comment {comment}", f"element vertex {len(points)}", *fields]
+    return "\n".join([*head, "end_header\n"]).encode() + points.tobytes()
+
+
+def _areas(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0)
+
+
+def _sample(scene: Scene, number: int, points_per_m2: float) -> NDArray[np.void]:
+    instance: Instance = scene.instances[number]
+    draw = rng.generator(0, "point cloud", scene.name, instance.node)
+    ends = np.cumsum(_areas(instance.vertices, instance.faces))
+    # What is left of a point is one by chance: small things are not without points on the average.
+    n = int(ends[-1] * points_per_m2 + draw.random())
+    points = np.zeros(n, POINT)
+    points["instance"] = number + 1
+    # A point in every n-th of the area, and the golden ratio across it: more even than chance.
+    at = (np.arange(n) + draw.random(n)) * (ends[-1] / max(n, 1))
+    face = np.minimum(np.searchsorted(ends, at, side="right"), len(ends) - 1)
+    begins = np.concatenate([[0.0], ends[:-1]])[face]
+    along = np.sqrt(np.clip((at - begins) / (ends[face] - begins), 0.0, 1.0))
+    across = (np.arange(n) * _GOLDEN + draw.random()) % 1.0
+    weights = np.stack([1.0 - along, along * (1.0 - across), along * across], axis=1)
+    place = np.einsum("nk,nka->na", weights, instance.vertices[instance.faces[face]])
+    for axis, name in enumerate("xyz"):
+        points[name] = place[:, axis]
+    first = 0
+    for part in instance.parts:
+        rows = np.flatnonzero((face >= first) & (face < first + len(part.faces)))
+        colours = _colours(part, scene.materials[part.material], face[rows] - first, weights[rows])
+        for channel, name in enumerate(("red", "green", "blue")):
+            points[name][rows] = colours[:, channel]
+        first += len(part.faces)
+    return points
+
+
+def _colours(
+    part: Part, material: Material, face: NDArray[np.int64], weights: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """Colours (n, 3) uint8, sRGB, at points of a part's faces."""
+    plain = np.broadcast_to(np.array(material.colour, np.uint8), (len(face), 3))
+    if material.texture is None:
+        if part.colours is None:
+            return plain
+        mixed = np.einsum("nk,nkc->nc", weights, part.colours[part.faces[face]].astype(np.float64))
+        return np.asarray(np.rint(mixed).astype(np.uint8))
+    height, width = material.texture.shape[:2]
+    u, v = np.einsum("nk,nka->an", weights, part.uv[part.faces[face]].astype(np.float64))
+    # A texture repeats; its first row is the top.
+    column = np.floor(u % 1.0 * width).astype(np.int64) % width
+    row = height - 1 - np.floor(v % 1.0 * height).astype(np.int64) % height
+    found = material.texture[row, column]
+    return found if material.mask is None else np.where(material.mask[row, column, None], found, plain)
+
 
 MARKER = "export.json"
 SHAPES = ("pointcloud", "occupancy")
@@ -40,11 +121,7 @@ def export_shapes(
     force: bool = False,
     reporter: Reporter | None = None,
 ) -> dict[str, int]:
-    """Write a point cloud or an occupancy grid of each scene whose mesh is there; no release is needed.
-
-    A folder ``SCENE.ply`` and ``SCENE.nodes.json``, or ``SCENE.npz``, and ``export.json``: whole or not at all.
-    Returns the numbers of scenes and points, or of scenes, voxels and occupied ones.
-    """
+    """Write a point cloud or an occupancy grid of each scene with a mesh; no release is needed."""
     if format_name not in SHAPES:
         raise UsageError(unknown("no format", format_name, SHAPES))
     if not points_per_m2 > 0.0 or not np.isfinite(points_per_m2):

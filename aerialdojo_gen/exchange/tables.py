@@ -73,19 +73,14 @@ class Tables:
         self.written: Counter[str] = Counter()
         self.nulls: Counter[str] = Counter()
 
-    def task(self, row: dict[str, Any]) -> None:
-        """Add a row of `IMPORTED_TASKS`."""
-        self._add(IMPORTED_TASKS, row, 1, _ROWS_A_PART)
-
-    def route(self, row: dict[str, Any]) -> None:
-        """Add a row of `IMPORTED_ROUTES`."""
-        self._add(IMPORTED_ROUTES, row, len(row["x_m"] or "."), _POSES_A_PART)
-
-    def object(self, row: dict[str, Any]) -> None:
-        """Add a row of `IMPORTED_OBJECTS`, its picture included; rows come in the order of the key."""
-        self._add(IMPORTED_OBJECTS, row, len(row["reference_image"] or b"") + 1000, _PICTURE_BYTES_A_PART)
-
-    def _add(self, spec: TableSpec, row: dict[str, Any], weight: int, most: int) -> None:
+    def add(self, spec: TableSpec, row: dict[str, Any]) -> None:
+        """Add a row of one of the three tables; those of objects come in the order of the key."""
+        if spec is IMPORTED_ROUTES:
+            weight, most = len(row["x_m"] or "."), _POSES_A_PART
+        elif spec is IMPORTED_OBJECTS:
+            weight, most = len(row["reference_image"] or b"") + 1000, _PICTURE_BYTES_A_PART
+        else:
+            weight, most = 1, _ROWS_A_PART
         self._rows.setdefault(spec.name, []).append(row)
         self._weight[spec.name] += weight
         if self._weight[spec.name] >= most:

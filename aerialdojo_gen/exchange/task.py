@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.shared import TaskConfig
+from aerialdojo_gen.exchange.fields import BadField
+from aerialdojo_gen.exchange.folder import check_picture, inside
 from aerialdojo_gen.exchange.frames import Frame
 from aerialdojo_gen.exchange.tables import IMPORTED_ROUTES
 from aerialdojo_gen.geometry.frames import wrap_turned_rad
@@ -81,6 +83,14 @@ class Context:
 
 _KNOWN = ("family", "scene_type", "partition", "subset", "target_name", "landmark", "direction")
 _BUDGETS = {name: getattr(TaskConfig(), name).action_budget for name in ("base", "standard", "long_horizon")}
+
+
+def picture_at(folder: Path, name: str, field: str) -> Path:
+    """Find a picture that a field names below a folder."""
+    try:
+        return check_picture(inside(folder, name))
+    except ValueError as error:
+        raise BadField(field, str(error)) from None
 
 
 def digest(*parts: str) -> str:

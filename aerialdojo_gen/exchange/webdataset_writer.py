@@ -47,18 +47,14 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
             told = _to_json(labels, part, k, options)
             goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
             for begin, frames in sample_frames.frames(k):
-                seen = frames.rgb if frames.rgb is not None else frames.depth_m
-                assert seen is not None
-                for i in range(len(seen)):
+                for i in range(len(next(iter(frames.values())))):
                     step = told[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
-                    for v, view in enumerate(options.sensors.views):
-                        if frames.rgb is not None:
-                            _add(tar, f"{key}.{view}.{_kind(options)}", _picture(frames.rgb[i, v], options))
-                    if frames.depth_m is not None:
-                        stored = {
-                            view: to_stored(frames.depth_m[i, v]) for v, view in enumerate(options.sensors.views)
-                        }
+                    seen = {name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()}
+                    for view, rgb in seen.get("rgb", {}).items():
+                        _add(tar, f"{key}.{view}.{_kind(options)}", _picture(rgb, options))
+                    if "depth_m" in seen:
+                        stored = {view: to_stored(depth_m) for view, depth_m in seen["depth_m"].items()}
                         _add(tar, f"{key}.depth.npz", _arrays(stored))
                     if goal is not None:
                         _add(tar, f"{key}.goal.{_kind(options)}", goal)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError, first_line, lacks
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.learning.encoding import actions_fingerprint
@@ -50,7 +50,7 @@ def write(path: Path, tensors: Mapping[str, Any], about: PolicyInfo, state: Mapp
     named = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     text = {"format": _FORMAT, "about": about.to_json(), "state": json.dumps(dict(state or {}))}
     with atomic_file(path.parent, path.name) as temporary:
-        _safetensors()[1].save_file(named, str(temporary), metadata=text)
+        _safetensors().torch.save_file(named, str(temporary), metadata=text)
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
@@ -59,7 +59,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
     if not Path(path).is_file():
         raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")
     try:
-        with _safetensors()[0].safe_open(str(path), framework="pt") as file:
+        with _safetensors().safe_open(str(path), framework="pt") as file:
             told = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
         if told.get("format") != _FORMAT:
@@ -72,8 +72,6 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
         named, scenes = (tuple(map(str, given.get(key, ()))) for key in ("named", "scenes"))
         init = str(given.get("init", ""))
         about = PolicyInfo(given["shape"], words, sensors, given["release"], given["actions"], named, scenes, init)
-    except AerialDojoError as error:
-        raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
     except Exception as error:  # safetensors has an error of its own, and a header may say anything
         raise StoreError(f"{path} holds no policy: {first_line(error)}") from None
     if about.actions != actions_fingerprint():
@@ -84,8 +82,9 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
     return tensors, about, state
 
 
-def _safetensors() -> tuple[Any, Any]:
+def _safetensors() -> Any:
     try:
-        return importlib.import_module("safetensors"), importlib.import_module("safetensors.torch")
+        importlib.import_module("safetensors.torch")
+        return importlib.import_module("safetensors")
     except ImportError:
         raise MissingPackage(lacks("a policy", "safetensors", "train")) from None

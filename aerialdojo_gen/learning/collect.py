@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,10 +38,9 @@ def parts_of(
     """Split trajectories into parts; a part's folder is named by a digest of all that its content depends on."""
     # References do not depend on the network that flies later.
     modules = ["rendering.gl", "learning.parts", *(["learning.flights"] if dagger_round is not None else [])]
-    code = [code_of(f"aerialdojo_gen.{name}").digest for name in modules]
-    facts = [sensors.views, sensors.width, sensors.height, sensors.fov_deg, sensors.max_depth_m, size_px,
-             renderer, code, None if dagger_round is None else
-             [dagger_round.sha256, dagger_round.seed, dagger_round.round, dagger_round.teacher_share]]  # fmt: skip
+    code, s, flown = [code_of(f"aerialdojo_gen.{name}").digest for name in modules], sensors, dagger_round
+    facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, size_px, renderer, code,
+             flown and [flown.sha256, flown.seed, flown.round, flown.teacher_share]]  # fmt: skip
     parts = []
     for number, scene in enumerate(index.scenes):
         rows = np.flatnonzero(index.scene == number)
@@ -56,8 +56,7 @@ def parts_of(
             shares = np.array_split(rows, -(-len(rows) // _PART))
         for own in shares:
             piece = index.take(own)
-            text = json.dumps([facts, piece.digest, mesh_of(data, scene)[1], shown], sort_keys=True)
-            name = f"{scene}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+            name = _part_name(scene, [facts, piece.digest, mesh_of(data, scene)[1], shown])
             parts.append(Part(
                 data, *selection, scene, tuple(piece.nav_id), sensors, size_px, renderer, folder / name, dagger_round,
             ))  # fmt: skip
@@ -76,12 +75,15 @@ def view_parts(
             own = Exploration(min(_LOOKS, looks - begin), seed, number, target_split)
             facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
                      mesh_of(data, scene)[1], asdict(own)]  # fmt: skip
-            name = f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
             parts.append(replace(
-                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / name, dagger_round=None,
-                exploration=own,
+                like, splits=(split,), settings=(), scene=scene, nav_ids=(), folder=folder / _part_name(scene, facts),
+                dagger_round=None, exploration=own,
             ))  # fmt: skip
     return parts
+
+
+def _part_name(scene: str, facts: list[Any]) -> str:
+    return f"{scene}-{hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]}"
 
 
 def collect(parts: Sequence[Part], executor: Executor, reporter: Reporter, what: str) -> list[Steps]:

@@ -21,10 +21,7 @@ _SAME_M = 0.25
 
 
 def packed(rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.uint8]:
-    """Join colours (..., H, W, 3) and depth in metres to (..., H, W, 4) uint8.
-
-    Depth as 255 times the root of depth over range.
-    """
+    """Join colours (..., H, W, 3) and depth, as 255 times the root of depth over range, to (..., H, W, 4) uint8."""
     near = np.sqrt(np.clip(depth_m / np.float32(sensors.max_depth_m), 0.0, 1.0), dtype=np.float32)
     return np.concatenate([rgb, np.rint(near * 255.0).astype(np.uint8)[..., None]], axis=-1)
 
@@ -64,10 +61,7 @@ class DeadReckoning:
 
     @property
     def back(self) -> NDArray[np.bool_]:
-        """Actions that no route has here: to a pose where the body has been, and turns beyond half a circle in place.
-
-        (16,) bool; Stop is none of them.
-        """
+        """Actions, (16,) bool, that no route has here: to earlier poses, or turns beyond half a circle in place."""
         turned = self._turns >= N_HEADINGS // 2
         found = [(turned and bool(TURNS[a])) or _pose(*self._after(a)) in self._been for a in range(N_ACTIONS)]
         found[STOP] = False

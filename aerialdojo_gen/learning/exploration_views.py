@@ -1,7 +1,4 @@
-"""Extra views of a scene: images near its references in random directions, with the objects that they show.
-
-Localization and the patch classifier are trained on them.
-"""
+"""Extra views of a scene, for localization and the patch classifier: near its references, with what they show."""
 
 from __future__ import annotations
 
@@ -10,16 +7,13 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.config.shared import Embodiment
-from aerialdojo_gen.benchmark.observations import renderer_for
+from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.benchmark.viewpoints import nodes_of
-from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches, packed
+from aerialdojo_gen.learning.encoding import PATCH_PX, in_patches
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.parts import Exploration, Part, blocked_at
-from aerialdojo_gen.learning.pictures import clip_depth
+from aerialdojo_gen.learning.parts import Exploration, Part, blocked_at, pictures
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
-from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
@@ -33,26 +27,27 @@ _MIN_PX = PATCH_PX**2 // 4
 
 
 def collect_views(part: Part, exploration: Exploration) -> Steps:
-    """Render extra views of a part's scene: episodes of one step each, without goals and labels.
-
-    Positions are those of references of all settings, moved by up to 3 m in a random direction until an obstacle:
-    what a policy sees that has left the route. Only targets of the chosen side of the split are named.
-    """
+    """Render extra views of a part's scene: episodes of one step each, without goals and labels."""
     index = read_index(part.data, Selection(part.splits, (), (), (part.scene,)), exploration.target_split)
     draw = rng.generator(exploration.seed, "survey", part.scene, exploration.number)
     at = np.sort(draw.integers(int(index.steps.sum()), size=exploration.looks))
+    # From references of all settings, moved until an obstacle: what a policy sees that has left the route.
     trajectory = np.searchsorted(index.first, at, side="right") - 1
     poses = np.empty((exploration.looks, 4))
     for k in np.unique(trajectory):
         rows = trajectory == k
         poses[rows] = index.poses_of(int(k))[at[rows] - index.first[k]]
     poses[:, 3] = draw.uniform(-np.pi, np.pi, exploration.looks)
-    poses[:, :3] = _offset_places(
-        flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses[:, :3], draw
-    )
-    scene = open_scene(*mesh_of(part.data, part.scene), SEVERAL).scene
+    mesh = mesh_of(part.data, part.scene)
+    poses[:, :3] = _offset_places(flight_space(*mesh, Embodiment().radius_m), poses[:, :3], draw)
+    scene = open_scene(*mesh, SEVERAL).scene
     names, number = _named(part, index, scene)
-    frames, shown = _render_patches(part, scene, poses, number)
+    shown = np.empty((len(poses), len(part.sensors.views) * (part.size_px // PATCH_PX) ** 2), np.int16)
+
+    def label(first: int, instance: NDArray[np.int32]) -> None:
+        shown[first : first + len(instance)] = [patch_labels(one) for one in number[instance]]
+
+    frames = pictures(part, poses, label)
     n, none = exploration.looks, np.zeros(exploration.looks, np.int64)
     return Steps(
         frames=frames, first=np.arange(n + 1), label=none,
@@ -89,29 +84,8 @@ def _named(part: Part, index: Index, scene: Scene) -> tuple[list[str], NDArray[n
     return [names[object_id] for object_id in known], number
 
 
-def _render_patches(
-    part: Part, scene: Scene, poses: NDArray[np.float64], number: NDArray[np.int16]
-) -> tuple[NDArray[np.uint8], NDArray[np.int16]]:
-    """Render poses, (n, views, H, W, 4), and label each patch with its object, (n, patches)."""
-    s = part.sensors
-    renderer = renderer_for(scene, part.renderer)
-    frames = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
-    shown = np.empty((len(poses), len(s.views) * (part.size_px // PATCH_PX) ** 2), np.int16)
-    # In chunks, to bound memory.
-    for begin in range(0, len(poses), 512):
-        own = poses[begin : begin + 512]
-        instance = np.empty((len(own), len(s.views), part.size_px, part.size_px), np.int32)
-        rgb, depth_m = draw_bodies(renderer, s.camera, own, s.views, instance)
-        frames[begin : begin + 512] = packed(rgb, clip_depth(depth_m, s), s)
-        shown[begin : begin + 512] = [patch_labels(one) for one in number[instance]]
-    return frames, shown
-
-
 def patch_labels(number: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Label each patch with the object that most of its pixels show: (views, H, W) to (patches,).
-
-    `UNNAMED` where that is fewer than a quarter of them, or an object that must not be named.
-    """
+    """Label patches with the object that most of a quarter of their pixels show: (views, H, W) to (patches,)."""
     pixels = in_patches(number)
     out = np.full(len(pixels), NOTHING, np.int16)
     some = np.flatnonzero((pixels != NOTHING).any(axis=1))

@@ -38,11 +38,7 @@ _FIELDS_MB = 400.0, 0.0
 
 
 class Teacher:
-    """Says what the reference would do at a pose.
-
-    The cost-to-go of a goal is made once; from every pose the planner's own search follows it, so that a label is the
-    first action of the route that the release would have from there.
-    """
+    """Says what the reference would do at a pose: the first action of the route that a release has from there."""
 
     def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = RADIUS_M) -> None:
         # Who has strayed may be nearer than any task begins, or straight before the goal.

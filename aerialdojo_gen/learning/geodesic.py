@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +22,7 @@ Floats = NDArray[np.float64]
 
 
 def blocked_actions(space: FlightSpace, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-    """For poses (n, 4) and the 16 actions.
-
-    Whether each collides or is refused, (n, 16), and where it leads, (n, 16, 3).
-    """
+    """For poses (n, 4): whether actions collide or are refused, (n, 16) each, and where they lead, (n, 16, 3)."""
     p = np.asarray(poses, np.float64).reshape(-1, 4)
     c, s = np.cos(p[:, 3])[:, None], np.sin(p[:, 3])[:, None]
     ahead, left, up = DISPLACEMENTS[:N_ACTIONS].T
@@ -54,38 +51,25 @@ class Geodesic:
         self._space, self._grid = space, space.grid
         self._plain = np.zeros(self._grid.moves.shape, np.float32)
         self._order = columns_by_distance(math.ceil((_FARTHEST_M + 2 * _REACH_M) / self._grid.arrays.cell))
-        self._fields: OrderedDict[tuple[float, ...], NDArray[np.float32]] = OrderedDict()
+        self._field = lru_cache(maxsize=_KEPT)(self._make_field)
 
     def distances_m(self, goal: ArrayLike, points: ArrayLike) -> Floats:
-        """Shortest way lengths (n,), metres in the action metric, from points (n.
-
-        3) to a goal over a half-metre grid; inf for none.
-        """
+        """Shortest way lengths (n,), metres in the action metric, from points (n, 3) to a goal; inf for none."""
         g, p = np.asarray(goal, np.float64), np.asarray(points, np.float64).reshape(-1, 3)
-        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(g)))
+        found = np.asarray(costs_at(np.ascontiguousarray(p), self._grid.arrays, self._field(*g.tolist())))
         return np.maximum(found, np.linalg.norm(p - g, axis=1))
 
     def actions(self, goal: ArrayLike, poses: ArrayLike) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-        """For poses (n, 4) and the 16 actions: whether each collides or is refused, and the cost-to-go in metres.
-
-        (n, 16) each.
-        """
+        """For poses (n, 4), (n, 16) each: whether actions collide or are refused, and the cost-to-go in metres."""
         collides, refused, ends = blocked_actions(self._space, poses)
         cost = self.distances_m(goal, ends.reshape(-1, 3)).reshape(-1, N_ACTIONS)
         return collides, refused, np.where(collides, np.inf, cost)
 
-    def _field(self, goal: Floats) -> NDArray[np.float32]:
-        key = tuple(goal.tolist())
-        if key in self._fields:
-            self._fields.move_to_end(key)
-            return self._fields[key]
+    def _make_field(self, *goal: float) -> NDArray[np.float32]:
         grid = self._grid
         cost = np.full(grid.moves.shape, np.inf, np.float32)
         seeds = seed_goal(*goal, 0.0, _REACH_M, grid.radius_m, grid.arrays, grid.moves, cost, NO_PREFERENCE)
         expand_cost(seeds, self._order, _FARTHEST_M, grid.arrays.cell, grid.moves, cost, self._plain)
-        while len(self._fields) >= _KEPT:
-            self._fields.popitem(last=False)
-        self._fields[key] = cost
         return cost
 
 

@@ -1,4 +1,4 @@
-"""Behaviour cloning: a network learns to do at each step of an episode what the teacher does there."""
+"""Behaviour cloning: a network learns to name what it sees, then to do at each step what the teacher does there."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
+from aerialdojo_gen.learning.exploration_views import NOTHING
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.localization import UNIT_M, LocalizationOutput, offset_loss, pose_loss
 from aerialdojo_gen.learning.network import Network, PolicyOutput
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool
+from aerialdojo_gen.learning.words import word_targets
 from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
@@ -39,10 +41,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: mean loss and accuracy of the steps trained on, and what `Learner.assess` finds.
-
-    The loss and this accuracy are those of choices that are told where the goal is.
-    """
+    """What came of an epoch: loss and accuracy of choices told where the goal is, and what `Learner.assess` finds."""
 
     phase: int
     number: int
@@ -74,10 +73,7 @@ class TrainingLog:
 def epoch_batches(
     lengths: NDArray[np.int64], most_steps: int, seed: int, phase: int, epoch: int
 ) -> list[NDArray[np.int64]]:
-    """Batches of episodes of like lengths, shuffled by (seed, phase, epoch).
-
-    At most `most_steps` steps each, padding included.
-    """
+    """Batches of episodes of like lengths, shuffled, of at most `most_steps` steps each, padding included."""
     draw = rng.generator(seed, "learning batches", phase, epoch)
     order = draw.permutation(np.flatnonzero(lengths > 0))
     size = max(1, int(_CHUNK * most_steps / max(float(lengths.mean()), 1.0)))
@@ -179,10 +175,7 @@ class Learner:
         log: TrainingLog, *, step: Callable[[NDArray[np.int64], float], tuple[float, float, int]],
         assess: Callable[[], Assessment | None] = lambda: None,
     ) -> None:  # fmt: skip
-        """Go through epochs of so many batches each, from where the progress is.
-
-        `step` learns from a batch at a rate, and returns its mean loss, how many were right, and of how many.
-        """
+        """Go on through epochs; `step` learns a batch, and returns its mean loss, how many are right, of how many."""
         p = self.progress
         total, done = sum(counts), sum(counts[: p.epoch]) + p.batch
         started, first = time.monotonic(), done
@@ -261,11 +254,8 @@ class Learner:
         return out
 
     def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[PolicyOutput, LocalizationOutput]:
-        """Guess where goals are, and choose by that guess, or by where they are where the choice is told.
-
-        A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them,
-        and who searches, or has a better map later, has a choice that does not follow.
-        """
+        """Guess where goals are, and choose by that guess, or by where they are where the choice is told."""
+        # A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them.
         network = self.network
         with self.autocast():
             goal = network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
@@ -311,3 +301,56 @@ class Learner:
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())
+
+
+# Of patches that show nothing with a name, as many: they are eight tenths of all, and much alike.
+_EMPTY = 0.08
+
+
+def train_patch_classifier(learner: Learner, exploration: Pool, words: tuple[str, ...], log: TrainingLog) -> None:
+    """Go through the epochs of a network's sight, from where the progress is."""
+    torch, recipe, progress = learner.torch, learner.recipe, learner.progress
+    learner.share_cores()
+    chances = _word_targets(exploration.names, words)
+    size = recipe.sight.batch_looks
+
+    def batches(epoch: int) -> list[NDArray[np.int64]]:
+        order = rng.generator(recipe.seed, "sight looks", epoch).permutation(exploration.n_steps)
+        return [np.sort(order[begin : begin + size]) for begin in range(0, len(order), size)]
+
+    def step(rows: NDArray[np.int64], rate: float) -> tuple[float, float, int]:
+        draw = rng.generator(recipe.seed, "sight patches", progress.epoch, progress.batch)
+        keep, wanted = _select_patches(exploration.shown(rows), chances, draw)
+        if not len(keep):
+            return 0.0, 0.0, 0
+        pictures = torch.from_numpy(exploration.frames(rows)).to(learner.device)
+        target = torch.from_numpy(wanted).to(learner.device)
+        with learner.autocast():
+            kept = torch.from_numpy(keep).to(learner.device)
+            logits = learner.network.sight(pictures.flatten(0, 1), kept).float()
+        cost = torch.nn.functional.cross_entropy(logits, target)
+        learner.update(cost, rate)
+        right = (target.gather(1, logits.argmax(1, keepdim=True)) > 0).sum()
+        return float(cost.detach()), float(right), len(keep)
+
+    count = -(-exploration.n_steps // size)
+    learner.run_epochs([count] * recipe.sight.epochs, batches, recipe.sight.learning_rate, log, step=step)
+
+
+def _word_targets(names: list[str], words: tuple[str, ...]) -> NDArray[np.float32]:
+    """Chances of words by object, (objects + 1, words + 1); the last row and the last word are of no object."""
+    out = np.zeros((len(names) + 1, len(words) + 1), np.float32)
+    out[:-1, :-1] = word_targets(names, words)
+    out[-1, -1] = 1.0
+    return out
+
+
+def _select_patches(
+    shown: NDArray[np.int64], chances: NDArray[np.float32], draw: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Choose patches to learn from: their numbers, and the chances of their words."""
+    flat = shown.ravel()
+    # An object of whose name no word is known tells nothing.
+    told = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
+    keep = np.flatnonzero(told | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
+    return keep, chances[np.where(flat[keep] == NOTHING, len(chances) - 1, flat[keep])]

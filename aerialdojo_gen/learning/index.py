@@ -18,8 +18,7 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.paraphrases import check_paraphrase, texts_of_tasks
-from aerialdojo_gen.benchmark.tasks import Selection, select
+from aerialdojo_gen.benchmark.tasks import Selection, check_paraphrase, select, texts_of_tasks
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.store import shards as store
@@ -108,10 +107,7 @@ def read_index(
     root: DataRoot, selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
     paraphrase: str = "task",
 ) -> Index:  # fmt: skip
-    """Read the trajectories of a selection: its references, or the successful flights of runs on its tasks.
-
-    With the `paraphrase` ``"random"`` a goal's description is one of its target's, drawn by the selection's seed.
-    """
+    """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed."""
     if target_split is not None and target_split not in _SIDES:
         raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
     chosen = select(root, selection)
@@ -136,11 +132,7 @@ def read_indices(
     roots: Sequence[DataRoot], selection: Selection, target_split: str | None = None, runs: Sequence[str] = (),
     paraphrase: str = "task",
 ) -> Index:  # fmt: skip
-    """Read the trajectories of a selection in several data directories, as `read_index` those of one.
-
-    A directory in which no task fits is left out, unless none fits in any. UsageError where two have a scene of the
-    same name.
-    """
+    """Read the trajectories of several data directories with different scenes, of each the tasks that fit, if any."""
     parts: list[Index] = []
     refused: list[UsageError] = []
     for root in roots:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,6 @@ from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreErr
 from aerialdojo_gen.benchmark.observations import used_opengl
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
-
-_STATE = {"seed", "epoch", "batch", "batch_size", "order", "fingerprint"}
 
 
 class WorkerDied(AerialDojoError):  # noqa: N818 - it says what happened
@@ -77,7 +75,8 @@ class Loader:
         self._torch = torch_package("a loader with workers or tensors") if workers or tensors else None
         # Refuses what makes no sense.
         self._order = data.order(batch_size, seed=seed, **how).how
-        self._sampler = _Sampler()
+        # A DataLoader keeps its sampler: the batches of the epoch under way.
+        self._left: list[list[int]] = []
         self._loading: Any = None
         self.epoch = self.batches_done = 0
 
@@ -116,8 +115,8 @@ class Loader:
             The state is of another data set, seed, size of batches or order.
         """
         own = self.state_dict()
-        if set(state) != _STATE:
-            raise StoreError(f"a loader's state has {', '.join(sorted(_STATE))}, not {', '.join(sorted(state))}")
+        if set(state) != set(own):
+            raise StoreError(f"a loader's state has {', '.join(sorted(own))}, not {', '.join(sorted(state))}")
         for name in ("fingerprint", "seed", "batch_size", "order"):
             if state[name] != own[name]:
                 raise StoreError(
@@ -130,12 +129,12 @@ class Loader:
 
     def _from_workers(self, order: Order) -> Iterator[dict[str, Any]]:
         assert self._torch is not None
-        self._sampler.order = order
+        self._left[:] = order
         if self._loading is None:
             # Kept over the epochs: what a worker has opened stays open.
             self._loading = self._torch.utils.data.DataLoader(
                 _Batches(self._data),
-                sampler=self._sampler,
+                sampler=self._left,
                 batch_size=None,
                 num_workers=self._workers,
                 multiprocessing_context=self._context or ("spawn" if used_opengl() else "fork"),
@@ -155,21 +154,6 @@ class Loader:
                 f"a worker of the loader died ({first_line(error)}): fewer workers or smaller batches take less "
                 "memory; load_state_dict goes on at the batch"
             ) from None
-
-
-class _Sampler:
-    """The order of the epoch under way: a DataLoader keeps its sampler."""
-
-    def __init__(self) -> None:
-        self.order: Sequence[list[int]] | Order = ()
-
-    def __len__(self) -> int:
-        """Return the number of batches that are left."""
-        return len(self.order)
-
-    def __iter__(self) -> Iterator[list[int]]:
-        """Yield their samples."""
-        return iter(self.order)
 
 
 class _Batches:

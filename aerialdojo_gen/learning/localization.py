@@ -77,10 +77,7 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         return place, heading, scene, functional.softplus(trust) + _LEAST
 
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[LocalizationOutput, Any]:
-        """Estimate poses for steps (n, T) of episodes from features and odometry.
-
-        Also the sums (n, sums) after them.
-        """
+        """Estimate poses for steps (n, T) of episodes from features and odometry; also the sums (n, sums) after."""
         steps = seen.shape[1]
         seen_at, facing, scene, trust = self.found(seen)
         # The offset's loss teaches which steps to trust; intervals learn by their own, which is steadier.
@@ -120,11 +117,7 @@ def _rotate_back(vector: Any, by: Any) -> Any:
 
 
 def places(logits: Any) -> tuple[Any, Any]:
-    """Return places that logits tell, and how far they spread: metres, (..., 164) to twice (..., 3).
-
-    A place is the mean about each axis' likeliest part, the spread the root of the mean square distance from it of
-    all chances.
-    """
+    """Return the means about each axis' likeliest part, and the spreads of all chances: (..., 164) to (..., 3), m."""
     out, spread = [], []
     for one, (width, n, low) in zip(logits.split([n for _, n, _ in _AXES], dim=-1), _AXES, strict=True):
         number = torch.arange(n, device=logits.device)
@@ -137,14 +130,12 @@ def places(logits: Any) -> tuple[Any, Any]:
 
 
 def directions(logits: Any) -> Any:
-    """Return the mean directions of sectors: (..., 24) to (..., 2), the shorter the less is known.
-
-    Cosine and sine of the yaw, times the concentration of a von Mises distribution with that mean, at most some 20.
-    """
+    """Return the mean directions of sectors: (..., 24) to (..., 2), the shorter the less is known."""
     yaw = (torch.arange(_HEADINGS, device=logits.device) + 0.5) * _SECTOR_RAD - math.pi
     mean = logits.softmax(dim=-1) @ torch.stack([yaw.cos(), yaw.sin()], dim=-1)
     length = torch.linalg.vector_norm(mean, dim=-1, keepdim=True)
-    # Mardia and Jupp 2000, as Banerjee et al. 2005 simplify it for two dimensions.
+    # The concentration of a von Mises distribution with that mean, at most some 20: Mardia and Jupp 2000, as Banerjee
+    # et al. 2005 simplify it for two dimensions.
     return mean * (2.0 - length.square()) / (1.05 - length.square())
 
 
@@ -157,11 +148,8 @@ def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     away_m = torch.cat([_rotate_back(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
     scene = batch["scene"][:, None].expand(mask.shape)[mask]
     own = pose_loss(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
-    return (
-        functional.smooth_l1_loss(guess.offset[mask], offset)
-        + own
-        + _interval_loss(guess.goal[mask], pose[:, :3] + away_m)
-    )
+    at_goal = _interval_loss(guess.goal[mask], pose[:, :3] + away_m)
+    return functional.smooth_l1_loss(guess.offset[mask], offset) + own + at_goal
 
 
 def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:

@@ -99,10 +99,7 @@ class PolicyOutput(NamedTuple):
     guess: LocalizationOutput  # Where the goal is thought to be, or was said to be
 
     def actions(self, back: Any) -> Any:
-        """Choose the likeliest free action, (n, T); Stop within 2 m of the goal estimate.
-
-        Never a turn that leads back.
-        """
+        """Choose the likeliest free action, (n, T), never a turn that leads back; Stop within 2 m of the goal."""
         free = functional.logsigmoid(-self.blocked.float())
         moving = self.logits.float() + CAUTION * free
         moving[..., STOP] = -torch.inf
@@ -179,10 +176,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
     def forward(
         self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None
     ) -> tuple[PolicyOutput, Any]:
-        """Policy outputs for steps (n, T) of episodes, and the memory (n, sums) after them.
-
-        Odometry in the start's frame.
-        """
+        """Policy outputs for steps (n, T) of episodes, odometry in the start's frame; also the memory (n, sums)."""
         memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
         seen = self.features(pictures, goal, mask)
         guess, memory = self.whereabouts(seen, goal, odometry, memory)
@@ -199,11 +193,9 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
 
     def choose(self, seen: Any, guess: LocalizationOutput) -> PolicyOutput:
-        """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else.
-
-        What the goal is has done its part by then. With its words a choice learns routes of the training's scenes by
-        heart, and beside a map that is still poor it learns not to go by the map.
-        """
+        """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else."""
+        # With the goal's words a choice learns routes of the training's scenes by heart, and beside a map that is
+        # still poor it learns not to go by the map.
         logits = self.choice(torch.cat([seen, bearing(guess).to(seen.dtype)], dim=2))
         return PolicyOutput(logits, self.blocked(seen), guess)
 

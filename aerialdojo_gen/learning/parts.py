@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,8 +97,10 @@ def references(part: Part) -> Steps:
     )  # fmt: skip
 
 
-def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Render poses: (n, views, H, W, 4) uint8."""
+def pictures(
+    part: Part, poses: NDArray[np.float64], on_instances: Callable[[int, NDArray[np.int32]], None] | None = None
+) -> NDArray[np.uint8]:
+    """Render poses, (n, views, H, W, 4) uint8; hands on which instances they show, with the first of these poses."""
     s = part.sensors
     out = np.empty((len(poses), len(s.views), part.size_px, part.size_px, 4), np.uint8)
     if s.blind:
@@ -106,16 +109,19 @@ def pictures(part: Part, poses: NDArray[np.float64]) -> NDArray[np.uint8]:
     renderer = renderer_for(context.scene, part.renderer)
     # In chunks, to bound memory.
     for k in range(0, len(poses), 512):
-        rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views)
-        out[k : k + 512] = packed(rgb, clip_depth(depth_m, s), s)
+        own = out[k : k + 512]
+        instance = None if on_instances is None else np.empty(own.shape[:-1], np.int32)
+        rgb, depth_m = draw_bodies(renderer, s.camera, poses[k : k + 512], s.views, instance)
+        own[:] = packed(rgb, clip_depth(depth_m, s), s)
+        if on_instances is not None and instance is not None:
+            on_instances(k, instance)
     return out
 
 
 def blocked_at(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Blocked actions at poses (n, 4): (n, 16) bool."""
-    collides, refused, _ = blocked_actions(
-        flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m), poses
-    )
+    space = flight_space(*mesh_of(part.data, part.scene), Embodiment().radius_m)
+    collides, refused, _ = blocked_actions(space, poses)
     return collides | refused
 
 

@@ -1,51 +1,216 @@
-"""Where the pictures of a trajectory's steps come from: drawn from the scene's mesh, or read from its recording."""
+"""Where the pictures of a trajectory's steps come from: the mesh, drawn anew, a recording, or what the disk has kept.
+
+A kept file holds each step's pictures compressed on their own, so that one step is read without the others, and a
+checksum with each: a file that is cut off or damaged is drawn again. Nothing is thrown out for something newer: who
+goes through a data set in a new order every epoch would meet just that. What finds no room is drawn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import hashlib
+import json
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import RenderError, StoreError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import renderer_for
+from aerialdojo_gen.benchmark.observations import renderer_for, renderer_name
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.index import Index
+from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.atomic import make_folder
 from aerialdojo_gen.store.root import DataRoot
+
+_MAGIC = b"ADPIX1\n\0"
+# Offset and length of a step's bytes, and their CRC-32.
+_ENTRY = struct.Struct("<QII")
+# How many bytes this process writes before it counts anew what others have written.
+_RECOUNT = 256 << 20
+
+
+@dataclass(frozen=True)
+class CacheOptions:
+    """Where pictures are kept."""
+
+    base: Path  # Pictures that are made in another way have another folder in it
+    most_bytes: int  # How large the folder of one way may grow
+    source: str  # Where pictures come from, and what draws them
+    renderer: str
+
+
+class CachedFrames:
+    """Pictures of a source, kept in a folder."""
+
+    def __init__(
+        self, source: Source, index: Index, sensors: Sensors, store: CacheOptions, meshes: dict[str, str]
+    ) -> None:
+        self._source, self._index, self._sensors = source, index, sensors
+        self._store, self._meshes = store, meshes
+        self._full = False
+        self._used: int | None = None
+        self._since = 0
+
+    def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
+        """Read what is there, draw the rest, and keep what was drawn while there is room; see `Source`."""
+        out = empty_frames(self._sensors, len(steps))
+        missing = []
+        for k in np.unique(trajectories):
+            rows = np.flatnonzero(trajectories == k)
+            if not self._read(int(k), steps[rows], rows, out):
+                missing.append((int(k), rows))
+        for k, rows in missing:
+            if not self._full and self._room():
+                n = int(self._index.steps[k])
+                whole = self._source.frames(np.full(n, k), np.arange(n))
+                self._keep(k, whole)
+                drawn = take(whole, steps[rows])
+            else:
+                drawn = self._source.frames(trajectories[rows], steps[rows])
+            for name, seen in drawn.items():
+                out[name][rows] = seen
+        return out
+
+    @property
+    def _codec(self) -> pa.Codec:
+        # Not kept: it cannot be sent to another process.
+        return pa.Codec("lz4_raw")
+
+    @cached_property
+    def _folder(self) -> Path:
+        # In the process that reads: to find out which renderer works here is to draw.
+        return pictures_folder(self._store, self._sensors)
+
+    def _path(self, k: int) -> Path:
+        index = self._index
+        flown = hashlib.sha256(index.start[k].tobytes() + index.actions_of(k).tobytes()).hexdigest()[:16]
+        mesh = self._meshes[index.scenes[index.scene[k]]][:16]
+        return self._folder / mesh / f"{index.nav_id[k]}-{flown}.pix"
+
+    def _read(self, k: int, steps: NDArray[np.int64], rows: NDArray[np.int64], out: Frames) -> bool:
+        n = int(self._index.steps[k])
+        try:
+            with self._path(k).open("rb") as file:
+                head = file.read(len(_MAGIC) + n * _ENTRY.size)
+                if len(head) != len(_MAGIC) + n * _ENTRY.size or not head.startswith(_MAGIC):
+                    return False
+                for step, row in zip(steps.tolist(), rows.tolist(), strict=True):
+                    at, length, crc = _ENTRY.unpack_from(head, len(_MAGIC) + step * _ENTRY.size)
+                    file.seek(at)
+                    packed = file.read(length)
+                    if len(packed) != length or zlib.crc32(packed) != crc:
+                        return False
+                    self._unpack(packed, row, out)
+        except OSError:
+            return False
+        return True
+
+    def _unpack(self, packed: bytes, row: int, out: Frames) -> None:
+        sizes = {name: seen[row].nbytes for name, seen in out.items()}
+        plain = np.frombuffer(self._codec.decompress(packed, sum(sizes.values())), np.uint8)
+        if "rgb" in out:
+            out["rgb"][row] = plain[: sizes["rgb"]].reshape(out["rgb"][row].shape)
+        if "depth_m" in out:
+            # The bytes of one significance together, which are alike: see `_pack`.
+            planes = np.ascontiguousarray(plain[-sizes["depth_m"] :].reshape(4, -1).T)
+            out["depth_m"][row] = planes.view("<f4").reshape(out["depth_m"][row].shape)
+
+    def _pack(self, frames: Frames, row: int) -> bytes:
+        parts = [frames["rgb"][row].tobytes()] if "rgb" in frames else []
+        if "depth_m" in frames:
+            parts.append(frames["depth_m"][row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
+        return bytes(self._codec.compress(b"".join(parts), asbytes=True))
+
+    def _keep(self, k: int, frames: Frames) -> None:
+        packed = [self._pack(frames, row) for row in range(int(self._index.steps[k]))]
+        starts = np.cumsum([len(_MAGIC) + len(packed) * _ENTRY.size, *(len(p) for p in packed)])
+        head = b"".join(_ENTRY.pack(int(at), len(p), zlib.crc32(p)) for at, p in zip(starts, packed, strict=False))
+        path = self._path(k)
+        size = int(starts[-1])
+        if self._used is not None and self._used + size > self._store.most_bytes:
+            self._full = True
+            return
+        make_folder(path.parent)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            temporary.write_bytes(b"".join([_MAGIC, head, *packed]))
+            temporary.replace(path)
+        except OSError:
+            # A full disk ends what is kept, not the training.
+            self._full = True
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            return
+        self._used = (self._used or 0) + size
+        self._since += size
+
+    def _room(self) -> bool:
+        if self._used is None or self._since > _RECOUNT:
+            self._used, self._since = sum(_sizes(self._folder)), 0
+        return self._used < self._store.most_bytes
+
+
+def pictures_folder(store: CacheOptions, sensors: Sensors) -> Path:
+    """Return the folder of pictures that are made in one way, made where it is not there."""
+    s = sensors
+    facts = {
+        "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")],
+        "source": store.source,
+        "renderer": renderer_name(store.renderer), "views": s.views, "rgb": s.rgb, "depth": s.depth,
+        "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,
+    }  # fmt: skip
+    text = json.dumps(facts, sort_keys=True)
+    folder = store.base / hashlib.sha256(text.encode()).hexdigest()[:16]
+    make_folder(folder)
+    return folder
+
+
+def _sizes(folder: Path) -> Iterator[int]:
+    for path in folder.glob("*/*.pix"):
+        with contextlib.suppress(OSError):
+            yield path.stat().st_size
+
 
 # Recordings that are kept open: a trajectory's steps follow each other within a block.
 _OPEN = 16
 
 
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """What the chosen views show at some poses."""
+# What the chosen views show at n poses, of "rgb" and "depth_m" those asked for: (n, views, H, W, 3) uint8, sRGB, and
+# planar depth, (n, views, H, W) float32, metres, 0 where there is nothing within range.
+Frames = dict[str, NDArray[Any]]
 
-    rgb: NDArray[np.uint8] | None  # (n, views, H, W, 3) uint8 or None; sRGB
-    depth_m: NDArray[np.float32] | None  # Planar depth, metres; 0 where there is nothing within range
 
-    def take(self, rows: NDArray[np.int64]) -> Frames:
-        """Keep some poses, in their order."""
-        return Frames(
-            None if self.rgb is None else self.rgb[rows], None if self.depth_m is None else self.depth_m[rows]
-        )
+def take(frames: Frames, rows: NDArray[np.int64]) -> Frames:
+    """Keep some poses, in their order."""
+    return {name: seen[rows] for name, seen in frames.items()}
 
-    @classmethod
-    def join(cls, parts: Sequence[Frames]) -> Frames:
-        """Join poses, in their order."""
-        rgb = [p.rgb for p in parts if p.rgb is not None]
-        depth_m = [p.depth_m for p in parts if p.depth_m is not None]
-        return cls(np.concatenate(rgb) if rgb else None, np.concatenate(depth_m) if depth_m else None)
+
+def join(parts: Sequence[Frames]) -> Frames:
+    """Join poses, in their order."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def empty_frames(sensors: Sensors, n: int) -> Frames:
+    """Make room for what sensors see at n poses."""
+    shape = (n, len(sensors.views), sensors.height, sensors.width)
+    rgb = {"rgb": np.empty((*shape, 3), np.uint8)} if sensors.rgb else {}
+    return rgb | ({"depth_m": np.empty(shape, np.float32)} if sensors.depth else {})
 
 
 class Source(Protocol):
@@ -69,7 +234,8 @@ class RenderedFrames:
         poses = {int(k): index.poses_of(int(k)) for k in np.unique(trajectories)}
         at = np.stack([poses[k][s] for k, s in zip(trajectories.tolist(), steps.tolist(), strict=True)])
         rgb, depth_m = draw_bodies(renderer_for(context.scene, self._renderer), sensors.camera, at, sensors.views)
-        return Frames(rgb if sensors.rgb else None, clip_depth(depth_m, sensors) if sensors.depth else None)
+        seen = {"rgb": rgb} if sensors.rgb else {}
+        return seen | ({"depth_m": clip_depth(depth_m, sensors)} if sensors.depth else {})
 
 
 class RecordedFrames:
@@ -102,23 +268,24 @@ class RecordedFrames:
             rows = rows[np.lexsort((steps[rows], trajectories[rows]))]
             parts.append((rows, self._read(trajectories[rows], steps[rows])))
         back = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        return Frames.join([frames for _, frames in parts]).take(back)
+        return take(join([frames for _, frames in parts]), back)
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
-        shape = (len(steps), len(s.views), s.height, s.width)
-        rgb = np.empty((*shape, 3), np.uint8) if s.rgb else None
-        depth_m = np.empty(shape, np.float32) if s.depth else None
+        out = empty_frames(s, len(steps))
         for row, (k, step) in enumerate(zip(trajectories.tolist(), steps.tolist(), strict=True)):
             root, scene = index.scene_of(k)
             recording = _recording(root, f"media/{scene}/{index.nav_id[k]}")
             for v, view in enumerate(s.views):
-                if rgb is not None:
-                    rgb[row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
-                if depth_m is not None:
+                if s.rgb:
+                    out["rgb"][row, v] = _smaller(recording.rgb[view][step], s, cv2.INTER_AREA)
+                if s.depth:
                     # The nearest value, not a mean: between two surfaces there is none.
-                    depth_m[row, v] = _smaller(recording.depth_m[view][step], s, cv2.INTER_NEAREST_EXACT)
-        return Frames(rgb, None if depth_m is None else clip_depth(depth_m, s))
+                    depth_m = recording.depth_m[view][step]
+                    out["depth_m"][row, v] = _smaller(depth_m, s, cv2.INTER_NEAREST_EXACT)
+        if s.depth:
+            clip_depth(out["depth_m"], s)
+        return out
 
 
 def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
@@ -128,10 +295,7 @@ def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.flo
 
 
 def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, int]:
-    """Count, by ``nav_id``, the frames of recordings that have all views asked for.
-
-    One frame a pose and no quality flags.
-    """
+    """Count the frames of recordings that have all views, one a pose, without quality flags, by ``nav_id``."""
     if not root.list("recordings", f"{scene}/*.parquet"):
         return {}
     columns = ("nav_id", "view", "modality", "sampling", "n_frames", "width", "height", "fov_deg", "ok")

@@ -96,10 +96,7 @@ class Search:
             thing.nearest_m = min(thing.nearest_m, float(distance_m[k]))
 
     def towards(self, odometry: NDArray[np.float32], remaining: int) -> NDArray[np.float32]:
-        """Where to fly, (3,) metres ahead, left and up.
-
-        To the best match until seen from nearby, else round the start.
-        """
+        """Say where to fly, (3,) metres ahead, left, up: to the best match until seen near, else round the start."""
         best = self._last or max(self._candidates.values(), key=lambda thing: thing.mean_score, default=None)
         if best is None:
             return self._onward(odometry)

@@ -116,11 +116,7 @@ class Pool:
 
     def places(self, rows: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.bool_]]:
         """Read poses of steps, (n, 4), numbers of their scenes, (n,), and which actions are blocked, (n, 16)."""
-        return (
-            np.asarray(self._joined["pose"][rows], np.float32),
-            self._scene_of_step[rows],
-            np.asarray(self._joined["blocked"][rows], np.bool_),
-        )
+        return self._joined["pose"][rows], self._scene_of_step[rows], self._joined["blocked"][rows]
 
     @property
     def names(self) -> list[str]:

@@ -23,12 +23,12 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.contents import release_fingerprint
 from aerialdojo_gen.learning import checkpoints
-from aerialdojo_gen.learning.adaptation import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.encoding import actions_fingerprint
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part
+from aerialdojo_gen.learning.policy import InitialWeights, joined, read_initial_weights
 from aerialdojo_gen.learning.recipe import Recipe
 from aerialdojo_gen.learning.steps import Pool, Steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
@@ -192,13 +192,21 @@ class _Training:
             f"{sum(p.numel() for p in learner.network.parameters()):,} weights on {learner.device}"
         )
         if self._init is not None:
-            report.line(f"train {recipe.name}: begins with {self._init.path}, {self._known_to(self._init)}")
+            about, known = self._about, self._init.about
+            words, scenes = len(known.vocabulary), len(known.scenes)
+            report.line(
+                f"train {recipe.name}: begins with {self._init.path}, scenes known: {scenes:,}, new: "
+                f"{len(about.scenes) - scenes:,}; words known: {words:,}, new: {len(about.vocabulary) - words:,}"
+            )
         self._tensorboard = _tensorboard(self._folder / "tensorboard")
         parts = self._collect(index, None, "drawing references")
         self._exploration = self._explore()
         for phase in range(self._first, recipe.dagger.rounds + 1):
             if phase > 0:
-                parts += self._collect(self._drawn(phase), self._flying(phase), f"round {phase}: flying")
+                flown = self._weights(phase - 1)
+                share = recipe.dagger.teacher_share
+                flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, share)
+                parts += self._collect(self._drawn(phase), flying, f"round {phase}: flying")
             if phase < learner.progress.phase or self._weights(phase).is_file():
                 continue
             if phase > learner.progress.phase:
@@ -213,15 +221,6 @@ class _Training:
             shutil.copyfile(self._weights(recipe.dagger.rounds), temporary)
         report.line(f"train {recipe.name}: weights in {last}")
         return TrainingResult(self._weights(0), last)
-
-    def _known_to(self, init: InitialWeights) -> str:
-        """Say what the initial weights know, and what they do not."""
-        about, known = self._about, init.about
-        words, scenes = len(known.vocabulary), len(known.scenes)
-        return (
-            f"scenes known: {scenes:,}, new: {len(about.scenes) - scenes:,}; "
-            f"words known: {words:,}, new: {len(about.vocabulary) - words:,}"
-        )
 
     def _read_index(self) -> tuple[Index, tuple[str, ...]]:
         """Read the training trajectories, and the words that images will be searched for."""
@@ -245,10 +244,6 @@ class _Training:
         free = np.flatnonzero(~self._kept_back(np.array(index.nav_id)))
         return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
 
-    def _flying(self, phase: int) -> DaggerRound:
-        weights = self._weights(phase - 1)
-        return DaggerRound(weights, file_digest(weights), self._recipe.seed, phase, self._recipe.dagger.teacher_share)
-
     def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
         parts = parts_of(
             self._root, index, self._cache, self._selection, self._sensors, self._recipe.data.size_px,
@@ -257,7 +252,9 @@ class _Training:
         return [replace(part, runs=self._recipe.data.runs) for part in parts]
 
     def _collect(self, index: Index, dagger_round: DaggerRound | None, what: str) -> list[Steps]:
-        parts = self._parts(index, dagger_round)
+        return self._collected(self._parts(index, dagger_round), what)
+
+    def _collected(self, parts: list[Part], what: str) -> list[Steps]:
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
 
@@ -267,11 +264,10 @@ class _Training:
             return None
         like = self._parts(self._index, None)[0]
         parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
-        with make_executor("local", self._workers) as executor:
-            return Pool(
-                collect(parts, executor, self._reporter, "rendering extra views"), self._about.scenes,
-                self._about.vocabulary,
-            )  # fmt: skip
+        return self._pool(self._collected(parts, "rendering extra views"))
+
+    def _pool(self, parts: list[Steps]) -> Pool:
+        return Pool(parts, self._about.scenes, self._about.vocabulary)
 
     def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
@@ -280,13 +276,13 @@ class _Training:
     def _learn(self, parts: list[Steps], phase: int) -> None:
         train, dagger = self._recipe.train, self._recipe.dagger
         if phase < 0 and self._exploration is not None:
-            from aerialdojo_gen.learning.recognition import train_patch_classifier
+            from aerialdojo_gen.learning.imitation import train_patch_classifier
 
             log = self._log("sight", self._recipe.sight.epochs)
             train_patch_classifier(self._learner, self._exploration, self._about.named, log)
             return
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
-        pool = Pool(parts, self._about.scenes, self._about.vocabulary)
+        pool = self._pool(parts)
         log = self._log(f"round {phase}" if phase else "imitation", epochs)
         self._learner.learn(pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, log)
 

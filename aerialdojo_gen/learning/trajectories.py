@@ -20,11 +20,19 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
-from aerialdojo_gen.learning.cached import CachedFrames, CacheOptions
 from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
-from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
+from aerialdojo_gen.learning.pictures import (
+    CachedFrames,
+    CacheOptions,
+    Frames,
+    RecordedFrames,
+    RenderedFrames,
+    Source,
+    join,
+    take,
+)
 from aerialdojo_gen.learning.words import PADDING, Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -176,18 +184,10 @@ class Trajectories:
         meshes = {name: mesh_of(root, name)[1] for root, name in places}
         source: Source = RenderedFrames(self.index, self.sensors, own.renderer)
         if own.source != "render":
-            recorded = RecordedFrames(self.index, self.sensors, source)
             if own.source == "recordings":
-                has = np.flatnonzero([recorded.has(k) for k in range(len(self.index))])
-                if not len(has):
-                    raise UsageError(
-                        f"none of the {len(self.index):,} trajectories has a recording of the views asked for: run "
-                        f"{command('render')}, or choose source='render'"
-                    )
-                self.index = self.index.take(has)
-                drawn = RenderedFrames(self.index, self.sensors, own.renderer)
-                recorded = RecordedFrames(self.index, self.sensors, drawn)
-            source = recorded
+                self.index = recorded_alone(self.index, self.sensors, "source='render'")
+                source = RenderedFrames(self.index, self.sensors, own.renderer)
+            source = RecordedFrames(self.index, self.sensors, source)
         if not own.cache_gb:
             return source
         base = Path(own.cache_dir) if own.cache_dir is not None else cache_folder() / "learning"
@@ -250,9 +250,8 @@ class Trajectories:
         out |= self._goals(rows)
         out |= self._labels.of(rows, steps, mask)
         frames = self._frames(np.broadcast_to(rows[:, None], steps.shape)[mask], steps[mask])
-        for name, seen in (("rgb", frames.rgb), ("depth_m", frames.depth_m)):
-            if seen is not None:
-                out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scatter_rows(seen, mask)
+        for name, seen in frames.items():
+            out[name] = seen.reshape(*mask.shape, *seen.shape[1:]) if mask.all() else scatter_rows(seen, mask)
         return out
 
     def _goals(self, rows: NDArray[np.int64]) -> dict[str, Any]:
@@ -282,15 +281,13 @@ class Trajectories:
 
     def _frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         if self._source is None:
-            return Frames(None, None)
+            return {}
         # Windows overlap: what two samples of a batch share is drawn once, a scene after the other.
         keys, back = np.unique(
             np.stack([self.index.scene[trajectories], trajectories, steps]), axis=1, return_inverse=True
         )
-        parts = [
-            self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])
-        ]  # fmt: skip
-        return Frames.join(parts).take(np.asarray(back, np.int64).ravel())
+        parts = [self._source.frames(*keys[1:, keys[0] == scene].astype(np.int64)) for scene in np.unique(keys[0])]
+        return take(join(parts), np.asarray(back, np.int64).ravel())
 
     def _fingerprint(self) -> str:
         s = self.sensors
@@ -316,14 +313,20 @@ def _roots(
     return [open_root(one) for one in several]
 
 
-def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
-    """Draw trajectories, spread over the scenes as evenly as they go; a larger limit only adds to them.
+def recorded_alone(index: Index, sensors: Sensors, else_: str) -> Index:
+    """Keep the trajectories that have a recording; UsageError, which names what to choose else, without any."""
+    recorded = RecordedFrames(index, sensors, RenderedFrames(index, sensors, "auto"))
+    has = np.flatnonzero([recorded.has(k) for k in range(len(index))])
+    if not len(has):
+        raise UsageError(
+            f"none of the {len(index):,} trajectories has a recording of the views asked for: run "
+            f"{command('render')}, or choose {else_}"
+        )
+    return index.take(has)
 
-    Returns
-    -------
-    (at most limit,) int64
-        Rows of the index, ascending.
-    """
+
+def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
+    """Draw rows of the index, ascending, spread evenly over the scenes; a larger limit only adds to them."""
     if limit < 1:
         raise UsageError(f"a limit is at least 1, not {limit}")
     lots: list[tuple[int, int, int]] = []

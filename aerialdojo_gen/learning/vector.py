@@ -20,6 +20,12 @@ from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import DIRECTIONS
 
 
+def _innermost(env: gymnasium.Env[Any, Any], what: str) -> AerialDojoEnv:
+    if not isinstance(env.unwrapped, AerialDojoEnv):
+        raise UsageError(f"{what}, not of {env.unwrapped}")
+    return env.unwrapped
+
+
 class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.int64]):
     """Adds to the reward what an action brings the body nearer to the goal, on ways that it can fly.
 
@@ -53,11 +59,9 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
         discount: float = 1.0,
     ) -> None:
         super().__init__(env)
-        if not isinstance(env.unwrapped, AerialDojoEnv):
-            raise UsageError(f"progress is of AerialDojo-v0's episodes, not of {env.unwrapped}")
+        self._own = _innermost(env, "progress is of AerialDojo-v0's episodes")
         if not 0.0 <= discount <= 1.0:
             raise UsageError(f"a discount is from 0 to 1, not {discount}")
-        self._own: AerialDojoEnv = env.unwrapped
         self._scale, self._action_cost, self._collision_cost = scale, action_cost, collision_cost
         self._discount = discount
         self._left_m = 0.0
@@ -75,11 +79,8 @@ class ProgressReward(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any],
         observation, reward, terminated, truncated, info = self.env.step(action)
         before, after = self._left_m, self._goal_distance_m()
         # Where no way is known, in a nook that the grid does not enter, there is no progress either.
-        if np.isfinite(after):
-            self._left_m = after
-        else:
-            after = before
-        gained = self._scale * (before - self._discount * after) - self._action_cost
+        self._left_m = after if np.isfinite(after) else before
+        gained = self._scale * (before - self._discount * self._left_m) - self._action_cost
         if info["reason"] == "collision":
             gained -= self._collision_cost
         return observation, float(reward) + gained, terminated, truncated, {**info, "goal_distance_m": self._left_m}
@@ -102,10 +103,7 @@ class OwnScenes(gymnasium.Wrapper[dict[str, Any], np.int64, dict[str, Any], np.i
 
     def __init__(self, env: gymnasium.Env[dict[str, Any], np.int64], scenes: Sequence[str]) -> None:
         super().__init__(env)
-        own = env.unwrapped
-        if not isinstance(own, AerialDojoEnv):
-            raise UsageError(f"scenes are of AerialDojo-v0's tasks, not of {own}")
-        own.draw_from(scenes)
+        _innermost(env, "scenes are of AerialDojo-v0's tasks").draw_from(scenes)
 
 
 def make_vec(
@@ -161,26 +159,22 @@ def make_vec(
     root = open_root(data)
     scenes = make_env(data, scene=scene, **{**options, "views": (), "sensors": None}).scenes
     shares = [tuple(scenes[k % len(scenes) :: num_envs]) if spread_scenes else () for k in range(num_envs)]
-    shaping = {} if progress is True else progress or None
-    makers = [partial(_make_one, root.url, scene, share, shaping, tuple(wrappers), options) for share in shares]
+    shaping: Any = {} if progress is True else progress or None
+    shaped = [] if shaping is None else [partial(ProgressReward, **shaping)]
+    makers = [
+        partial(
+            _make_one, root.url, {**options, "scene": scene},
+            [*([partial(OwnScenes, scenes=share)] if share else []), *shaped, *wrappers],
+        )
+        for share in shares
+    ]  # fmt: skip
     if vectorization_mode == "sync":
         return SyncVectorEnv(makers)
     return AsyncVectorEnv(makers, context=context or "spawn")
 
 
-def _make_one(
-    data: str,
-    scene: str | Sequence[str],
-    own: tuple[str, ...],
-    shaping: dict[str, float] | None,
-    wrappers: tuple[Callable[[gymnasium.Env[Any, Any]], gymnasium.Env[Any, Any]], ...],
-    options: dict[str, Any],
-) -> gymnasium.Env[Any, Any]:
-    env: gymnasium.Env[Any, Any] = make_env(data, scene=scene, **options)
-    if own:
-        env = OwnScenes(env, own)
-    if shaping is not None:
-        env = ProgressReward(env, **shaping)
+def _make_one(data: str, options: dict[str, Any], wrappers: Sequence[Callable[..., Any]]) -> gymnasium.Env[Any, Any]:
+    env: gymnasium.Env[Any, Any] = make_env(data, **options)
     for wrap in wrappers:
         env = wrap(env)
     return env
@@ -202,9 +196,7 @@ class Flattened(gymnasium.ObservationWrapper[dict[str, Any], np.int64, dict[str,
 
     def __init__(self, env: gymnasium.Env[dict[str, Any], np.int64], vocabulary: Vocabulary | None = None) -> None:
         super().__init__(env)
-        own = env.unwrapped
-        if not isinstance(own, AerialDojoEnv):
-            raise UsageError(f"observations are of AerialDojo-v0, not of {own}")
+        own = _innermost(env, "observations are of AerialDojo-v0")
         self.vocabulary = vocabulary or Vocabulary.of(goal_text(*said) for said in own.goals_in_words())
         seen = own.observation_space
         tokens = spaces.Box(0, len(self.vocabulary) - 1, (self.vocabulary.length,), np.int64)

@@ -15,10 +15,9 @@ from aerialdojo_gen.benchmark.agents import AgentBase, InvalidAnswer, load_agent
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.evaluation import Limits
-from aerialdojo_gen.benchmark.guarded_agent import AgentError
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.benchmark.worker import RetryPolicy
+from aerialdojo_gen.benchmark.worker import AgentError, RetryPolicy
 from aerialdojo_gen.scenes.context import open_contexts
 
 HERE, FILE = __name__, Path(__file__).stem

@@ -16,10 +16,10 @@ from support.command_line import called
 from support.llm_server import Act, Cut, Endless, Filtered, Hang, Raw, Say, Status, Trickle, serving
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.benchmark.counts import conduct_cells
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runs import load_runs
+from aerialdojo_gen.benchmark.tables import conduct_cells
 
 KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."

@@ -3,7 +3,7 @@
 import pytest
 
 from aerialdojo_gen.benchmark.env import AerialDojoEnv
-from aerialdojo_gen.benchmark.paraphrases import texts_of_tasks
+from aerialdojo_gen.benchmark.tasks import texts_of_tasks
 from aerialdojo_gen.learning.trajectories import Trajectories
 from aerialdojo_gen.store.root import open_root
 

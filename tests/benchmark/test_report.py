@@ -22,10 +22,10 @@ from aerialdojo_gen.base.errors import AerialDojoError, StoreError
 from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.text_table import BEST, SECOND, Column, TextTable
 from aerialdojo_gen.benchmark import figures, registry, score_rows, tables
-from aerialdojo_gen.benchmark.counts import conduct_cells
 from aerialdojo_gen.benchmark.metrics import PROFILES, Profile, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, load_runs
+from aerialdojo_gen.benchmark.tables import conduct_cells
 from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow

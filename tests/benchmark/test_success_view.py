@@ -21,6 +21,7 @@ from support.walled import SCENE, VIEWPOINTS, walled, write_walled
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.flight import view_of
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
@@ -28,7 +29,6 @@ from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
-from aerialdojo_gen.benchmark.viewpoints import view_of
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.rendering.casters import in_sight
 from aerialdojo_gen.store import shards as store

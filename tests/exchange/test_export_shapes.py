@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AerialDojoError, StoreError, UsageError
 from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.exchange.point_cloud import sample_surface
-from aerialdojo_gen.exchange.shape_export import export_shapes
+from aerialdojo_gen.exchange.shape_export import export_shapes, sample_surface
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.occupancy import SLACK_M, Occupancy

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.benchmark.viewpoints import nodes_of
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.learning.exploration_views import NOTHING, UNNAMED, collect_views, patch_labels
 from aerialdojo_gen.learning.index import read_index

@@ -16,8 +16,8 @@ from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.learning import Trajectories, Vocabulary, collate
-from aerialdojo_gen.learning.cached import CachedFrames
 from aerialdojo_gen.learning.labels import NO_ACTION
+from aerialdojo_gen.learning.pictures import CachedFrames
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
 

@@ -18,9 +18,8 @@ from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.studio.annotate.access import TokenGate
 from aerialdojo_gen.studio.annotate.coco import write_coco
-from aerialdojo_gen.studio.annotate.server import STATIC, make_app, serve_session
+from aerialdojo_gen.studio.annotate.server import STATIC, TokenGate, make_app, serve_session
 from aerialdojo_gen.studio.annotate.session import AnnotationSession, open_session
 from aerialdojo_gen.studio.annotate.storage import Storage
 

@@ -15,8 +15,9 @@ from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import ServiceDown
+from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.studio.annotate.rewrite import Limits, Rewriter, make_agent
+from aerialdojo_gen.studio.annotate.rewrite import Rewriter, make_agent
 
 ROOT = Path(__file__).resolve().parents[2]
 KEY = "sk-test-51f0c1e7a9b24d6e8f30"

@@ -21,8 +21,7 @@ from aerialdojo_gen.dataset.lookup import ReleasedScene, find_task
 from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.scenes.context import release_scenes
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.studio.show.figure import write_png
-from aerialdojo_gen.studio.show.page import render_page
+from aerialdojo_gen.studio.show.figure import render_page, write_png
 from aerialdojo_gen.studio.show.pictured import picture_task
 
 YARD = "U_Courtyard_0"

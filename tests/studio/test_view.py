@@ -25,7 +25,7 @@ from support.viewing import YARD
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.studio.view.contents import route_detail, route_points, scene_index
+from aerialdojo_gen.studio.view.scenes import route_detail, route_points, scene_index
 from aerialdojo_gen.studio.view.server import view_app
 from aerialdojo_gen.studio.web import serving
 from aerialdojo_gen.studio.web.payload import scene_payload

@@ -23,29 +23,7 @@ _OPPOSITE = {"left": "right", "right": "left"}
 
 
 class ClipHeuristicAgent(AgentBase):
-    """CLIP-H, the baseline of UAV-ON (Xiao et al. 2025) and of the repository of AerialDojo-200K's authors.
-
-    Before every action it compares the views with the goal by CLIP, and moves towards the one that fits best, without
-    turning: front, left, right or down. It stops where the best view's cosine reaches a threshold. The rule and its
-    numbers are those of the authors' ``policies/cliph.py``; docs/evaluate.md says what differs here.
-
-    Parameters
-    ----------
-    vision, text, tokenizer : str
-        Files of a CLIP model: the two encoders (ONNX) and tokenizer.json.
-    stop : float
-        Cosine of a view and a semantic goal's description at which it stops.
-    stop_image : float
-        Cosine of a view and an image goal's picture at which it stops.
-    descend_m : float
-        It moves down only where nothing in any view is as near as this.
-    boundary_m : float
-        It turns left instead of leaving a square of twice this edge around its start.
-    clearance_m : float
-        Free depth that a move must leave ahead, else the next best view is taken; 0 to look at no depth, as CLIP-H.
-    move_m : int
-        Length of a level move: 1, 3 or 5 m.
-    """
+    """CLIP-H of UAV-ON (Xiao et al. 2025), by the authors' ``policies/cliph.py``; docs/evaluate.md has the rule."""
 
     sensors = Sensors(width=224, height=224)
 
@@ -54,12 +32,12 @@ class ClipHeuristicAgent(AgentBase):
         vision: str,
         text: str,
         tokenizer: str,
-        stop: float = 0.30,
-        stop_image: float = 0.90,
-        descend_m: float = 5.0,
-        boundary_m: float = 50.0,
-        clearance_m: float = 0.0,
-        move_m: int = 1,
+        stop: float = 0.30,  # Cosine of a view and a semantic goal's description at which it stops
+        stop_image: float = 0.90,  # That of a view and an image goal's picture
+        descend_m: float = 5.0,  # It moves down only where nothing in any view is as near as this
+        boundary_m: float = 50.0,  # It turns left instead of leaving a square of twice this edge around its start
+        clearance_m: float = 0.0,  # Free depth that a move must leave ahead; 0 to look at no depth, as CLIP-H
+        move_m: int = 1,  # Length of a level move: 1, 3 or 5 m
     ) -> None:
         if move_m not in (1, 3, 5):
             raise ValueError(f"move_m is 1, 3 or 5, not {move_m}")

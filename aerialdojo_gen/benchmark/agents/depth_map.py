@@ -78,10 +78,7 @@ class DepthMap:
         self._barred[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = 1
 
     def way_to_frontier(self, x_m: float, y_m: float) -> list[tuple[float, float]]:
-        """Find the way to the nearest place, at least 3 m off, where the known free space ends.
-
-        Points of the map's frame, from the body's cell on; none where there is no such place within reach.
-        """
+        """Find the way, points or none, to the nearest place, 3 m off or more, where known free space ends."""
         near = cv2.dilate((self._cells == _OCCUPIED).astype(np.uint8), _MARGIN)
         open_ = ((self._cells == _FREE) & (near == 0) & (self._barred == 0)).astype(np.uint8)
         start = self.cell(x_m, y_m)

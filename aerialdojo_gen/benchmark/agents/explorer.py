@@ -23,22 +23,11 @@ _THUMB_PX = 24
 
 
 class ExplorerAgent(AgentBase):
-    """Frontier exploration in the plane, by depth alone (Yamauchi 1997), in a frame reckoned from its own actions.
-
-    It keeps the height it starts at, and climbs a metre where there is nowhere left to go. With an image goal it
-    stops where the front view correlates with the picture; the words of a goal it ignores. Its last action is a Stop,
-    wherever it is then.
-
-    Parameters
-    ----------
-    likeness : float
-        Correlation of the thumbnails, -1 to 1, at which an image goal counts as found.
-    clearance_m : float
-        Free depth that must be left ahead after a move.
-    """
+    """Frontier exploration in the plane, by depth alone (Yamauchi 1997), in a frame reckoned from its own actions."""
 
     sensors = Sensors(views=("front", "left", "right"), width=96, height=96)
 
+    # Correlation, -1 to 1, at which an image goal counts as found; free depth that is left ahead after a move.
     def __init__(self, likeness: float = 0.75, clearance_m: float = 0.8) -> None:
         if not -1.0 <= likeness <= 1.0:
             raise ValueError(f"likeness is a correlation, -1 to 1, not {likeness}")

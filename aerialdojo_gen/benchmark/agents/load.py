@@ -127,19 +127,13 @@ def _converted(name: str, option: str, text: str, default: Any) -> Any:
 
 
 def add_working_directory() -> None:
-    """Let modules of the working directory be imported, as ``python -m`` does; a console script does not.
-
-    Last, so that a file there takes no library's place.
-    """
+    """Let modules of the working directory be imported, the last of all, as ``python -m`` does."""
     if "" not in sys.path and os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
 
 
 def error_location(error: BaseException) -> str:
-    """Say what was raised and where, in one line: ``KeyError at mine.py:12: 'map'``.
-
-    The place is the last one outside of libraries and of this package, so that it is in the agent's own code.
-    """
+    """Say in one line what was raised, and where in the agent's own code: ``KeyError at mine.py:12: 'map'``."""
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)] or frames
     where = f" at {Path(own[-1].filename).name}:{own[-1].lineno}" if own else ""

@@ -34,16 +34,7 @@ class _ListAgent(AgentBase):
 
 
 class OracleAgent(_ListAgent):
-    """Replays the reference trajectory: the upper bound, and the self-test of the data.
-
-    The runner gives it the reference's actions before each episode, and gives them to no other agent.
-
-    Parameters
-    ----------
-    actions : str
-        Which list of `routes` it flies: ``action``, the Approach left out, or ``agent_action``, which has the 16
-        actions alone and ends where the target is seen.
-    """
+    """Replays a list of `routes`, ``action`` or ``agent_action``, which the runner gives to it alone."""
 
     def __init__(self, actions: str = "action") -> None:
         if actions not in ("action", "agent_action"):
@@ -55,18 +46,8 @@ class OracleAgent(_ListAgent):
         self._actions = [action for action in actions if action != APPROACH]
 
 
-class RandomAgent(AgentBase):
-    """Draws among the 16 actions, Stop as likely as any other.
-
-    Parameters
-    ----------
-    seed : int
-        With the goal's words it fixes the draws: the agent is told nothing that tells two episodes of one goal apart.
-    stop_probability : float, optional
-        Chance of Stop at each step; the other actions share the rest. One in 16 where absent.
-    """
-
-    sensors = BLIND
+class RandomAgent(_ListAgent):
+    """Draws among the 16 actions by `seed` and the goal's words; Stop as often as each, or by `stop_probability`."""
 
     def __init__(self, seed: int = 0, stop_probability: float | None = None) -> None:
         p = 1.0 / N_ACTIONS if stop_probability is None else float(stop_probability)
@@ -83,24 +64,13 @@ class RandomAgent(AgentBase):
         draws = rng.generator(self._seed, "random-agent", *words)
         self._actions = draws.choice(N_ACTIONS, size=budget, p=self._p).tolist()
 
-    def act(self, observation: Observation) -> int:
-        """Draw an action."""
-        return int(self._actions[observation.step])
-
 
 class StopAgent(_ListAgent):
     """Stops where it stands: how many tasks are solved by doing nothing."""
 
 
 class ConstantAgent(_ListAgent):
-    """Flies the same few actions in every episode, and stops: how many tasks are solved without looking.
-
-    Parameters
-    ----------
-    actions : str or sequence of str or int
-        Names or numbers of actions, in a string separated by commas. Where they end it stops. The default is the
-        best blind flight that is known.
-    """
+    """Flies the same few actions, names or numbers, in every episode: how much is solved without looking."""
 
     def __init__(self, actions: str | Sequence[str | int] = BEST_CONSTANT) -> None:
         given = actions.split(",") if isinstance(actions, str) else [str(action) for action in actions]
@@ -117,32 +87,19 @@ NO_ACTION = "-"
 SYMBOLS = f"0123456789abcdef{NO_ACTION}"
 
 
-class SubmittedAgent(AgentBase):
-    """Replays submitted actions; the runner says which task comes next, and says so to no other agent.
-
-    Parameters
-    ----------
-    file : str
-        JSON: the actions of every task, a character of `SYMBOLS` each, by task id.
-    """
-
-    sensors = BLIND
+class SubmittedAgent(_ListAgent):
+    """Replays the submitted actions of a JSON file, by task id; the runner tells it, and no other agent, the task."""
 
     def __init__(self, file: str) -> None:
         self._by_task: dict[str, str] = read_json(Path(file))
-        self._actions = ""
 
     def follow(self, task_id: str) -> None:
         """Take the actions of the next episode."""
-        self._actions = self._by_task[task_id]
-
-    def reset(self, goal: Goal) -> None:
-        """Begin an episode."""
+        self._actions = [SYMBOLS.index(symbol) for symbol in self._by_task[task_id]]
 
     def act(self, observation: Observation) -> int:
         """Do what was submitted for this step; Stop where the list has ended and the episode has not."""
-        if observation.step >= len(self._actions):
-            return STOP
-        if self._actions[observation.step] == NO_ACTION:
+        action = super().act(observation)
+        if SYMBOLS[action] == NO_ACTION:
             raise InvalidAnswer("submitted as an answer that names no action")
-        return SYMBOLS.index(self._actions[observation.step])
+        return action

@@ -33,28 +33,16 @@ _BY_KIND = {
 _STATUS = re.compile(r": HTTP (\d{3}): ")
 
 
-def refused(error: UsageError, model: str, key_variable: str) -> ServiceDown:
-    """Make the error that ends a run from a service's refusal of all requests.
-
-    Not what was asked for is wrong, as a `UsageError` says, but what stands behind it: the exit code is 1.
-    """
+def _mend_of(error: UsageError, model: str, key_variable: str) -> str:
     status = _STATUS.search(str(error))
     code = status[1] if status else ""
     if code == "404":
-        mend = f"is --option model={model} served there, and is base_url right?"
-    elif code.startswith("3"):
-        mend = "it sends requests elsewhere: is base_url right?"
-    elif code in ("402", "429"):
-        mend = "has the account anything left to spend?"
-    else:
-        mend = f"is the key in {key_variable} right, and may it use model={model}?"
-    return ServiceDown(f"{error}: {mend}")
-
-
-def check_error(error: AgentUnavailable) -> AerialDojoError:
-    """Make the error that ends the check before a run from a failure of its one request."""
-    mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
-    return AerialDojoError(f"{error}{mend}")
+        return f"is --option model={model} served there, and is base_url right?"
+    if code.startswith("3"):
+        return "it sends requests elsewhere: is base_url right?"
+    if code in ("402", "429"):
+        return "has the account anything left to spend?"
+    return f"is the key in {key_variable} right, and may it use model={model}?"
 
 
 # An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
@@ -144,9 +132,7 @@ class LanguageModelAgent(AgentBase):
 
     def used_options(self) -> dict[str, Any]:
         """Return all options as used, defaults too, without secrets."""
-        used = self.options.model_dump(mode="json") | {"answer": self.form}
-        cleaned: dict[str, Any] = self._secrets.options(used)
-        return cleaned
+        return dict(self._secrets.options(self.options.model_dump(mode="json") | {"answer": self.form}))
 
     def ask(
         self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
@@ -156,41 +142,45 @@ class LanguageModelAgent(AgentBase):
 
     def ask_for(self, system: str, text: str, schema: Schema) -> Reply:
         """Ask for something else than an action, in the first form that the service takes."""
-        forms = self.forms if self.options.answer == "auto" else (self.form,)
-        for form in forms[forms.index(self.form) if self._asked else 0 :]:
-            self.form = form
+
+        def ask() -> Reply:
+            return self._send(system, [Message("user", (text,))], schema=schema)
+
+        reply = ask() if self._asked else self._first_form(ask)
+        self._asked = True
+        return reply
+
+    def _first_form(self, ask: Callable[[], Reply], is_right: Callable[[Reply], bool] = lambda _: True) -> Reply:
+        """Ask in one form of answer after the other; the last either answers or raises."""
+        *forms, last = self.forms if self.options.answer == "auto" else (self.options.answer,)
+        for self.form in forms:
             try:
-                reply = self._send(system, [Message("user", (text,))], schema=schema)
+                reply = ask()
             except AgentUnavailable as error:
-                if self._asked or form == forms[-1] or error.kind not in _UNSUPPORTED:
+                if error.kind not in _UNSUPPORTED:
                     raise
                 continue
-            self._asked = True
-            return reply
-        raise AssertionError("the last form either answers or raises")
+            if is_right(reply):
+                return reply
+        self.form = last
+        return ask()
 
     def check(self) -> str:
         """Send one small request as the run will send them; settles how answers are asked for."""
         grey = colour_picture(np.full((32, 32, 3), 128, np.uint8), 32)
-        text = f"{self._example()} This is a test of the connection: choose Stop."
-        forms = self.forms if self.options.answer == "auto" else (self.options.answer,)
-        for form in forms:
-            self.form = form
-            try:
-                reply = self._ask_with_retry(text, [Message("user", ("A grey picture:", grey))])
-            except ServiceDown as error:
-                raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
-            except AgentUnavailable as error:
-                if form != forms[-1] and error.kind in _UNSUPPORTED:
-                    continue
-                raise AerialDojoError(f"checked before the run, nothing flown: {check_error(error)}") from None
-            if form != forms[-1] and not self._readable(reply.text):
-                continue
-            self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
-            counted = "" if self.tells_tokens else ", tells no tokens"
-            seconds = self.service.meter.longest_s
-            return f"{self.service.name} answers in {seconds:.1f} s, by {form}{counted}"
-        raise AssertionError("the last form either answers or raises")
+        example = f'{{"thought": "...", "action": "{self.options.action_set.names[0]}"}}'
+        text = f"Answer with one JSON object: {example}. This is a test of the connection: choose Stop."
+        said = [Message("user", ("A grey picture:", grey))]
+        try:
+            reply = self._first_form(lambda: self._ask_with_retry(text, said), self._readable)
+        except ServiceDown as error:
+            raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
+        except AgentUnavailable as error:
+            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
+            raise AerialDojoError(f"checked before the run, nothing flown: {error}{mend}") from None
+        self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
+        counted = "" if self.tells_tokens else ", tells no tokens"
+        return f"{self.service.name} answers in {self.service.meter.longest_s:.1f} s, by {self.form}{counted}"
 
     def _ask_with_retry(self, system: str, messages: Sequence[Message]) -> Reply:
         """Ask once more where the service answers at all: somebody waits, and one that is not there stays so."""
@@ -210,7 +200,8 @@ class LanguageModelAgent(AgentBase):
             return self.ask(system, messages, retries, schema)
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
-            raise refused(error, self.options.model, variable) from None
+            # Not what was asked for is wrong, but what stands behind it: the exit code is 1.
+            raise ServiceDown(f"{error}: {_mend_of(error, self.options.model, variable)}") from None
 
     def settled(self) -> dict[str, Any]:
         """Return options that `check` has settled, for the agents that fly."""
@@ -221,15 +212,12 @@ class LanguageModelAgent(AgentBase):
         """Whether the cost of an episode will be known, if the service tells tokens."""
         return self.options.priced
 
-    def _readable(self, text: str) -> bool:
+    def _readable(self, reply: Reply) -> bool:
         try:
-            parse_answer(text, self.options.action_set.names)
+            parse_answer(reply.text, self.options.action_set.names)
         except InvalidAnswer:
             return False
         return True
-
-    def _example(self) -> str:
-        return f'Answer with one JSON object: {{"thought": "...", "action": "{self.options.action_set.names[0]}"}}.'
 
     def reset(self, goal: Goal) -> None:
         """Begin an episode."""

@@ -115,21 +115,16 @@ def read_as(kind: type[Model], text: str) -> Model:
         raise InvalidAnswer(f"it is JSON, but no object: {type(value).__name__}")
     try:
         answer = kind.model_validate(value)
-    except (ValidationError, ValueError) as error:
-        raise _refused(_problems(error)) from None
+    except ValidationError as error:
+        faults = error.errors(include_input=False, include_url=False)
+        raise _refused("; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in faults)) from None
+    except ValueError:
+        raise _refused("it holds half of a surrogate pair, which is no character") from None
     try:
         json.dumps(value, ensure_ascii=False).encode("utf-8")
     except UnicodeEncodeError:
         raise InvalidAnswer("it holds half of a surrogate pair, which is no character") from None
     return answer
-
-
-def _problems(error: ValueError) -> str:
-    if not isinstance(error, ValidationError):
-        return "it holds half of a surrogate pair, which is no character"
-    return "; ".join(
-        f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_input=False, include_url=False)
-    )
 
 
 def _refused(why: str) -> InvalidAnswer:

@@ -10,11 +10,7 @@ from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Message, Repl
 
 
 class OpenAIAgent(LanguageModelAgent):
-    """Asks a model by way of the package ``openai``; the key is OPENAI_API_KEY's, or ``key_env``'s.
-
-    A service of one's own (``base_url``, or OPENAI_BASE_URL) may do without a key. Its answers are bounded by
-    ``max_tokens``, OpenAI's own by ``max_completion_tokens``, the only one that its newer models take.
-    """
+    """Asks by the package ``openai``; the key is OPENAI_API_KEY's, or ``key_env``'s; an own service may need none."""
 
     package = "openai"
 

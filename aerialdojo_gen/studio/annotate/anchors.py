@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -46,9 +45,8 @@ class AnchorService:
         # One thread: PyBullet is not thread-safe, and the page needs CPU as well.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="anchors")
         self._world: Future[Any] = self._worker.submit(self._build)
-        self._candidates: OrderedDict[tuple[int, str], list[dict[str, Any]]] = OrderedDict()
-        self._views: OrderedDict[tuple[float, ...], View] = OrderedDict()
-        self._lock = threading.Lock()
+        self._candidates: dict[tuple[int, str], list[dict[str, Any]]] = {}
+        self._kept_view = lru_cache(_MAX_PICTURES)(lambda *pose: self._run(lambda: self._render(*pose)))
 
     def _build(self) -> Any:
         from aerialdojo_gen.pipeline.stages.work.anchor_world import World
@@ -72,19 +70,13 @@ class AnchorService:
         from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 
         key = (entry.id, entry.node)
-        with self._lock:
-            if key in self._candidates:
-                return self._candidates[key]
-        rows, _ = self._run(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
-        with self._lock:
-            self._candidates[key] = rows
-        return rows
+        if key not in self._candidates:
+            found = self._run(lambda: anchors_of(self._item(entry), self._world.result(), self._job, self.config))
+            self._candidates[key] = found[0]
+        return self._candidates[key]
 
     def place(self, entry: Object, eye_m: Floats) -> Floats:
-        """Put a viewpoint, (3,) world metres, on the line of sight from `eye_m` to an object.
-
-        At the standoff from its surface.
-        """
+        """Put a viewpoint, (3,) world metres, between `eye_m` and an object, at the standoff from its surface."""
         instance = self.scene[entry.node]
         away = eye_m - instance.centroid
         length = float(np.linalg.norm(away))
@@ -116,25 +108,15 @@ class AnchorService:
 
     def view(self, position_m: Floats, yaw_rad: float) -> View:
         """Take the front view from a place (kept for the next time)."""
-        key = (*np.round(position_m, 4).tolist(), round(yaw_rad, 5))
-        with self._lock:
-            if key in self._views:
-                self._views.move_to_end(key)
-                return self._views[key]
-        view = self._run(lambda: self._render(position_m, yaw_rad))
-        with self._lock:
-            self._views[key] = view
-            while len(self._views) > _MAX_PICTURES:
-                self._views.popitem(last=False)
-        return view
+        return self._kept_view(*position_m.tolist(), yaw_rad)
 
-    def _render(self, position_m: Floats, yaw_rad: float) -> View:
+    def _render(self, *pose_m_rad: float) -> View:
         from aerialdojo_gen.pipeline.stages.work.reference_images import box_of, instance_map
         from aerialdojo_gen.rendering.backend import scene_renderer
         from aerialdojo_gen.rendering.casters import ray_caster
 
         camera = Camera(self._pictures.width, self._pictures.height, self._pictures.fov_deg)
-        pose = view_pose(position_m, yaw_rad, "front")
+        pose = view_pose(pose_m_rad[:3], pose_m_rad[3], "front")
         picture = scene_renderer(self.scene, self._pictures.renderer).render(camera, pose)
         rays = ray_caster(self.scene)
         shown = instance_map(rays, camera, pose)

@@ -43,11 +43,7 @@ def write_coco(session: AnnotationSession, path: Path) -> Path:
 
 
 def coco(session: AnnotationSession) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Make the COCO document and its pictures, by file name.
-
-    Boxes are ``[left, top, width, height]`` in pixels, areas the pixels that show the object, image ids the ids of
-    the objects that the images are of.
-    """
+    """Make the COCO document, boxes as left, top, width and height in pixels, and its pictures by file name."""
     entries = [e for e in session.storage.load().annotations.objects if e.node in session.scene]
     names = sorted({e.category for e in entries})
     number = {name: k for k, name in enumerate(names, start=1)}

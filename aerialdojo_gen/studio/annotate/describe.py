@@ -26,10 +26,7 @@ class Describer:
         self._geometry = SceneGeometry(vocabulary.scene)  # caches results
 
     def describe(self, annotations: Annotations) -> dict[str, Any]:
-        """Describe all entries.
-
-        JSON with ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file.
-        """
+        """Describe all entries: ``landmarks``, ``objects`` (each with its ``faults``) and ``faults`` of the file."""
         source = parse_annotations(format_annotations(annotations))
         faults: dict[tuple[str, int], list[dict[str, str]]] = {}
         general = []

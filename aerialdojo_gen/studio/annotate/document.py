@@ -135,24 +135,15 @@ def _entry(model: type[Entry], values: dict[str, Any]) -> Entry:
 
 def apply(annotations: Annotations, edits: Sequence[Edit]) -> Annotations:
     """Apply edits to annotations."""
-    lists: dict[Kind, list[Entry]] = {"landmarks": [*annotations.landmarks], "objects": [*annotations.objects]}
+    lists: dict[str, list[Any]] = {"landmarks": [*annotations.landmarks], "objects": [*annotations.objects]}
     for edit in edits:
         entries = lists[edit.kind]
         at = next((k for k, entry in enumerate(entries) if entry.id == edit.id), None)
         if (None if at is None else entries[at]) != edit.before:
             raise ConflictError(f"{edit.kind[:-1]} {edit.id} has been changed since")
-        if at is None:
-            assert edit.after is not None
-            entries.insert(min(edit.index, len(entries)), edit.after)
-        elif edit.after is None:
-            del entries[at]
-        else:
-            entries[at] = edit.after
-    return Annotations(
-        annotations.scene,
-        tuple(e for e in lists["landmarks"] if isinstance(e, Landmark)),
-        tuple(e for e in lists["objects"] if isinstance(e, Object)),
-    )
+        place = slice(edit.index, edit.index) if at is None else slice(at, at + 1)
+        entries[place] = [] if edit.after is None else [edit.after]
+    return Annotations(annotations.scene, tuple(lists["landmarks"]), tuple(lists["objects"]))
 
 
 def difference(before: Annotations, after: Annotations) -> list[Edit]:

@@ -26,6 +26,7 @@ from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageError
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.load import load_agent, read_options
+from aerialdojo_gen.benchmark.evaluation import Limits
 from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent, Reply
 from aerialdojo_gen.benchmark.llm.answer import read_as
 from aerialdojo_gen.pipeline.stage import ProjectPaths
@@ -82,14 +83,6 @@ class _Read(BaseModel):
 
     said: list[int]
     besides: list[str]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Where rewriting stops."""
-
-    tokens: int | None = None
-    cost_usd: float | None = None
 
 
 @dataclass
@@ -260,11 +253,7 @@ def rewrite_scene(
     name: str, roots: ProjectPaths, agent: LanguageModelAgent, limits: Limits | None, *, again: bool = False,
     say: Callable[[str], object] = lambda line: None,
 ) -> Rewriting | None:  # fmt: skip
-    """Rewrite the descriptions in a scene's annotation file, those of people only if `again`.
-
-    Without limits it says what would be sent, and sends nothing: None. Where the service refuses all requests
-    (ServiceDown) the file stays as it is.
-    """
+    """Rewrite descriptions in an annotation file, people's only if `again`; without limits it sends nothing: None."""
     path = roots.annotations / f"{name}.json"
     if not path.exists():
         raise AnnotationError(f"{path} does not exist: there is nothing to rewrite")

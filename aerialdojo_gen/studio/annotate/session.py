@@ -27,8 +27,7 @@ from aerialdojo_gen.studio.annotate import boxes
 from aerialdojo_gen.studio.annotate.anchors import AnchorService
 from aerialdojo_gen.studio.annotate.describe import Describer
 from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
-from aerialdojo_gen.studio.annotate.history import Record
-from aerialdojo_gen.studio.annotate.storage import Author, State, Storage
+from aerialdojo_gen.studio.annotate.storage import Author, Record, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _MOST_CHANGES = 200

@@ -10,25 +10,91 @@ import contextlib
 import fcntl
 import hashlib
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
-from aerialdojo_gen.studio.annotate.document import (
-    ConflictError,
-    Edit,
-    Kind,
-    Operation,
-    apply,
-    describe,
-    difference,
-    edits_of,
-)
-from aerialdojo_gen.studio.annotate.history import Action, History, Record
+from aerialdojo_gen.studio.annotate import document
+from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Kind, Operation
+
+Action = Literal["do", "undo", "redo", "import", "outside"]
+
+
+class Record(BaseModel):
+    """A line of the history."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    time: str  # UTC, ISO 8601
+    who: str  # Name that the person entered
+    client: str  # The browser tab that the change's undo belongs to
+    action: Action  # ``outside``: changed by something other than this tool
+    what: str  # Summary in words
+    before: str  # Versions of the file (SHA-256 of its bytes, hexadecimal)
+    after: str
+    edits: tuple[Edit, ...]
+
+
+class History:
+    """The records of a history file, read incrementally."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.records: list[Record] = []
+        self.whole = 0  # bytes up to the end of the last complete line
+        self._lock = threading.Lock()
+
+    def refresh(self) -> None:
+        """Read new records; an incomplete last line, left by a crash, is ignored."""
+        with self._lock:
+            size = self.path.stat().st_size if self.path.exists() else 0
+            if size < self.whole:
+                self.records, self.whole = [], 0
+            if size == self.whole:
+                return
+            with self.path.open("rb") as file:
+                file.seek(self.whole)
+                tail = file.read()
+            end = tail.rfind(b"\n") + 1
+            for line in tail[:end].splitlines():
+                # Of another version, or damaged: it only cannot be undone.
+                with contextlib.suppress(ValidationError):
+                    self.records.append(Record.model_validate_json(line))
+            self.whole += end
+
+    def stacks(self, client: str) -> tuple[list[Record], list[Record]]:
+        """Return a tab's undo and redo stacks, the next one last."""
+        undo: list[Record] = []
+        redo: list[Record] = []
+        for record in self.records:
+            if record.client != client:
+                continue
+            if record.action == "undo" and undo:
+                redo.append(undo.pop())
+            elif record.action == "redo" and redo:
+                undo.append(redo.pop())
+            elif record.action in ("do", "import"):
+                undo.append(record)
+                redo.clear()
+        return undo, redo
+
+    def since(self, version: str) -> Iterator[Record]:
+        """Yield the changes after a version; all of them if it is unknown."""
+        last = max((k for k, record in enumerate(self.records) if record.after == version), default=None)
+        first = max((k for k, record in enumerate(self.records) if record.before == version), default=None)
+        start = last + 1 if last is not None else first if first is not None else 0
+        yield from self.records[start:]
+
+    def highest_id(self, kind: str) -> int:
+        """Return the highest id that a kind of entry ever had; -1 if none."""
+        return max((e.id for record in self.records for e in record.edits if e.kind == kind), default=-1)
 
 
 @dataclass(frozen=True)
@@ -88,16 +154,18 @@ class Storage:
 
     def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
         """Apply an operation and save it."""
-
-        def edits(state: State) -> list[Edit]:
-            return edits_of(operation, state.annotations, self._next_id(state, operation.kind))
-
-        return self._commit(version, author, "do", edits)
+        kind = operation.kind
+        return self._commit(
+            version,
+            author,
+            "do",
+            lambda state: document.edits_of(operation, state.annotations, self._next_id(state, kind)),
+        )
 
     def replace(self, version: str, author: Author, raw: bytes) -> tuple[State, Record | None]:
         """Replace the file by another one, as a change that can be undone; `AnnotationError` if it is invalid."""
         after = parse_whole(raw, self.scene, "the file")
-        return self._commit(version, author, "import", lambda state: difference(state.annotations, after))
+        return self._commit(version, author, "import", lambda state: document.difference(state.annotations, after))
 
     def undo(self, version: str, author: Author) -> tuple[State, Record | None]:
         """Undo the last change of the author's tab; `ConflictError` if the entry has changed since."""
@@ -110,12 +178,12 @@ class Storage:
 
     def redo(self, version: str, author: Author) -> tuple[State, Record | None]:
         """Redo the last undone change of the author's tab."""
-
-        def edits(_: State) -> list[Edit]:
-            _done, undone = self.history.stacks(author.client)
-            return list(undone[-1].edits) if undone else []
-
-        return self._commit(version, author, "redo", edits)
+        return self._commit(
+            version,
+            author,
+            "redo",
+            lambda _: [e for r in self.history.stacks(author.client)[1][-1:] for e in r.edits],
+        )
 
     def _next_id(self, state: State, kind: Kind) -> int:
         present = max((entry.id for entry in getattr(state.annotations, kind)), default=-1)
@@ -130,14 +198,14 @@ class Storage:
             if state.version != version:
                 raise StaleError(state)
             edits = tuple(edits_of_state(state))
-            after = apply(state.annotations, edits)
+            after = document.apply(state.annotations, edits)
             if not edits:
                 return state, None
             raw = format_annotations(after).encode("utf-8")
             digest = hashlib.sha256(raw).hexdigest()
             now = datetime.now(UTC).isoformat(timespec="seconds")
             record = Record(
-                time=now, who=author.who, client=author.client, action=action, what=describe(edits),
+                time=now, who=author.who, client=author.client, action=action, what=document.describe(edits),
                 before=state.version, after=digest, edits=edits,
             )  # fmt: skip
             lines = [record]

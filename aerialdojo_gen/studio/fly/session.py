@@ -225,12 +225,9 @@ def _spread(scenes: list[str], task_ids: list[str], seed: int) -> pa.Array:
 
 
 def _goal_state(goal: Goal) -> dict[str, Any]:
-    rules = goal.rules
+    rules, told = goal.rules, ("target_name", "landmark", "direction", "description")
     return {
-        "target_name": goal.target_name,
-        "landmark": goal.landmark,
-        "direction": goal.direction,
-        "description": goal.description,
+        **{name: getattr(goal, name) for name in told},
         "has_image": goal.image is not None,
         "image_distance_m": goal.image_distance_m,
         "heading": goal.heading and asdict(goal.heading),

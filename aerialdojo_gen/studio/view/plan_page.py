@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,58 +17,45 @@ from aerialdojo_gen.studio.web.payload import scene_payload
 from aerialdojo_gen.studio.web.serving import local_app, one_line
 
 
-@dataclass(frozen=True)
-class _Built:
-    """What came of one version of the files: a scene, or the last one that was built and an error."""
-
-    payload: bytes
-    state: dict[str, Any]
-
-
 class WatchedPlan:
-    """A plan's file, and the scene of its present text."""
+    """A plan's file, and the scene of its present text, or the last one that was built and an error."""
 
     def __init__(self, path: Path, assets: Path) -> None:
         self.path, self._assets = path, assets
         self._lock = threading.Lock()
         self._seen: object = None
-        self._built = _Built(b"", {})
+        self._payload, self._state = b"", dict[str, Any]()
         self._version = 0
 
-    def current(self) -> _Built:
-        """Build if a file changed since the last call."""
+    def current(self) -> tuple[bytes, dict[str, Any]]:
+        """Build if a file changed since the last call; return the scene and what the page says of it."""
         with self._lock:
-            seen = self._stamp()
+            seen = []
+            for file in (self.path, *sorted(self._assets.rglob("*.toml"))):
+                # An editor that saves replaces the file.
+                with contextlib.suppress(OSError):
+                    stat = file.stat()
+                    seen.append((file, stat.st_mtime_ns, stat.st_size))
             if seen != self._seen:
                 self._seen = seen
                 self._version += 1
-                self._built = self._build()
-            return self._built
+                self._build()
+            return self._payload, self._state
 
-    def _stamp(self) -> object:
-        files = [self.path, *sorted(self._assets.rglob("*.toml"))]
-        return [(file, stat.st_mtime_ns, stat.st_size) for file in files if (stat := _stat(file))]
-
-    def _build(self) -> _Built:
+    def _build(self) -> None:
         head: dict[str, Any] = {"version": self._version, "file": str(self.path), "name": self.path.stem}
         before, entries = time.perf_counter(), dict[str, str]()
         try:
             scene = build_plan(self.path, load_catalogue(self._assets), entries)
             lines = _entry_lines(self.path.read_text(encoding="utf-8"))
         except (AerialDojoError, OSError) as error:
-            return _Built(self._built.payload, {**self._built.state, **head, "error": one_line(str(error))})
+            self._state = {**self._state, **head, "error": one_line(str(error))}
+            return
         counts = {"n_triangles": scene.n_triangles, "n_instances": len(scene.instances)}
         where = {node: {"entry": name, "line": lines.get(name)} for node, name in entries.items()}
         seconds = round(time.perf_counter() - before, 2)
-        return _Built(scene_payload(scene), {**head, **counts, "seconds": seconds, "error": "", "entries": where})
-
-
-def _stat(file: Path) -> Any:
-    try:
-        return file.stat()
-    except OSError:
-        # An editor that saves replaces the file.
-        return None
+        self._payload = scene_payload(scene)
+        self._state = {**head, **counts, "seconds": seconds, "error": "", "entries": where}
 
 
 def _entry_lines(text: str) -> dict[str, int]:
@@ -92,10 +79,10 @@ def plan_app(path: Path, assets: Path) -> FastAPI:
 
     @app.get("/api/state")
     def get_state() -> dict[str, Any]:
-        return watched.current().state
+        return watched.current()[1]
 
     @app.get("/api/scene", response_model=None)
     def get_scene() -> Response:
-        return Response(watched.current().payload, media_type="application/octet-stream")
+        return Response(watched.current()[0], media_type="application/octet-stream")
 
     return app

@@ -12,8 +12,7 @@ from aerialdojo_gen.dataset.release import open_release
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
-from aerialdojo_gen.studio.view.contents import route_detail
-from aerialdojo_gen.studio.view.scenes import SceneCache
+from aerialdojo_gen.studio.view.scenes import SceneCache, route_detail
 from aerialdojo_gen.studio.view.tasks import TaskList
 from aerialdojo_gen.studio.web.serving import STATIC, local_app
 

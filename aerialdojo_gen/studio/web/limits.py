@@ -83,12 +83,8 @@ class LimitedProtocol(H11Protocol):
 
     def _follow(self) -> None:
         # A response may be complete before its request: a refused body is still awaited.
-        if self.conn.their_state is h11.SEND_BODY:
-            phase = "body"
-        elif self.cycle is None or self.cycle.response_complete:
-            phase = "head"
-        else:
-            phase = ""
+        answered = self.cycle is None or self.cycle.response_complete
+        phase = "body" if self.conn.their_state is h11.SEND_BODY else "head" if answered else ""
         if phase == self._phase:
             return
         self._phase, self._waits_since = phase, time.monotonic()
