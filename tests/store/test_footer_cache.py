@@ -4,6 +4,7 @@ import os
 import shutil
 
 import pytest
+from support.handmade import filled
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store import footer_cache, schemas
@@ -38,19 +39,12 @@ def at_once(monkeypatch):
 
 
 def shard(folder, fingerprint="f" * 64, rows=3):
-    table = from_rows(
-        schemas.LANDMARKS,
-        [{n: {"scene": SCENE, "landmark_id": k}.get(n, _value(schemas.LANDMARKS.schema.field(n), k))
-          for n in schemas.LANDMARKS.schema.names} for k in range(rows)],
-    )  # fmt: skip
+    made = [filled(schemas.LANDMARKS, {"scene": SCENE, "landmark_id": k}) for k in range(rows)]
+    table = from_rows(schemas.LANDMARKS, made)
     files = {"meshes/a.glb": store.ShardFile(7, "a" * 64)}
     summary = {"rows_in": rows, "rows_out": rows, "counts": {"kept": rows}}
     store.write_shard(folder, "landmarks", SCENE, 0, table, fingerprint=fingerprint, summary=summary, files=files)
     return folder / store.shard_name("landmarks", SCENE)
-
-
-def _value(field, k):
-    return str(k) if str(field.type) == "string" else [] if str(field.type).startswith("list") else k
 
 
 def asked(folder):

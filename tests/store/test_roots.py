@@ -8,6 +8,7 @@ import pickle  # noqa: TID251 - executors send roots to other processes
 from pathlib import Path
 
 import pytest
+from support.handmade import filled
 from support.roots import fill, read_folder, write
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
@@ -18,10 +19,7 @@ from aerialdojo_gen.store.root import LocalRoot, open_root
 from aerialdojo_gen.store.tables import from_rows
 
 SCENE = "U_Test_0"
-PAIR = {"scene": SCENE, "pair_id": "1_0__2", "start_object_id": 1, "start_anchor_id": 0, "target_object_id": 2,
-        "euclidean_m": 5.0, "target_visible_at_start": 0.5,
-    "visible_view_at_start": "front",
-}  # fmt: skip
+PAIR = filled(schemas.PAIRS, {"scene": SCENE, "pair_id": "1_0__2", "euclidean_m": 5.0})
 
 
 def test_a_file_is_what_was_committed(root):

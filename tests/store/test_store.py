@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.handmade import filled
 
 from aerialdojo_gen.base.errors import DamagedFile, StoreError
 from aerialdojo_gen.store import schemas
@@ -22,22 +23,14 @@ finite = st.floats(-1e6, 1e6)
 
 
 def pair(i, scene="U_Test_0"):
-    return {
-        "scene": scene, "pair_id": f"{i}_0__{i + 1}", "start_object_id": i, "start_anchor_id": 0,
-        "target_object_id": i + 1, "euclidean_m": 4.5 + i, "target_visible_at_start": i / 1000,
-        "visible_view_at_start": "left" if i else None,
-    }  # fmt: skip
+    own = {"scene": scene, "pair_id": f"{i}_0__{i + 1}", "euclidean_m": 4.5 + i, "target_visible_at_start": i / 1000}
+    return filled(schemas.PAIRS, own | {"visible_view_at_start": "left" if i else None})
 
 
 def plan(pair_id, n, value):
-    lists = {name: [value] * n for name in ("x_m", "y_m", "z_m", "yaw_rad")}
-    return {
-        "scene": "U_Test_0", "pair_id": pair_id, "outcome": "SOLVED" if n else "NO_PATH",
-        "predicted_length_m": None, "length_m": float(n),
-        "n_actions": n, "expansions": 3, "min_clearance_m": 0.5 if n else None, **lists, "action": [1] * n,
-        "free_length_m": value, "plan_detour": 1.5, "straight_line_free": bool(n % 2), "climb_m": 0.0,
-        "agent_action": [1] * n if n else None,
-    }  # fmt: skip
+    lists = {name: [value] * n for name in ("x_m", "y_m", "z_m", "yaw_rad")} | {"action": [1] * n}
+    own = {"scene": "U_Test_0", "pair_id": pair_id, "length_m": float(n), "free_length_m": value, **lists}
+    return filled(schemas.PLANS, own | {"straight_line_free": bool(n % 2), "agent_action": [1] * n if n else None})
 
 
 def write(data, rows, **kw):
