@@ -56,8 +56,8 @@ def test_help_needs_little(smoke, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "verb",
-    ["show", "plan", *(pytest.param(verb, marks=pytest.mark.nightly) for verb in (
-        "evaluate", "export", "validate", "add-scene", "build-scenes"))],
+    ["plan", *(pytest.param(verb, marks=pytest.mark.nightly) for verb in (
+        "show", "evaluate", "export", "validate", "add-scene", "build-scenes"))],
 )  # fmt: skip
 def test_what_fits_by_its_figure_runs(smoke, tmp_path, verb):
     data = shutil.copytree(smoke, tmp_path / "data")

@@ -144,9 +144,8 @@ def test_readers_say_in_a_line_that_a_footer_is_damaged(smoke, tmp_path, command
     shutil.copytree(smoke / "meshes", data / "meshes")
     path = store.shard_path(data, "routes/train", "U_Courtyard_0")
     with_json(path, text)
-    args = {"stats": ["stats", "--data", str(data)], "validate": ["validate", "--data", str(data), "--workers", "1"],
-            "evaluate": ["evaluate", "--agent", "stop", "--data", str(data), "--split", "id_train"]}  # fmt: skip
-    done = CliRunner().invoke(app, args[command])
+    more = {"validate": ["U_Courtyard_0", "--workers", "1"], "evaluate": ["--agent", "stop", "--split", "id_train"]}
+    done = CliRunner().invoke(app, [command, "--data", str(data), *more.get(command, [])])
     said = done.output + str(done.exception or "")
     assert done.exit_code == 1
     assert "Traceback" not in said
