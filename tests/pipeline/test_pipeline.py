@@ -1,11 +1,10 @@
-"""Strong properties of the real output of a whole run on two small scenes."""
+"""Properties of the real output of a whole run on two small scenes, beside those that validate holds."""
 
 import io
 import itertools
 import json
 import math
 
-import cv2
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
@@ -65,11 +64,6 @@ def solved(plans):
 
 
 @pytest.fixture(scope="module")
-def anchors(smoke):
-    return pd.read_parquet(smoke / "anchors").set_index(["scene", "object_id", "anchor_id"])
-
-
-@pytest.fixture(scope="module")
 def routes(smoke):
     return pd.concat([pd.read_parquet(p) for p in sorted((smoke / "release" / "routes").iterdir())])
 
@@ -103,11 +97,6 @@ def test_every_candidate_has_a_plan_and_a_verdict(smoke, plans):
     assert (verdicts["reason"] == "kept").equals(verdicts["keep"])
 
 
-def test_length_is_the_sum_of_the_stored_segments(solved):
-    for row in solved.itertuples():
-        assert np.linalg.norm(np.diff(xyz(row), axis=0), axis=1).sum() == pytest.approx(row.length_m, abs=1e-9)
-
-
 def test_replay_of_the_actions_reproduces_the_stored_poses(solved):
     for row in solved.itertuples():
         assert len({len(getattr(row, name)) for name in LISTS}) == 1
@@ -122,19 +111,6 @@ def test_replay_of_the_actions_reproduces_the_stored_poses(solved):
         assert np.abs(wrap(poses[:, 3] - row.yaw_rad)).max() < 1e-5
         # Without Approach an agent still stops within a metre of the anchor.
         assert np.linalg.norm(poses[-1, :3] - xyz(row)[-1]) <= 1.0 + 1e-6
-
-
-def test_routes_run_from_the_start_anchor_to_the_selected_one(routes, anchors):
-    for row in routes.itertuples():
-        start = anchors.loc[(row.scene, row.start_object_id, row.start_anchor_id)]
-        targets = anchors.loc[(row.scene, row.target_object_id)]
-        goal = targets[targets["selected"]].iloc[0]
-        assert tuple(xyz(row)[0]) == (start.x_m, start.y_m, start.z_m)
-        assert abs(wrap(row.yaw_rad[0] - start.yaw_rad - math.pi)) < 1e-9
-        assert tuple(xyz(row)[-1]) == (goal.x_m, goal.y_m, goal.z_m)
-        assert abs(wrap(row.yaw_rad[-1] - goal.yaw_rad)) <= math.radians(7.5) + 1e-9
-        euclidean = np.linalg.norm(xyz(row)[-1] - xyz(row)[0])
-        assert row.euclidean_m == pytest.approx(euclidean, abs=1e-9)
 
 
 def test_released_routes_hold_the_papers_bounds(routes):
@@ -189,48 +165,6 @@ def test_the_body_never_touches_the_mesh_at_sampled_points(routes, meshes):
             assert distance.min() > RADIUS_M - 1e-4, row.nav_id
             # The stored clearance is the route's smallest: no sampled point is nearer than it says.
             assert min(distance.min(), 5.0) >= row.min_clearance_m - 1e-3
-
-
-def test_routes_stay_inside_the_scene(smoke, routes):
-    scenes = pd.read_parquet(smoke / "scenes").set_index("scene")
-    for row in routes.itertuples():
-        scene, points = scenes.loc[row.scene], xyz(row)
-        low = scene[["min_x_m", "min_y_m"]].to_numpy(float)
-        high = scene[["max_x_m", "max_y_m", "max_z_m"]].to_numpy(float)
-        assert (points[:, :2] >= low).all()
-        assert (points <= high).all()
-
-
-def test_anchors_are_a_metre_from_the_surface_and_face_the_object(smoke, meshes):
-    objects = pd.read_parquet(smoke / "objects").set_index(["scene", "object_id"])
-    anchors = pd.read_parquet(smoke / "anchors")
-    assert set(map(tuple, anchors[["scene", "object_id"]].to_numpy())) == set(objects.index)
-    assert (anchors.groupby(["scene", "object_id"])["selected"].sum() == 1).all()
-    for scene, rows in anchors.groupby("scene"):
-        model = read_glb(smoke / "meshes" / f"{scene}.glb")
-        for row in rows.itertuples():
-            thing = objects.loc[(scene, row.object_id)]
-            node = model[thing.mesh_node]
-            surface = trimesh.Trimesh(node.vertices, node.faces, process=False)
-            point = np.array([[row.x_m, row.y_m, row.z_m]])
-            assert trimesh.proximity.closest_point(surface, point)[1][0] == pytest.approx(1.0, abs=0.02)
-            towards = math.atan2(thing.y_m - row.y_m, thing.x_m - row.x_m)
-            assert abs(wrap(row.yaw_rad - towards)) < 1e-6
-            assert row.clearance_m >= RADIUS_M
-            assert 0 < row.visible_fraction <= 1
-
-
-def test_reference_images_show_their_object(smoke):
-    objects = pd.concat([pd.read_parquet(p) for p in sorted((smoke / "release" / "objects").glob("*.parquet"))])
-    assert objects["reference_image_id"].is_unique
-    for row in objects.itertuples():
-        image = cv2.imdecode(np.frombuffer(row.reference_image, np.uint8), cv2.IMREAD_COLOR)
-        height, width = image.shape[:2]
-        assert image.std() > 5
-        assert 0 <= row.box_u0_px < row.box_u1_px <= width
-        assert 0 <= row.box_v0_px < row.box_v1_px <= height
-        area = (row.box_u1_px - row.box_u0_px) * (row.box_v1_px - row.box_v0_px)
-        assert 0 < row.image_fraction <= area / (width * height) + 1e-9
 
 
 def test_recordings_are_there_and_well(smoke):
