@@ -68,19 +68,6 @@ def test_before_another_side_of_the_target_a_stop_is_a_success_at_a_viewpoint(co
     assert (row.success, row.target_in_sight, row.success_view) == (False, True, True)
 
 
-def test_exactly_the_radius_is_a_success_and_passing_the_goal_is_one_of_osr_alone(
-    court: Path, tmp_path: Path
-) -> None:
-    # Facing west, north is to the right: 3 m before the goal, 1 m before it, 4 m behind it.
-    at_radius = flown(court, tmp_path, "MoveRight3,Stop", "radius").loc["open"]
-    assert (at_radius.final_distance_m, at_radius.success, at_radius.oracle_success) == (3.0, True, True)
-    passed = flown(court, tmp_path, "MoveRight5,MoveRight5,Stop", "passed").loc["open"]
-    assert (passed.min_distance_m, passed.final_distance_m) == pytest.approx((1.0, 4.0))
-    assert (passed.success, passed.oracle_success) == (False, True)
-    short = flown(court, tmp_path, "MoveRight1,MoveRight1,Stop", "short").loc["open"]
-    assert (short.success, short.oracle_success) == (False, False)
-
-
 def test_no_stop_and_a_collision_are_no_success_however_near(court: Path, tmp_path: Path) -> None:
     spun = flown(court, tmp_path, ",".join(["TurnLeft15"] * 90), "spun")
     assert (spun.termination == "budget").all()

@@ -35,10 +35,11 @@ def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def has_failed(answer, code, *words):
+def fails(answer, code, *words):
+    """The command ended with a code and a last line that has these words."""
     got, _, said = answer
     last = said.splitlines()[-1]
-    return (got == code and last.startswith("error: ") and all(word in last for word in words)) or answer
+    assert (got, last.startswith("error: "), [word for word in words if word not in last]) == (code, True, []), answer
 
 
 def test_what_was_sent_comes_back_to_the_byte_and_nothing_else_does(smoke, hub, call, tmp_path):
@@ -73,9 +74,7 @@ def test_meshes_travel_where_they_are_asked_for(smoke, hub, call, tmp_path):
     assert not (tmp_path / "few" / "meshes").exists()
     # A mesh of another making has a digest of its own, which the release knows nothing of.
     hub.repos[NAME].files["meshes/U_Courtyard_1.glb"] = hub.repos[NAME].files["meshes/U_Courtyard_0.glb"]
-    assert (
-        has_failed(call("pull", NAME, "--data", tmp_path / "other"), 1, "U_Courtyard_1.glb is not the mesh") is True
-    )
+    fails(call("pull", NAME, "--data", tmp_path / "other"), 1, "U_Courtyard_1.glb is not the mesh")
     assert not (tmp_path / "other" / "release").exists()
 
 
@@ -85,8 +84,7 @@ def test_a_mesh_of_ones_own_is_not_lost(smoke, hub, call, tmp_path):
     own.parent.mkdir()
     own.write_bytes(b"drawn by hand")
     shutil.copyfile(smoke / "meshes" / "U_Courtyard_0.glb", own.with_name("U_Courtyard_0.glb"))
-    refused = has_failed(call("pull", NAME, "--data", tmp_path), 2, str(own), "--no-meshes", "--replace")
-    assert refused is True
+    fails(call("pull", NAME, "--data", tmp_path), 2, str(own), "--no-meshes", "--replace")
     assert files_of(tmp_path).keys() == {"meshes/U_Courtyard_0.glb", "meshes/U_Courtyard_1.glb"}
     assert own.read_bytes() == b"drawn by hand"
     assert call("pull", NAME, "--data", tmp_path, "--replace")[0] == 0
@@ -97,10 +95,8 @@ def test_weights_of_a_policy_travel_with_the_release(smoke, hub, call, tmp_path)
     data, name = tmp_path / "sent", "policies/imitation/policy.safetensors"
     shutil.copytree(smoke / "release", data / "release")
     missing = call("push-to-hub", NAME, "--data", data, "--policy", "imitation")
-    assert has_failed(missing, 2, "there are no weights", name) is True
-    assert (
-        has_failed(call("push-to-hub", NAME, "--data", data, "--policy", "../x"), 2, "there are no weights") is True
-    )
+    fails(missing, 2, "there are no weights", name)
+    fails(call("push-to-hub", NAME, "--data", data, "--policy", "../x"), 2, "there are no weights")
     (data / name).parent.mkdir(parents=True)
     (data / name).write_bytes(b"weights")
     (data / name).with_name("checkpoint.safetensors").write_bytes(b"stays here")
@@ -112,7 +108,7 @@ def test_weights_of_a_policy_travel_with_the_release(smoke, hub, call, tmp_path)
     own = tmp_path / "own" / name
     own.parent.mkdir(parents=True)
     own.write_bytes(b"trained here")
-    assert has_failed(call("pull", NAME, "--data", tmp_path / "own"), 2, str(own), "or add --replace") is True
+    fails(call("pull", NAME, "--data", tmp_path / "own"), 2, str(own), "or add --replace")
     assert own.read_bytes() == b"trained here"
 
 
@@ -120,7 +116,7 @@ def test_weights_of_a_policy_travel_with_the_release(smoke, hub, call, tmp_path)
 def test_a_token_goes_to_no_other_machine_unencrypted(hub, call, tmp_path, monkeypatch, address):
     monkeypatch.setenv("HF_ENDPOINT", address)
     answer = call("pull", NAME, "--data", tmp_path)
-    assert has_failed(answer, 2, f"HF_TOKEN would go to {address} unencrypted", "https://") is True
+    fails(answer, 2, f"HF_TOKEN would go to {address} unencrypted", "https://")
     assert TOKEN not in "".join(answer[1:])
 
 
@@ -165,7 +161,7 @@ def test_neither_a_strangers_names_nor_a_password_reach_the_terminal(smoke, hub,
     assert r"left there: \u001b]0;owned\u0007\nnext: rm -rf" + "\n" in said
     monkeypatch.setenv("HF_ENDPOINT", hub.url.replace("://", "://me:hunter2@") + "9")
     answer = call("pull", NAME, "--data", tmp_path / "new")
-    assert has_failed(answer, 1, "cannot reach") is True
+    fails(answer, 1, "cannot reach")
     assert "hunter2" not in "".join(answer[1:])
 
 
@@ -180,7 +176,7 @@ def test_what_comes_damaged_is_told_and_not_kept(smoke, hub, call, tmp_path):
     part = "objects/part-U_Courtyard_0.parquet"
     whole = hub.repos[NAME].files[part]
     hub.spoilt[part] = whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]
-    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part, "came damaged") is True
+    fails(call("pull", NAME, "--data", tmp_path), 1, part, "came damaged")
     assert not (tmp_path / "release").exists()
     hub.spoilt.clear()
     assert call("pull", NAME, "--data", tmp_path)[0] == 0
@@ -192,9 +188,9 @@ def test_a_data_set_whose_parts_are_wrong_makes_no_release(smoke, hub, call, tmp
     files = hub.repos[NAME].files
     part = "landmarks/part-U_Courtyard_0.parquet"
     whole = files.pop(part)
-    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part, "is missing") is True
+    fails(call("pull", NAME, "--data", tmp_path), 1, part, "is missing")
     files[part] = whole[: len(whole) // 2]
-    assert has_failed(call("pull", NAME, "--data", tmp_path), 1, part) is True
+    fails(call("pull", NAME, "--data", tmp_path), 1, part)
     assert not (tmp_path / "release").exists()
 
 
@@ -202,7 +198,7 @@ def test_a_release_that_is_there_stays_unless_it_is_to_be_replaced(smoke, hub, c
     assert call("push-to-hub", NAME, "--data", smoke)[0] == 0
     shutil.copytree(smoke / "release", tmp_path / "release")
     (tmp_path / "release" / "README.md").write_text("mine")
-    assert has_failed(call("pull", NAME, "--data", tmp_path), 2, "--replace") is True
+    fails(call("pull", NAME, "--data", tmp_path), 2, "--replace")
     assert (tmp_path / "release" / "README.md").read_text() == "mine"
     assert call("pull", NAME, "--data", tmp_path, "--replace")[0] == 0
     assert files_of(tmp_path / "release") == files_of(smoke / "release")
@@ -211,27 +207,27 @@ def test_a_release_that_is_there_stays_unless_it_is_to_be_replaced(smoke, hub, c
 def test_what_goes_wrong_is_a_line_that_names_the_mend(smoke, hub, call, tmp_path, monkeypatch):
     push = ("push-to-hub", NAME, "--data", smoke)
     pull = ("pull", NAME, "--data", tmp_path / "new")
-    assert has_failed(call(*pull), 2, f"there is no data set {NAME} at {hub.url}") is True
+    fails(call(*pull), 2, f"there is no data set {NAME} at {hub.url}")
     hub.repos[NAME] = Repo(files={"README.md": b"a model", "data.csv": b"1"})
-    assert has_failed(call(*pull), 2, "holds no release") is True
-    assert has_failed(call(*pull, "--revision", "v9"), 2, "no such revision") is True
+    fails(call(*pull), 2, "holds no release")
+    fails(call(*pull, "--revision", "v9"), 2, "no such revision")
     monkeypatch.setenv("HF_TOKEN", READER)
-    assert has_failed(call(*push), 1, "refuses to make or write to", "HF_TOKEN") is True
+    fails(call(*push), 1, "refuses to make or write to", "HF_TOKEN")
     monkeypatch.setenv("HF_TOKEN", "hf_aWrongTokenOfNoAccount12345678")
     for command in (push, pull):
         answer = call(*command)
-        assert has_failed(answer, 1, "does not know the token in HF_TOKEN") is True
+        fails(answer, 1, "does not know the token in HF_TOKEN")
         assert "hf_aWrong" not in answer[2]
     monkeypatch.delenv("HF_TOKEN")
     hub.repos[NAME].private = True
-    assert has_failed(call(*pull), 2, "HF_TOKEN is not set") is True
-    assert has_failed(call(*push), 1, "export HF_TOKEN=", "/settings/tokens") is True
-    assert has_failed(call("pull", "yards", "--data", tmp_path), 2, "write USER/NAME") is True
-    assert has_failed(call("push-to-hub", NAME, "--data", tmp_path / "none"), 1, "there is no release in") is True
+    fails(call(*pull), 2, "HF_TOKEN is not set")
+    fails(call(*push), 1, "export HF_TOKEN=", "/settings/tokens")
+    fails(call("pull", "yards", "--data", tmp_path), 2, "write USER/NAME")
+    fails(call("push-to-hub", NAME, "--data", tmp_path / "none"), 1, "there is no release in")
     monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")
-    assert has_failed(call(*pull), 1, "cannot reach http://127.0.0.1:9") is True
+    fails(call(*pull), 1, "cannot reach http://127.0.0.1:9")
     monkeypatch.setenv("HF_ENDPOINT", "nowhere")
-    assert has_failed(call(*pull), 2, "HF_ENDPOINT") is True
+    fails(call(*pull), 2, "HF_ENDPOINT")
     assert not (tmp_path / "new").exists()
 
 
