@@ -4,14 +4,13 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from support.handmade import box, instance, mesh_of, scene, write_rows, write_scene, xyz
+from support.handmade import box, instance, job_of, mesh_of, scene, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, StoreError
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.geometry.viewpoints import shortlist
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import anchor_sample
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import is_same
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import World, anchors_of
@@ -22,18 +21,17 @@ CONFIG = AnchorSampleConfig()
 RADIUS = Embodiment().radius_m
 
 
-def job(tmp_path, seed=0):
-    return Job(
-        "anchor-sample", "U_Test_0", 0, 1, seed, Embodiment(), ProjectPaths(tmp_path, tmp_path, tmp_path, tmp_path)
-    )
-
-
 def item(thing, object_id=0):
     return {"object_id": object_id, "name": thing.node, "mesh_node": thing.node, **xyz(thing.centroid)}
 
 
 def find(place, node, tmp_path, config=CONFIG, seed=0):
-    return anchors_of(item(place[node]), World.of(place, RADIUS, CONFIG.margin_m), job(tmp_path, seed), config)
+    return anchors_of(
+        item(place[node]),
+        World.of(place, RADIUS, CONFIG.margin_m),
+        job_of("anchor-sample", tmp_path, seed=seed),
+        config,
+    )
 
 
 def place_of(row):
@@ -228,7 +226,7 @@ def whole_run(place, objects, data, seed=0, chosen=()):
     write_scene(data, place)
     write_rows(data, "objects", [item(thing, k) for k, thing in enumerate(objects)])
     write_rows(data, "chosen_anchors", chosen)
-    return anchor_sample.run(job(data, seed), CONFIG)
+    return anchor_sample.run(job_of("anchor-sample", data, seed=seed), CONFIG)
 
 
 def test_the_stage_accounts_for_every_candidate_and_names_objects_without_anchors(tmp_path, caplog):

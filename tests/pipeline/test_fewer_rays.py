@@ -5,8 +5,8 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from support.handmade import box, instance, scene
-from support.two_coloured import item_of, job_in, world_of
+from support.handmade import box, instance, job_of, scene
+from support.two_coloured import item_of, world_of
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
@@ -53,7 +53,7 @@ def world(request):
 def found(world, tmp_path_factory) -> Candidates:
     folder = tmp_path_factory.mktemp("job")
     return candidates_of(
-        item_of(world.scene.instances[world.index["kiosk"]], "kiosk"), world, job_in(folder), CONFIG
+        item_of(world.scene.instances[world.index["kiosk"]], "kiosk"), world, job_of("anchor-sample", folder), CONFIG
     )[0]
 
 

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from support.handmade import write_rows, write_scene
+from support.handmade import job_of, write_rows, write_scene
 from support.walled import SCENE, VIEWPOINTS, walled
 
 from aerialdojo_gen.base.config.sections import FilterConfig
-from aerialdojo_gen.base.config.shared import Embodiment
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.filter import run
 from aerialdojo_gen.rendering.casters import all_in_sight, in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -48,8 +46,7 @@ def data(tmp_path):
 
 
 def test_a_stop_behind_a_wall_or_over_a_roof_makes_no_task(data):
-    job = Job("filter", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
-    made = run(job, FilterConfig())
+    made = run(job_of("filter", data, SCENE), FilterConfig())
     reasons = dict(zip(*(made.tables["verdicts"][name].to_pylist() for name in ("pair_id", "reason")), strict=True))
     hidden = {"behind", "above", "behind, no Approach", "above, no Approach"}
     kept = {"before": "kept", "before, no Approach": "kept"}

@@ -6,12 +6,10 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.handmade import box, instance, scene, write_rows, write_scene, xyz
+from support.handmade import box, instance, job_of, scene, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import PairObjectsConfig
-from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import pair_objects
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.tables import check_table
@@ -46,8 +44,7 @@ def pair(data: Path, rows, config=None, others=()):
     config = config or PairObjectsConfig()
     write_rows(data, "anchors", rows)
     things(data, rows, *others)
-    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
-    out = pair_objects.run(job, config)
+    out = pair_objects.run(job_of("pair-objects", data), config)
     check_table(schemas.PAIRS, out.tables["pairs"])
     assert out.rows_out == out.tables["pairs"].num_rows
     assert out.rows_in == out.rows_out + sum(out.counts.values())
@@ -144,9 +141,8 @@ def test_an_object_that_the_mesh_lacks_is_named(tmp_path):
     pair(tmp_path, rows)
     nodes = ("ball_0", "gone")
     write_rows(tmp_path, "objects", [{"object_id": k, "mesh_node": node} for k, node in enumerate(nodes)])
-    job = Job("pair-objects", SCENE, 0, 1, 0, Embodiment(), ProjectPaths(*[tmp_path] * 4))
     with pytest.raises(StoreError, match="object 1 is not in the scene's mesh: run aerialdojo-gen annotate-import"):
-        pair_objects.run(job, PairObjectsConfig())
+        pair_objects.run(job_of("pair-objects", tmp_path), PairObjectsConfig())
 
 
 moves = st.one_of(

@@ -5,14 +5,12 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 from support.flying import along, distances, solid, town
-from support.handmade import write_rows, write_scene, xyz
+from support.handmade import job_of, write_rows, write_scene, xyz
 
 from aerialdojo_gen.base.config.sections import PairObjectsConfig, PlanConfig, QuotaConfig
-from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.geometry.motion import replay
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import candidate_policy, pair_objects, plan
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.context import release_scenes
@@ -23,10 +21,6 @@ from aerialdojo_gen.store.tables import check_table
 SCENE = "U_Test_0"
 CONFIG = PlanConfig(targets_per_part=2)
 N_OBJECTS = 5
-
-
-def job(data: Path, stage: str, part: int = 0, parts: int = 1) -> Job:
-    return Job(stage, SCENE, part, parts, 0, Embodiment(), ProjectPaths(data, data, data, data))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +43,7 @@ def data(tmp_path_factory) -> Path:
             turn = rng.uniform(-math.pi, math.pi)
             anchors.append({"object_id": k, "anchor_id": a, **xyz(p), "yaw_rad": turn, "selected": a == 1})
     write_rows(root, "anchors", anchors)
-    pairs = pair_objects.run(job(root, "pair-objects"), PairObjectsConfig()).tables["pairs"]
+    pairs = pair_objects.run(job_of("pair-objects", root), PairObjectsConfig()).tables["pairs"]
     store.write_shard(root, "pairs", SCENE, 0, pairs)
     return root
 
@@ -58,7 +52,7 @@ def data(tmp_path_factory) -> Path:
 def shards(data):
     parts = -(-N_OBJECTS // CONFIG.targets_per_part)
     assert parts == 3
-    return [plan.run(job(data, "plan", k, parts), CONFIG) for k in range(parts)]
+    return [plan.run(job_of("plan", data, SCENE, k, parts), CONFIG) for k in range(parts)]
 
 
 def test_every_candidate_has_one_row_in_one_shard(data, shards):
@@ -112,12 +106,12 @@ def test_stored_routes_run_from_the_turned_start_anchor_to_the_selected_one(data
 
 def test_a_shard_does_not_depend_on_what_was_planned_before(data, shards):
     release_scenes()
-    again = plan.run(job(data, "plan", 1, 3), CONFIG)
+    again = plan.run(job_of("plan", data, SCENE, 1, 3), CONFIG)
     assert again.tables["plans"].equals(shards[1].tables["plans"])
 
 
 def test_a_part_beyond_the_targets_is_empty(data):
-    out = plan.run(job(data, "plan", 3, 4), CONFIG)
+    out = plan.run(job_of("plan", data, SCENE, 3, 4), CONFIG)
     assert (out.rows_in, out.rows_out, out.tables["plans"].num_rows) == (0, 0, 0)
     check_table(schemas.PLANS, out.tables["plans"])
 
@@ -130,7 +124,7 @@ def test_a_pair_without_its_anchor_is_named(data, tmp_path):
         store.write_shard(tmp_path, name, SCENE, 0, table)
     (tmp_path / "meshes").symlink_to(data / "meshes")
     with pytest.raises(StoreError, match="pair-objects"):
-        plan.run(job(tmp_path, "plan"), CONFIG)
+        plan.run(job_of("plan", tmp_path), CONFIG)
 
 
 # What is released of the town: a fifth of its short routes, and metres that they can have.
@@ -142,7 +136,7 @@ def released(data, monkeypatch):
     def planned(paper: PaperScene, **values) -> tuple[dict, dict]:
         monkeypatch.setattr(candidate_policy, "inventory", lambda: {SCENE: paper})
         config = PlanConfig(search="released", quota=QuotaConfig(prefer_harder=5.0, **values))
-        out = plan.run(job(data, "plan"), config)
+        out = plan.run(job_of("plan", data), config)
         assert out.rows_in == out.rows_out == store.read_scene(data, "pairs", SCENE).num_rows
         return {r["pair_id"]: r for r in check_table(schemas.PLANS, out.tables["plans"]).to_pylist()}, out.counts
 

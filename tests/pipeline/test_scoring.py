@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.handmade import box, instance
-from support.two_coloured import EMBODIMENT, POST, directions, item_of, job_in, part, plain_view, sign, world_of, yard
+from support.handmade import box, instance, job_of
+from support.two_coloured import EMBODIMENT, POST, directions, item_of, part, plain_view, sign, world_of, yard
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ScorerWeights
@@ -79,7 +79,9 @@ def test_a_wall_before_an_object_costs_the_anchors_behind_it(tmp_path):
     wall = instance("wall", box((-3.0, 0.85, 0.0), (3.0, 0.9, 1.2)))
     open_, walled = ({}, {})
     for found, more in ((open_, ()), (walled, (wall,))):
-        rows, _ = anchors_of(item_of(POST, "post"), world_of(yard(POST, *more)), job_in(tmp_path), config)
+        rows, _ = anchors_of(
+            item_of(POST, "post"), world_of(yard(POST, *more)), job_of("anchor-sample", tmp_path), config
+        )
         for row, azimuth in zip(rows, directions(rows, POST), strict=True):
             found[round(math.degrees(azimuth)), round(row["z_m"], 2)] = row
     behind = [key for key in open_.keys() & walled.keys() if walled[key]["part_unoccluded"] < 0.9]
@@ -149,7 +151,7 @@ def test_a_sign_is_better_from_the_front_than_from_its_edge():
 
 def test_the_selected_anchor_of_a_sign_is_before_its_face(tmp_path):
     thing = sign()
-    rows, _ = anchors_of(item_of(thing, "sign"), world_of(yard(thing)), job_in(tmp_path), CONFIG)
+    rows, _ = anchors_of(item_of(thing, "sign"), world_of(yard(thing)), job_of("anchor-sample", tmp_path), CONFIG)
     (first, *_) = directions(rows, thing)
     assert abs(math.cos(first)) > math.cos(math.radians(46))
 
@@ -210,7 +212,9 @@ def test_weights_of_the_terms_are_a_mean():
 
 
 def test_rows_hold_the_scores_their_parts_and_a_thumbnail(tmp_path):
-    rows, rejected = anchors_of(item_of(POST, "post"), world_of(yard(POST)), job_in(tmp_path), CONFIG)
+    rows, rejected = anchors_of(
+        item_of(POST, "post"), world_of(yard(POST)), job_of("anchor-sample", tmp_path), CONFIG
+    )
     assert sum(rejected.values()) + len(rows) >= 24
     assert len(rows) == 3
     for row in rows:
@@ -234,7 +238,9 @@ def test_only_the_best_few_are_pictured(tmp_path, monkeypatch):
     picture = Candidates.picture
     monkeypatch.setattr(Candidates, "picture", lambda self, k, *a: taken.append(k) or picture(self, k, *a))
     config = AnchorSampleConfig(pictured=5)
-    rows, rejected = anchors_of(item_of(POST, "post"), world_of(yard(POST)), job_in(tmp_path), config)
+    rows, rejected = anchors_of(
+        item_of(POST, "post"), world_of(yard(POST)), job_of("anchor-sample", tmp_path), config
+    )
     # Fewer where no other can be chosen any more.
     assert 1 <= len(taken) == len(set(taken)) <= 5
     assert rejected["not_shortlisted"] > 20

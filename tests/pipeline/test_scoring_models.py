@@ -9,9 +9,10 @@ import sys
 import cv2
 import numpy as np
 import pytest
+from support.handmade import job_of
 from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
 from support.tiny_clip import write_clip
-from support.two_coloured import POST, item_of, job_in, plain_view, redness, world_of, yard
+from support.two_coloured import POST, item_of, plain_view, redness, world_of, yard
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ScorerWeights, VlmConfig
 from aerialdojo_gen.base.errors import AgentUnavailable, AssetError, MissingPackage, UsageError
@@ -31,7 +32,7 @@ def clip(tmp_path_factory):
 
 
 def selected(config, name, folder):
-    rows, _ = anchors_of(item_of(POST, name), world_of(yard(POST)), job_in(folder), config)
+    rows, _ = anchors_of(item_of(POST, name), world_of(yard(POST)), job_of("anchor-sample", folder), config)
     assert rows[0]["selected"]
     return rows
 

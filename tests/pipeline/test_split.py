@@ -10,14 +10,12 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.handmade import box, instance, write_rows, write_scene, xyz
+from support.handmade import box, instance, job_of, write_rows, write_scene, xyz
 from support.handmade import scene as handmade_scene
 
 from aerialdojo_gen.base.config.sections import FilterConfig, SplitConfig
-from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.dataset.card import write_card
 from aerialdojo_gen.dataset.contents import counts
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import filter as filter_stage
 from aerialdojo_gen.pipeline.stages.work import split
 from aerialdojo_gen.pipeline.stages.work.quota import train_counts, train_mask
@@ -86,13 +84,9 @@ def data(tmp_path_factory):
     }.items():  # fmt: skip
         write_rows(data, table, rows)
     for name, run, config in (("filter", filter_stage.run, FilterConfig()), ("split", split.run, SplitConfig())):
-        for table, rows in run(job(name, data), config).tables.items():
+        for table, rows in run(job_of(name, data), config).tables.items():
             store.write_shard(data, table, SCENE, 0, rows)
     return data
-
-
-def job(stage, data):
-    return Job(stage, SCENE, 0, 1, 0, Embodiment(), ProjectPaths(data, data, data, data))
 
 
 def load(data, table):
@@ -127,7 +121,7 @@ def test_of_a_scene_that_is_out_of_distribution_a_fifth_trains(data, tmp_path):
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
     scene = store.read_scene(data, "scenes", SCENE).to_pylist()[0] | {"partition": "OOD"}
     write_rows(tmp_path / "data", "scenes", [scene])
-    output = split.run(job("split", tmp_path / "data"), SplitConfig())
+    output = split.run(job_of("split", tmp_path / "data"), SplitConfig())
     tables = {name: table.to_pandas() for name, table in output.tables.items()}
     n = load(data, "routes").groupby("setting").size()
     for table, instances in (("tasks", 2), ("routes", 1)):
@@ -152,7 +146,7 @@ def test_tasks_tell_the_start_and_nothing_of_the_goal(data):
 
 def test_what_training_has_seen_is_told_by_the_tables_alone(data):
     # So few training tasks that some pairs have none.
-    tables = split.run(job("split", data), SplitConfig(id_train_fraction=0.2)).tables
+    tables = split.run(job_of("split", data), SplitConfig(id_train_fraction=0.2)).tables
     tasks, routes = (
         pd.concat([tables[f"{name}/{side}"].to_pandas() for side in ("train", "test")])
         for name in ("tasks", "routes")
@@ -215,7 +209,7 @@ def test_verdicts_are_judged_by_each_candidates_own_figures(data):
         ({"min_plan_detour": 1.25}, paper["plan_detour"] >= 1.25),
         ({"min_plan_detour": 1.26}, paper["plan_detour"] >= 1.26),
     ):
-        output = filter_stage.run(job("filter", data), FilterConfig(**rule))
+        output = filter_stage.run(job_of("filter", data), FilterConfig(**rule))
         rows = output.tables["verdicts"].to_pandas().set_index("pair_id")
         assert set(rows.index[rows["keep"]]) == set(paper.index[kept])
     assert 0 < (paper["target_visible_at_start"] <= 0.25).sum() < len(paper)
@@ -264,7 +258,7 @@ def test_another_salt_renames_the_same_tasks(data, tmp_path):
     """Which candidates are released, and on which side, hangs on the pairs alone; the salt stands nowhere."""
     shutil.copytree(data, tmp_path / "data", ignore=shutil.ignore_patterns("release"))
     salt = "nobody is to know this"
-    output = split.run(job("split", tmp_path / "data"), SplitConfig(salt=salt))
+    output = split.run(job_of("split", tmp_path / "data"), SplitConfig(salt=salt))
     pair = ["start_object_id", "start_anchor_id", "target_object_id"]
     for subset in ("train", "test"):
         ours = pd.read_parquet(data / "release" / "routes" / f"id_{subset}").sort_values(pair, ignore_index=True)

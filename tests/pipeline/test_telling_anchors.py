@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.handmade import box, instance, scene
+from support.handmade import box, instance, job_of, scene
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
@@ -14,7 +14,6 @@ from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD, Patch, in_picture, off_front_rad, visible_shares
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m
@@ -39,12 +38,9 @@ CABINET = told(
 
 
 def anchors(place, node, tmp_path, config=CONFIG):
-    job = Job(
-        "anchor-sample", "U_Test_0", 0, 1, 0, Embodiment(), ProjectPaths(tmp_path, tmp_path, tmp_path, tmp_path)
-    )
     x, y, z = place[node].centroid.tolist()
     item = {"object_id": 0, "name": node, "mesh_node": node, "x_m": x, "y_m": y, "z_m": z}
-    return anchors_of(item, World.of(place, RADIUS, CONFIG.margin_m), job, config)[0]
+    return anchors_of(item, World.of(place, RADIUS, CONFIG.margin_m), job_of("anchor-sample", tmp_path), config)[0]
 
 
 def test_a_thing_is_looked_at_from_its_front_where_its_telling_part_is_seen(tmp_path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
@@ -11,20 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.contact import CONTACT_M, _feet, _gaps, stand
 from aerialdojo_gen.scenes.model import Instance
 
-ROOT = Path(__file__).resolve().parents[2]
 LEANING, UPRIGHT = (
     ("pickup_truck", "fire_engine", "bench", "picnic_table", "gas_cylinder_cage"),
     ("guard_booth", "phone_booth", "flagpole"),
 )
-
-
-@pytest.fixture(scope="module")
-def catalogue() -> Catalogue:
-    return load_catalogue(ROOT / "scene_assets")
 
 
 def thing(catalogue: Catalogue, category: str, yaw_deg: float) -> Instance:

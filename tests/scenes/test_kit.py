@@ -1,18 +1,16 @@
 """The builders of the kit, each by itself: with the arguments of plans, and with others near them."""
 
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pytest
-from support.layout_checks import catalogue, nightly_unless
+from support.layout_checks import ASSETS, catalogue, nightly_unless
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.rendering.kit_gallery import settings_of, uses_of
 from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.plans.build import build_tables
 
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 USES = uses_of(sorted(ASSETS.glob("s[cm]*/*_[01].toml")))
 # Builders that only add-map and add-terrain call: tests/imports builds with them.
 OF_PLACES = {

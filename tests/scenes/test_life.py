@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from shapely.geometry import Point
+from support import layout_checks
+from support.layout_checks import ASSETS
 
 from aerialdojo_gen.annotations.claims import SceneClaims
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
@@ -16,27 +17,20 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
 from aerialdojo_gen.scenes.checks import clashes, floating
 from aerialdojo_gen.scenes.kit.life import WALKED, life
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.build import build_site
 from aerialdojo_gen.scenes.site import Site
 
-ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 SCENES = ("U_Alley_0", "D_Flood_1", "I_RailCorridor_0")
 POSTURES = {"standing": 0, "walking": 1, "sitting": 2, "at work": 3, "on the phone": 4}
-
-
-@pytest.fixture(scope="module")
-def catalogue() -> Catalogue:
-    return load_catalogue(ASSETS)
 
 
 @cache
 def site_of(name: str) -> Site:
     path = ASSETS / "scenes" / f"{name}.toml"
-    return build_site(name, read_toml(path, AssetError), load_catalogue(ASSETS), name, path.parent)[0]
+    return build_site(name, read_toml(path, AssetError), layout_checks.catalogue(), name, path.parent)[0]
 
 
 @cache

@@ -1,26 +1,23 @@
 """What a plan may change afterwards: levelled places and single props that stand elsewhere."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.layout_checks import ASSETS, catalogue
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 YARD = ASSETS / "smoke" / "U_Courtyard_0.toml"
 
 
 def built(tmp_path, extra):
     recipe = tmp_path / YARD.name
     recipe.write_text(YARD.read_text() + extra)
-    return build_scene(recipe, load_catalogue(ASSETS))
+    return build_scene(recipe, catalogue())
 
 
 def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
@@ -46,7 +43,7 @@ def test_a_moved_prop_stays_on_the_ground():
     site = Site(
         "N_T_0",
         SceneHead.model_validate({"size_m": (60, 60), "ceiling_m": 20, "moves": {"bench_000": {"by_m": (6.0, 3.0)}}}),
-        load_catalogue(ASSETS),
+        catalogue(),
     )
     site.set_ground(rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0))
     unmoved = site.place(Placement("bench", 1.0, 2.0, variant=DRAWN))
@@ -63,7 +60,7 @@ def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
     own = rolling_terrain((60, 60), 1.0, 3, 4.0, 20.0)
     levels = {"level": [{"at": (5.0, -4.0), "radius_m": 2.0}]}
     recipe = SceneHead.model_validate({"size_m": (60, 60), "ceiling_m": 20} | levels)
-    site = Site("N_T_0", recipe, load_catalogue(ASSETS))
+    site = Site("N_T_0", recipe, catalogue())
     site.set_ground(own)
     turns = np.linspace(0.0, 2.0 * np.pi, 24)
     for radius, level in ((2.0, True), (7.5, False)):
@@ -81,7 +78,7 @@ def test_a_turned_plan_is_the_same_scene_turned(tmp_path, turn_deg):
     before = built(tmp_path, "")
     recipe = tmp_path / YARD.name
     recipe.write_text(YARD.read_text().replace("ceiling_m", f"turn_deg = {turn_deg}\nceiling_m", 1))
-    after = build_scene(recipe, load_catalogue(ASSETS))
+    after = build_scene(recipe, catalogue())
     c, s = {90: (0, 1), 180: (-1, 0), 270: (0, -1)}[turn_deg]
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     assert after.sun == before.sun

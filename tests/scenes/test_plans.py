@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -10,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point
+from support.layout_checks import ASSETS
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.plans.build import build_plan
@@ -20,7 +19,6 @@ from aerialdojo_gen.scenes.plans.schema import schema_text
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.plans.values import PlanNames
 
-ASSETS = Path(__file__).parents[2] / "scene_assets"
 PLANS = sorted(ASSETS.glob("s[cm]*/*_[01].toml"))
 HEAD = {"plan": 1, "size_m": [40, 40], "ceiling_m": 12}
 YARD = {
@@ -41,11 +39,6 @@ YARD = {
          "fit": "skip"},
     ],
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(ASSETS)
 
 
 def build(tmp_path, catalogue, plan):

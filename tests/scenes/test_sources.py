@@ -3,28 +3,23 @@
 import json
 import tomllib
 from collections import Counter
-from pathlib import Path
 
 import pytest
+from support.layout_checks import ASSETS
 
 from aerialdojo_gen.base.paper_figures import inventory
-from aerialdojo_gen.scenes.catalogue import load_catalogue
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.fixture(scope="module")
-def catalogue():
-    return load_catalogue(ROOT / "scene_assets")
 
 
 @pytest.fixture(scope="module")
 def annotations():
-    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (ROOT / "annotations").glob("*.json")}
+    return {
+        path.stem: json.loads(path.read_text(encoding="utf-8"))
+        for path in (ASSETS.parent / "annotations").glob("*.json")
+    }
 
 
 def test_every_scene_of_the_paper_has_a_recipe_and_annotations(annotations):
-    recipes = {path.stem for path in (ROOT / "scene_assets" / "scenes").glob("*.toml")}
+    recipes = {path.stem for path in (ASSETS / "scenes").glob("*.toml")}
     assert recipes == set(inventory()) == set(annotations)
 
 
@@ -46,7 +41,7 @@ def test_categories_are_told_apart_by_name(catalogue):
 
 
 def test_the_two_instances_of_a_type_differ_in_more_than_the_seed():
-    folder = ROOT / "scene_assets" / "scenes"
+    folder = ASSETS / "scenes"
     for name in inventory():
         if name.endswith("_0"):
             one, two = (tomllib.loads((folder / f"{stem}.toml").read_text()) for stem in (name, f"{name[:-1]}1"))

@@ -11,6 +11,8 @@ import numpy as np
 import pyarrow as pa
 import trimesh
 
+from aerialdojo_gen.base.config.shared import Embodiment
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -87,3 +89,8 @@ def write_scene(data: Path, place: Scene, table: str = "scenes") -> None:
 def xyz(values: Iterable[float], name: str = "{}_m") -> dict[str, float]:
     """The columns of a position."""
     return {name.format(axis): float(value) for axis, value in zip("xyz", values, strict=True)}
+
+
+def job_of(stage: str, data: Path, scene: str = "U_Test_0", part: int = 0, parts: int = 1, seed: int = 0) -> Job:
+    """A part of a stage's work on a data directory, with the body that ships."""
+    return Job(stage, scene, part, parts, seed, Embodiment(), ProjectPaths(data, data, data, data))

@@ -10,7 +10,6 @@ from support.handmade import box, ground, instance
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
-from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -42,10 +41,6 @@ POST = Instance(
 
 def world_of(place: Scene) -> World:
     return World.of(place, EMBODIMENT.radius_m, AnchorSampleConfig().margin_m)
-
-
-def job_in(folder) -> Job:
-    return Job("anchor-sample", "U_Test_0", 0, 1, 0, EMBODIMENT, ProjectPaths(folder, folder, folder, folder))
 
 
 def item_of(thing: Instance, name: str) -> dict:
