@@ -8,6 +8,7 @@ from fuzzing.mutate import Raw, toml_dumped
 from shapely.geometry import Polygon
 from support import rendered
 from support.command_line import said
+from support.layout_checks import catalogue
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.rendering import finished
@@ -23,8 +24,7 @@ from aerialdojo_gen.scenes.recipe import load_imported
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 from aerialdojo_gen.store.root import open_root
 
-SITE = {"size_m": [30, 30], "ceiling_m": 12}
-COURT = {"plan": 1, **SITE}
+COURT = {"plan": 1, "size_m": [30, 30], "ceiling_m": 12}
 WALLS = {"make": "walls", "lines": [[[0, 0], [9, 0]]], "height_m": 3, "material": "brick"}
 ROOF = {"shape": "block", "role": "roof_tiles", "corners": [-6, -6, 0, 0], "z": [3, 3.2]}
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
@@ -54,8 +54,17 @@ def recipe(tmp_path, body):
     return path
 
 
+ROLLING = {"make": "rolling_ground", "cell_m": 1, "height_m": 1, "wavelength_m": 20}
+VALLEY = {"make": "stepped_valley", "cell_m": 2, "bed": [[-9, 0], [9, 0]], "roughness_m": 1, "steps": [[5, 5, 1]]}
+ROCKS, FAR = {"make": "layered_rocks", "bands": ["rock"]}, {"disc": [200, 100, 4]}
+
+
+def drawn(*parts):
+    return {"category": "roof", "parts": [ROOF | part for part in parts]}
+
+
 @pytest.mark.parametrize(
-    ("change", "place"),
+    ("change", "says"),
     [
         ({"size_m": [float("nan"), 30]}, "size_m[0]: is nan, no finite number"),
         ({"sun": [0, 0, float("inf")]}, "sun[2]: is inf, no finite number"),
@@ -65,14 +74,24 @@ def recipe(tmp_path, body):
         ({"site": [{"entries": [{}] * 1500}, {"entries": [{}] * 501}]}, "more than 2,000 entries"),
         ({"site": [{"entries": 3}]}, "site[0]: entries is a list of entries"),
         ({"attribution": "A" * 501}, "attribution = "),
+        ({"steps": [ROLLING, {"make": "level_area", "area": FAR}]}, "the ground about (200, 100) lies off the site"),
+        ({"steps": [VALLEY]}, "a step ends 0.05 m or more beyond where it begins"),
+        ({"steps": [{"make": "massif", "ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}]},
+         "line.0.2 = -1: Input should be greater than or equal to 0"),
+        ({"steps": [{"make": "level_along", "lines": [[[-2000, 0], [2000, 0]]], "width_m": 2}]},
+         "a way may be 3,000 m long"),
     ],
-)
-def test_a_plan_s_numbers_are_bounded_before_anything_is_made_of_them(project, tmp_path, change, place):
-    path = recipe(tmp_path, COURT | change)
+)  # fmt: skip
+def test_a_plan_s_numbers_are_bounded_before_anything_is_made_of_them(tmp_path, change, says):
+    change = {"ground": change} if "steps" in change else change
+    assert_refused(recipe(tmp_path, COURT | change), says)
+
+
+def assert_refused(path, says, place=""):
     with pytest.raises(AssetError) as refused:
-        build_scene(path, load_catalogue(project / "scene_assets"))
-    assert str(refused.value).startswith(str(path))
-    assert place in str(refused.value)
+        build_scene(path, catalogue())
+    assert str(refused.value).startswith(f"{path}: {place}")
+    assert says in str(refused.value)
 
 
 def assert_named(message, start, place):
@@ -90,53 +109,21 @@ def assert_named(message, start, place):
         ({"paint": [0, 0, float("inf"), 9], "material": "mud"}, ".paint[2]: is inf, no finite number"),
         ({"paint": [-6, False, 0, 0], "material": "mud"}, "a number or an expression is wanted, got False"),
         ({"paint": [-6, -1e-300, 0, 0], "material": "mud"}, "a rectangle must be 0.01 m wide and deep or more"),
-        ({"parts": [ROOF | {"corners": ["nan", -6, 0, 0]}]}, "parts[0] (block): 'nan' speaks of"),
-        ({"parts": [ROOF | {"corners": [-6, -1e-300, 0, 0]}]}, "parts[0] (block): the outline has no area"),
+        (drawn({"corners": ["nan", -6, 0, 0]}), "parts[0] (block): 'nan' speaks of"),
+        (drawn({"corners": [-6, -1e-300, 0, 0]}), "parts[0] (block): the outline has no area"),
         (WALLS | {"lines": [[[1, 1], [1, 1]]]}, "consecutive points of a line must be 0.01 m apart"),
         (WALLS | {"lines": [[[0, 0], [1e7, 0]]]}, "must lie within 2,000"),
         (WALLS | {"height_m": 0}, "height_m = 0: Input should be greater than 0"),
         ({"place": [["bench", 0, 0, "inf"]]}, "(place)[0]: yaw_deg = 'inf': 'inf' speaks of"),
-    ],
-)
-def test_what_a_plan_draws_has_a_length_and_an_area(project, tmp_path, entry, says):
-    category = {"category": "roof"} if "parts" in entry else {}
-    path = recipe(tmp_path, {"plan": 1, **SITE, "site": [entry | category]})
-    with pytest.raises(AssetError) as refused:
-        build_scene(path, load_catalogue(project / "scene_assets"))
-    assert str(refused.value).startswith(f"{path}: site[0]")
-    assert says in str(refused.value)
-
-
-ROLLING = {"make": "rolling_ground", "cell_m": 1, "height_m": 1, "wavelength_m": 20}
-FAR = {"disc": [200, 100, 4]}
-
-
-@pytest.mark.parametrize(
-    ("parts", "says"),
-    [
-        ({"ground": {"steps": [ROLLING, {"make": "level_area", "area": FAR}]}},
-         "the ground about (200, 100) lies off the site"),
-        ({"ground": {"steps": [{"make": "stepped_valley", "cell_m": 2, "bed": [[-9, 0], [9, 0]], "roughness_m": 1,
-                                "steps": [[5, 5, 1]]}]}}, "a step ends 0.05 m or more beyond where it begins"),
-        ({"ground": {"steps": [{"make": "massif", "ridges": [{"line": [[0, 0, -1]], "width_m": 9}]}]}},
-         "line.0.2 = -1: Input should be greater than or equal to 0"),
-        ({"ground": {"steps": [{"make": "level_along", "lines": [[[-2000, 0], [2000, 0]]], "width_m": 2}]}},
-         "a way may be 3,000 m long"),
-        ({"site": [{"make": "layered_rocks", "bands": ["rock"],
-                    "rocks": [{"area": FAR, "name": "far", "height_m": 3}]}]}, "rock_000 has no body"),
-        ({"site": [{"make": "mudbrick_houses", "houses": [{"at": [0, 0], "name": "a", "size_m": [0.5, 5, 3]}]}]},
+        (ROCKS | {"rocks": [{"area": FAR, "name": "far", "height_m": 3}]}, "rock_000 has no body"),
+        ({"make": "mudbrick_houses", "houses": [{"at": [0, 0], "name": "a", "size_m": [0.5, 5, 3]}]},
          "[houses.0] size_m.0 = 0.5: Input should be greater"),
-        ({"site": [{"make": "layered_rocks", "bands": ["rock"], "as": ["low", "high"],
-                    "rocks": [{"area": [0, 0, 4, 4], "name": "one", "height_m": 3}]}]},
+        (ROCKS | {"as": ["low", "high"], "rocks": [{"area": [0, 0, 4, 4], "name": "one", "height_m": 3}]},
          "'layered_rocks' returns no height for each name of 'as'"),
     ],
 )  # fmt: skip
-def test_what_a_builder_cannot_make_is_an_error_of_its_plan(project, tmp_path, parts, says):
-    path = recipe(tmp_path, {"plan": 1, "size_m": [30, 30], "ceiling_m": 12} | parts)
-    with pytest.raises(AssetError) as refused:
-        build_scene(path, load_catalogue(project / "scene_assets"))
-    assert str(refused.value).startswith(f"{path}: ")
-    assert says in str(refused.value)
+def test_what_an_entry_cannot_make_is_an_error_of_its_plan(tmp_path, entry, says):
+    assert_refused(recipe(tmp_path, COURT | {"site": [entry]}), says, "site[0]")
 
 
 def test_ground_stays_a_number_where_an_area_to_be_levelled_has_shrunk_to_nothing():
