@@ -254,6 +254,13 @@ def test_outcomes_of_what_cannot_be_planned():
     assert unsolved.poses.shape == (0, 4)
 
 
+def test_what_lies_beyond_the_longest_length_is_no_path():
+    config = PlanConfig(max_length_m=10.0)
+    planner = Planner(scene(), config, RADIUS)
+    outcomes = [r.outcome for r in planner.plan_target((0, 0, 5, 0), [(8, 0, 5, 0), (-13, 0, 5, 0)])]
+    assert outcomes == ["SOLVED", "NO_PATH"]
+
+
 def test_a_rung_that_fails_counts_too_and_the_next_one_is_tried():
     start, goal = (-16.0, -16.0, 1.0, 0.0), (16.0, 16.0, 1.0, 0.0)
     wide, narrow = SearchAttempt(weight=1.05, budget=20_000), SearchAttempt(weight=1.05, budget=3)
