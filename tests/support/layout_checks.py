@@ -100,6 +100,14 @@ def clashes(scene: Scene, share: float = 0.2, bearers: Collection[str] = ()) -> 
     return checks.clashes(scene, catalogue(), share, bearers)
 
 
+def touching(things: Iterable[Instance]) -> set[tuple[str, str]]:
+    """Pairs of things whose meshes run into one another."""
+    manager = trimesh.collision.CollisionManager()
+    for thing in things:
+        manager.add_object(thing.node, trimesh.Trimesh(thing.vertices, thing.faces, process=False))
+    return set(manager.in_collision_internal(return_names=True)[1])
+
+
 def walled_in(scene: Scene, structure: Collection[str]) -> list[str]:
     """List the props whose top lies inside closed structure of these categories: an odd number of faces above it."""
     solids = [trimesh.Trimesh(i.vertices, i.faces, process=False) for i in scene.instances if i.category in structure]
