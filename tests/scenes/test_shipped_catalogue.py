@@ -204,8 +204,9 @@ def test_no_design_changes_a_thing_beyond_use(catalogue, bodies):
 
 
 @pytest.mark.slow
-def test_all_that_the_catalogue_says_of_targets_is_so_of_every_variant_it_builds(catalogue):
-    assert catalogue_faults(catalogue) == []
+@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.nightly)])
+def test_all_that_the_catalogue_says_of_targets_is_so_of_every_variant_it_builds(catalogue, every):
+    assert catalogue_faults(catalogue, every=every) == []
 
 
 def test_every_surface_can_be_drawn(catalogue):
