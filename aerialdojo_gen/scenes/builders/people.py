@@ -18,8 +18,8 @@ _BODY_M = 1.75
 _HIP, _KNEE, _ANKLE = 0.93, 0.5, 0.08
 _SHOULDER, _HEAD = 1.43, 1.61
 _UPPER_ARM, _FOREARM, _THIGH, _SHIN = 0.29, 0.25, 0.43, 0.42
-_STAND, _WALK, _SIT, _WORK, _CALL, _ON_SEAT, _RIDE = range(7)
-_SEATED = frozenset({_SIT, _ON_SEAT, _RIDE})
+_STAND, _WALK, _SIT, _WORK, _CALL, _ON_SEAT, RIDE = range(7)
+_SEATED = frozenset({_SIT, _ON_SEAT, RIDE})
 _ABOVE_SEAT_M = 0.09  # the hips' middle over what bears them
 
 
@@ -27,9 +27,9 @@ _ABOVE_SEAT_M = 0.09  # the hips' middle over what bears them
 def person(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Person who stands, walks, sits, works bent, calls or rides, in what the parameters dress them in."""
     posture = round(params["posture"])
-    lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0, _ON_SEAT: -3.0, _RIDE: params.get("lean", 0.0)}.get(posture, 0.0)
+    lean_deg = {_WORK: 38.0, _WALK: 4.0, _SIT: -6.0, _ON_SEAT: -3.0, RIDE: params.get("lean", 0.0)}.get(posture, 0.0)
     hip_m = {_SIT: 0.11, _WORK: _HIP - 0.09, _WALK: _HIP - 0.015}.get(posture, _HIP)
-    if posture in (_ON_SEAT, _RIDE):
+    if posture in (_ON_SEAT, RIDE):
         hip_m = params["seat"] * _BODY_M / params["height"] + _ABOVE_SEAT_M
     upper = _upper(rng, params, posture, lean_deg)
     out = [(role, posed(body, rotation(0.0, lean_deg, 0.0), vec(0.0, 0.0, hip_m))) for role, body in upper]
@@ -57,7 +57,7 @@ def _upper(rng: np.random.Generator, params: Mapping[str, float], posture: int, 
         flare = limb([(0, 0, -0.34), (0, 0, -0.05), (0, 0, 0.1)], [0.215 * stout, 0.175 * stout, 0.155 * stout], 10)
         out.append(("top", stretched(flare, np.array([0.8, 1.0, 1.0]))))
     out += _head(params, neck + 0.06)
-    grips = _grips(params, up, lean_deg) if posture == _RIDE else _hanging(rng, posture, up, lean_deg)
+    grips = _grips(params, up, lean_deg) if posture == RIDE else _hanging(rng, posture, up, lean_deg)
     out += _arms(params, grips)
     if params["vest"]:
         for z, r in ((0.2, 0.163), (0.32, 0.181)):
@@ -181,7 +181,7 @@ def _legs(rng: np.random.Generator, params: Mapping[str, float], posture: int, h
             knee, ankle = vec(_THIGH, side * (0.1 + spread), hip_m - 0.01), vec(0, side * (0.1 + spread), _ANKLE)
             down = float(knee[2]) - _ANKLE
             ankle[0] = knee[0] + min(math.sqrt(max(_SHIN * _SHIN - down * down, 0.0)), 0.2)
-        elif posture == _RIDE:
+        elif posture == RIDE:
             foot_m = params["foot_z"] + side * params["foot_dz"]
             ankle = vec(params["foot_x"], side * params["foot_y"], foot_m + _ANKLE)
             knee = _joint(hip, ankle, _THIGH, _SHIN, 1.0)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from aerialdojo_gen.scenes.builders import builder
-from aerialdojo_gen.scenes.builders.people import Parts, person
+from aerialdojo_gen.scenes.builders.people import RIDE, Parts, person
 from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, cylinder, sphere, torus
 from aerialdojo_gen.scenes.shapes_extruded import profile, sweep
@@ -21,14 +21,13 @@ _RIDES: dict[int, dict[str, float]] = {
     1: {"seat": 0.82, "lean": 16.0, "grip_x": 0.56, "grip_y": 0.35, "grip_z": 1.06,
         "foot_x": 0.22, "foot_y": 0.22, "foot_z": 0.3, "foot_dz": 0.0},
 }  # fmt: skip
-_RIDE = 6
 
 
 @builder
 def rider(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Person on a bicycle, or with ``motor = 1`` on a motorcycle."""
     motor = round(params["motor"])
-    own = person(rng, {**params, **_RIDES[motor], "posture": _RIDE, "height": 1.75})
+    own = person(rng, {**params, **_RIDES[motor], "posture": RIDE, "height": 1.75})
     x = _SADDLE_X_M[motor]
     return [*(_motorcycle() if motor else _bicycle()), *((role, translated(m, (x, 0.0, 0.0))) for role, m in own)]
 
