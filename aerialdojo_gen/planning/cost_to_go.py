@@ -18,17 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.column_kernels import (
-    FLAT,
-    KIND_OF,
-    KINDS,
-    QUANTUM_M,
-    UP,
-    departure_costs,
-    move_lengths,
-    relax,
-    relax_vertical,
-)
+from aerialdojo_gen.planning.column_kernels import FLAT, QUANTUM_M, UP, move_lengths
+from aerialdojo_gen.planning.column_lanes import LANES, MIN_CELLS, relax_column, relax_flat
 from aerialdojo_gen.planning.connectivity import MOVES, cell_centre
 from aerialdojo_gen.planning.grid_kernels import GridArrays, segment_free
 from aerialdojo_gen.planning.preference import Preference, approach_penalty, clearance_penalty
@@ -87,7 +78,6 @@ def seed_goal(
     return found[:n]
 
 
-@njit(cache=True, error_model="numpy")
 def expand_cost(
     seeds: NDArray[np.int32],
     order: NDArray[np.int32],
@@ -101,11 +91,31 @@ def expand_cost(
 
     Label-correcting by columns, equal to Dijkstra's to the bit as quanta add up exactly.
     """
+    lacking = MIN_CELLS - cost.shape[2]
+    if lacking <= 0:
+        return int(_expand(seeds, order, bound, cell, moves, cost, clearance_cost))
+    # Impassable cells on top make a low grid's columns long enough.
+    high = [
+        np.pad(a, ((0, 0), (0, 0), (0, lacking)), constant_values=v)
+        for a, v in ((moves, 0), (cost, np.inf), (clearance_cost, 0))
+    ]
+    column, k = np.divmod(seeds, cost.shape[2])
+    visits = int(_expand((column * MIN_CELLS + k).astype(np.int32), order, bound, cell, *high))
+    cost[:] = high[1][:, :, :-lacking]
+    return visits
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(
+    seeds: NDArray[np.int32], order: NDArray[np.int32], bound: float, cell: float, moves: NDArray[np.uint32],
+    cost: NDArray[np.float32], clearance_cost: NDArray[np.float32],
+) -> int:  # fmt: skip
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(cell)
     limit = np.float32(bound)
-    queued, departures = np.zeros((nx, ny), np.bool_), np.empty(len(KINDS) * nz, np.float32)
-    costs, passable, flat_clearance_cost = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    queued = np.zeros((nx, ny), np.bool_)
+    costs, passable, clearance = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
+    targets, improved = np.empty(len(FLAT), np.int64), np.empty(len(FLAT), np.uint8)
     n_queued, visits = 0, 0
     middle_i, middle_j = 0, 0
     for seed in seeds:
@@ -126,18 +136,17 @@ def expand_cost(
             n_queued -= 1
             visits += 1
             base = (i * ny + j) * nz
-            relax_vertical(costs, passable, flat_clearance_cost, base, base + nz, lengths[UP], coarse[UP])
-            for kind in range(len(KINDS)):
-                k = KINDS[kind]
-                departure_costs(costs, flat_clearance_cost, base, nz, lengths[k], coarse[k], departures, kind * nz)
-            for m in FLAT:
-                u, v = i + MOVES[m, 0], j + MOVES[m, 1]
-                if (
-                    0 <= u < nx
-                    and 0 <= v < ny
-                    and relax(departures, KIND_OF[m] * nz, passable, base, costs, (u * ny + v) * nz, nz, m, limit)
-                    and not queued[u, v]
-                ):
+            relax_column(costs, passable, clearance, base, nz, lengths[UP], coarse[UP])
+            for m in range(len(FLAT)):
+                u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+                targets[m] = (u * ny + v) * nz if 0 <= u < nx and 0 <= v < ny else -1
+            improved[:] = 0
+            for k in range(0, nz, LANES):
+                k = min(k, nz - LANES)
+                relax_flat(costs, passable, clearance, base + k, k, lengths, coarse, targets, limit, improved)
+            for m in range(len(FLAT)):
+                u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+                if improved[m] and not queued[u, v]:
                     queued[u, v] = True
                     n_queued += 1
         if visits == visits_before:

@@ -24,9 +24,10 @@ def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
 
 
 @pytest.mark.parametrize("prefer", [NO_PREFERENCE, Preference(1.0, 2.0, 0.5, 3.0)])
-def test_it_is_dijkstras_on_the_same_graph(prefer):
-    """Visits to columns against scipy's heap over every passable move."""
-    grid = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16))
+@pytest.mark.parametrize("ceiling", [6.0, 8.0, 13.0])
+def test_it_is_dijkstras_on_the_same_graph(prefer, ceiling):
+    """Visits to columns, lower and higher than a group of cells, against scipy's heap over every passable move."""
+    grid = ClearanceGrid.build(town(half=12.0, ceiling=ceiling, n=16))
     goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
     cost, seeds, _ = field(grid, goal, prefer=prefer)
     clearance_cost = clearance_cost_field(grid.arrays.field, prefer).ravel()
