@@ -124,51 +124,6 @@ def _next_node(node: int) -> int:
     return node + 1 if node else 0
 
 
-@njit(cache=True, inline="always")
-def _clip(p: float, d: float, low: float, high: float, t0: float, t1: float) -> tuple[float, float]:
-    """Clip the interval t0 to t1 of a segment p + t d to the slab between two planes."""
-    if d == 0.0:
-        return (t0, t1) if low <= p <= high else (1.0, 0.0)
-    a, b = (low - p) / d, (high - p) / d
-    return max(t0, min(a, b)), min(t1, max(a, b))
-
-
-@njit(cache=True, error_model="numpy")
-def segment_blocker(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    radius: float, tri: NDArray[np.float64], boxes: NDArray[np.float64],
-) -> int:  # fmt: skip
-    """Row of a triangle that lies within `radius` of the segment pq, -1 if there is none."""
-    dx, dy, dz = qx - px, qy - py, qz - pz
-    lx, ly, lz = min(px, qx) - radius, min(py, qy) - radius, min(pz, qz) - radius
-    hx, hy, hz = max(px, qx) + radius, max(py, qy) + radius, max(pz, qz) + radius
-    leaves, n = boxes.shape[0] // 2, tri.shape[0]
-    r2 = radius * radius
-    node = 1
-    while node > 0:
-        ax, ay, az, bx, by, bz = (
-            boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3], boxes[node, 4], boxes[node, 5]
-        )  # fmt: skip
-        disjoint = ax > hx or ay > hy or az > hz or bx < lx or by < ly or bz < lz
-        if not disjoint:
-            # The bounding box of a slanted segment is too coarse: clip the segment itself.
-            t0, t1 = _clip(px, dx, ax - radius, bx + radius, 0.0, 1.0)
-            t0, t1 = _clip(py, dy, ay - radius, by + radius, t0, t1)
-            t0, t1 = _clip(pz, dz, az - radius, bz + radius, t0, t1)
-            disjoint = t0 > t1
-        if disjoint:
-            node = _next_node(node)
-        elif node < leaves:
-            node *= 2
-        else:
-            first = (node - leaves) * LEAF
-            for k in range(first, min(first + LEAF, n)):
-                if segment_triangle_d2(px, py, pz, qx, qy, qz, tri, k, radius) <= r2:
-                    return k
-            node = _next_node(node)
-    return -1
-
-
 @njit(cache=True)
 def segment_distance(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,

@@ -14,6 +14,7 @@ from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
 from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, nearest_owners, point_distance
+from aerialdojo_gen.planning.bvh_groups import group_boxes
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, passable_moves, reaches_marked_cell
 from aerialdojo_gen.planning.distance_field import build_distance_field
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
@@ -57,7 +58,7 @@ class _SolidSpace:
         band_m = max(band_m, 0.87 * cell_m)
         field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
         arrays = GridArrays(
-            field, low.copy(), cell_m, solid, boxes, real, real_boxes, low + radius_m, high - radius_m
+            field, low.copy(), cell_m, solid, group_boxes(boxes), real, real_boxes, low + radius_m, high - radius_m
         )
         return cls(arrays, ground, len(curtain) > 0, owner[rows[order]])
 

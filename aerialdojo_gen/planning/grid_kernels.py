@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import segment_triangle_d2
-from aerialdojo_gen.planning.bvh import point_distance, segment_blocker, segment_distance
+from aerialdojo_gen.planning.bvh import point_distance, segment_distance
+from aerialdojo_gen.planning.bvh_groups import segment_blocker
 
 FREE, UNKNOWN = -1, -2
 
@@ -22,7 +23,7 @@ class GridArrays(NamedTuple):
     origin: NDArray[np.float64]  # (3,) float64; lower corner of cell (0, 0, 0), metres
     cell: float  # Edge of a cell, metres
     tri: NDArray[np.float64]
-    boxes: NDArray[np.float64]
+    groups: NDArray[np.float32]  # `aerialdojo_gen.planning.bvh_groups.group_boxes` of the tree of `tri`
     real_tri: NDArray[np.float64]
     real_boxes: NDArray[np.float64]
     lower: NDArray[np.float64]  # (3,) float64; where the body's centre may be, metres
@@ -72,7 +73,7 @@ def find_blocker(
     if length == 0.0:
         if bound_at(px, py, pz, ox, oy, oz, cell, field) > radius:
             return FREE
-        return UNKNOWN if prove_only else segment_blocker(px, py, pz, qx, qy, qz, radius, grid.tri, grid.boxes)
+        return UNKNOWN if prove_only else segment_blocker(px, py, pz, qx, qy, qz, radius, grid.tri, grid.groups)
     ux, uy, uz = dx / length, dy / length, dz / length
     t, t0 = 0.0, -1.0  # t0: start of the undecided part, negative for none
     while t < length:
@@ -99,7 +100,7 @@ def find_blocker(
         if t0 >= 0.0:
             found = segment_blocker(
                 px + t0 * ux, py + t0 * uy, pz + t0 * uz, px + t * ux, py + t * uy, pz + t * uz,
-                radius, grid.tri, grid.boxes,
+                radius, grid.tri, grid.groups,
             )  # fmt: skip
             if found >= 0:
                 return found
