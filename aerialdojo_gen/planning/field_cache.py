@@ -23,7 +23,7 @@ class FieldCache:
     def __init__(self, plain_mb: float, packed_mb: float) -> None:
         self._free_bytes = {True: plain_mb * 1e6, False: packed_mb * 1e6}
         self._plain: dict[bytes, NDArray[np.float32]] = {}
-        self._packed: dict[bytes, pa.Buffer] = {}
+        self._packed: dict[bytes, bytes] = {}
 
     def find(self, goal: bytes, scratch: NDArray[np.float32]) -> NDArray[np.float32] | None:
         """Return a goal's field (nx, ny, nz), decompressed into `scratch` if necessary; None if not cached."""
@@ -42,8 +42,9 @@ class FieldCache:
         elif self._free_bytes[False] > 0.0:
             steps = np.empty(field.size, np.int32)
             _pack(field.reshape(-1), steps)
-            packed = pa.compress(steps, _CODEC)
-            if self._reserve(False, packed.size):
+            # A copy: Arrow's buffer is as large as the worst case, and keeps pages that it does not need.
+            packed = pa.compress(steps, _CODEC, asbytes=True)
+            if self._reserve(False, len(packed)):
                 self._packed[goal] = packed
 
     def _reserve(self, plain: bool, n_bytes: int) -> bool:
