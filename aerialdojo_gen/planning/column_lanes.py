@@ -3,7 +3,7 @@
 LLVM turns a loop over a column into groups of 32 cells and leaves the others to a scalar loop, and cannot vectorise
 vertical moves, where each cell waits for the one below. So these functions emit vector instructions themselves. The
 last group of a column overlaps the one before: a relaxation may be repeated. Costs are whole quanta, so that sums do
-not depend on their order, and results are those of `column_kernels`, to the bit.
+not depend on their order, and results are those of loops over single cells, to the bit.
 """
 
 from __future__ import annotations
@@ -72,43 +72,42 @@ def _data(context: Any, b: Any, signature: Any, args: Any, *places: int) -> list
 @intrinsic
 def relax_flat(
     _: Any, costs: Any, passable: Any, clearance: Any, at: Any, k: Any, lengths: Any, coarse: Any, targets: Any,
-    bound: Any, improved: Any,
+    limits: Any, improved: Any,
 ) -> tuple[Any, Callable[..., Any]]:  # fmt: skip
     """Relax the level moves from the group of cells at `at`, which is at height `k` of its column.
 
-    `targets` has the first cell of the column that each move leads to, negative for none; `improved` is set to 1
-    where a cost there decreased.
+    `targets` has the first cell of the column that each move leads to, negative for none, and `limits` the largest
+    cost that is written there; `improved` is set to 1 where a cost decreased.
     """
 
     def emit(context: Any, b: Any, signature: Any, args: Any) -> Any:
-        costs, passable, clearance, lengths, coarse, targets, improved = _data(
-            context, b, signature, args, 0, 1, 2, 5, 6, 7, 9
+        costs, passable, clearance, lengths, coarse, targets, limits, improved = _data(
+            context, b, signature, args, 0, 1, 2, 5, 6, 7, 8, 9
         )
-        at, k, bound = args[3], args[4], _splat(b, args[8])
+        at, k = args[3], args[4]
         cost, moves = _load(b, costs, at, _FLOATS), _load(b, passable, at, _INTS)
         near = _load(b, clearance, at, _FLOATS)
         reached = []
         for move in KINDS.tolist():
             place = [ir.Constant(_INT64, move)]
             leaving = _leaving_costs(b, b.load(b.gep(lengths, place)), b.load(b.gep(coarse, place)), near)
-            total = b.fadd(cost, leaving)
-            reached.append(b.select(b.fcmp_ordered("<=", total, bound), total, _INFINITE))
+            reached.append(b.fadd(cost, leaving))
         for number, move in enumerate(FLAT.tolist()):
             place, new = [ir.Constant(_INT64, number)], reached[KIND_OF[move]]
             target = b.load(b.gep(targets, place))
             with b.if_then(b.icmp_signed(">=", target, ir.Constant(_INT64, 0))):
                 there = _group(b, costs, b.add(target, k), _FLOATS)
                 old = b.load(there, align=4)
+                limit = _splat(b, b.load(b.gep(limits, place)))
                 better = b.and_(_passes(b, moves, move), b.fcmp_ordered("<", new, old))
+                better = b.and_(better, b.fcmp_ordered("<=", new, limit))
                 with b.if_then(_any(b, better)):
                     b.store(b.select(better, new, old), there, align=4)
                     b.store(ir.Constant(_INT8, 1), b.gep(improved, place))
         return context.get_dummy_value()
 
     places = types.intp
-    return types.void(
-        costs, passable, clearance, places, places, lengths, coarse, targets, types.float32, improved
-    ), emit
+    return types.void(costs, passable, clearance, places, places, lengths, coarse, targets, limits, improved), emit
 
 
 def _scan(move: int) -> Any:
@@ -161,7 +160,7 @@ def relax_column(
     costs: NDArray[np.float32], passable: NDArray[np.uint32], clearance: NDArray[np.float32], first: int, n: int,
     length: np.float32, coarse: np.float32,
 ) -> None:  # fmt: skip
-    """Relax the vertical moves between n cells from `first` on, n at least `MIN_CELLS`: `relax_vertical`, faster."""
+    """Relax the vertical moves between n cells from `first` on, up and then down; n is at least `MIN_CELLS`."""
     for k in range(1, n, LANES):
         at = first + min(k, n - LANES)
         _scan_up(costs, passable, clearance, at, length, coarse, costs[at - 1])

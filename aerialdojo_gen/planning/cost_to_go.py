@@ -112,7 +112,7 @@ def _expand(
 ) -> int:  # fmt: skip
     nx, ny, nz = cost.shape
     lengths, coarse = move_lengths(cell)
-    limit = np.float32(bound)
+    limits = np.full(len(FLAT), bound, np.float32)
     queued = np.zeros((nx, ny), np.bool_)
     costs, passable, clearance = cost.reshape(-1), moves.reshape(-1), clearance_cost.reshape(-1)
     targets, improved = np.empty(len(FLAT), np.int64), np.empty(len(FLAT), np.uint8)
@@ -143,7 +143,7 @@ def _expand(
             improved[:] = 0
             for k in range(0, nz, LANES):
                 k = min(k, nz - LANES)
-                relax_flat(costs, passable, clearance, base + k, k, lengths, coarse, targets, limit, improved)
+                relax_flat(costs, passable, clearance, base + k, k, lengths, coarse, targets, limits, improved)
             for m in range(len(FLAT)):
                 u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
                 if improved[m] and not queued[u, v]:

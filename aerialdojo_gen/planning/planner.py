@@ -17,6 +17,7 @@ from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
 from aerialdojo_gen.planning.certify import certify_profile
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
+from aerialdojo_gen.planning.column_lanes import MIN_CELLS
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, expand_cost, seed_goal
 from aerialdojo_gen.planning.field_cache import FieldCache
 from aerialdojo_gen.planning.hybrid_astar import EXHAUSTED, FOUND, SearchArrays, SearchOptions, make_search_arrays
@@ -149,7 +150,8 @@ class Planner:
         """
         goal_pose, (start_pose,) = _poses(goal, start)
         weight = self.config.ladder[0].weight
-        if weight < 1.0 or self.grid.in_collision(goal_pose[:3]) or self._blocked(start_pose):
+        low = self.grid.moves.shape[2] < MIN_CELLS
+        if low or weight < 1.0 or self.grid.in_collision(goal_pose[:3]) or self._blocked(start_pose):
             return self.plan_target(goal_pose, start_pose)[0]
         if self._near_field is None:
             self._near_field = NearField(self.grid, self._clearance_cost)

@@ -22,16 +22,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.column_kernels import (
-    FLAT,
-    KIND_OF,
-    KINDS,
-    UP,
-    departure_costs,
-    move_lengths,
-    relax,
-    relax_vertical,
-)
+from aerialdojo_gen.planning.column_kernels import FLAT, UP, move_lengths
+from aerialdojo_gen.planning.column_lanes import LANES, MIN_CELLS, relax_column, relax_flat
 from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
 from aerialdojo_gen.planning.grid_kernels import GridArrays
 from aerialdojo_gen.planning.grid_path import GAVE_UP, grid_metric, make_path_arrays, short_path_cost
@@ -39,8 +31,6 @@ from aerialdojo_gen.planning.grid_path import GAVE_UP, grid_metric, make_path_ar
 # Columns are queued in bins half a cell wide; the longest move is just under five bins.
 _BINS = 8
 _DELAY = (2.0 * MOVE_LENGTHS).astype(np.int64)
-# Ranges of cells begin and end at multiples of this, the width of SIMD instructions.
-_LANES = 8
 # A straight Approach is shorter than in the grid's metric by less than this share of its length.
 _APPROACH_SAVING = 0.45
 
@@ -93,9 +83,9 @@ def _span(
     # Solve |z - start| + weight · |z - goal| = left outside of the two; between them nothing is cut off.
     low = min(low, (start[2] + weight * goal[2] - remaining) / (1.0 + weight))
     high = max(high, (start[2] + weight * goal[2] + remaining) / (1.0 + weight))
-    first = max(0, int((low - oz) / cell - 0.5)) // _LANES * _LANES
-    last = (max(0, int((high - oz) / cell + 0.5)) // _LANES + 1) * _LANES
-    return min(first, nz - 1), min(last, nz), (reach - from_start) / weight
+    first = max(0, int((low - oz) / cell - 0.5))
+    last = min(max(int((high - oz) / cell + 0.5) + 1, first + MIN_CELLS), nz)
+    return min(first, last - MIN_CELLS), last, (reach - from_start) / weight
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,7 +101,8 @@ def expand_query(
         arrays.first, arrays.last, arrays.limit, arrays.waiting, arrays.next, arrays.columns
     )  # fmt: skip
     lengths, coarse = move_lengths(grid.cell)
-    leaving = np.empty(len(KINDS) * nz, np.float32)
+    targets, limits = np.empty(len(FLAT), np.int64), np.empty(len(FLAT), np.float32)
+    improved = np.empty(len(FLAT), np.uint8)
     bins = np.full(_BINS, -1, np.int32)
     n, remaining, bin_number = 0, 0, 0
     for seed in seeds:
@@ -133,36 +124,27 @@ def expand_query(
         i, j = c // ny, c % ny
         waiting[i, j] = False
         k0, k1, base = first[i, j], last[i, j], c * nz
-        relax_vertical(costs, flat_moves, flat_clearance, base + k0, base + k1, lengths[UP], coarse[UP])
-        for kind in range(len(KINDS)):
-            m = KINDS[kind]
-            departure_costs(costs, flat_clearance, base + k0, k1 - k0, lengths[m], coarse[m], leaving, kind * nz + k0)
-        for m in FLAT:
-            u, v = i + MOVES[m, 0], j + MOVES[m, 1]
+        relax_column(costs, flat_moves, flat_clearance, base + k0, k1 - k0, lengths[UP], coarse[UP])
+        for m in range(len(FLAT)):
+            u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+            targets[m], improved[m] = -1, 0
             if not (0 <= u < nx and 0 <= v < ny) or last[u, v] < 0:
                 continue
-            d = u * ny + v
             if last[u, v] == 0:
                 first[u, v], last[u, v], most = _span(u, v, start, goal, approach, reach, weight, grid)
-                limit[u, v], columns[n] = min(bound, most), d
+                limit[u, v], columns[n] = min(bound, most), u * ny + v
                 n += 1
-            b0, b1 = max(k0, first[u, v]), min(k1, last[u, v])
-            if (
-                b0 < b1
-                and relax(
-                    leaving,
-                    KIND_OF[m] * nz + b0,
-                    flat_moves,
-                    base + b0,
-                    costs,
-                    d * nz + b0,
-                    b1 - b0,
-                    m,
-                    limit[u, v],
-                )
-                and not waiting[u, v]
-            ):
-                b = (bin_number + _DELAY[m]) % _BINS
+            if last[u, v] > 0:
+                targets[m], limits[m] = (u * ny + v) * nz, limit[u, v]
+        for k in range(k0, k1, LANES):
+            k = min(k, k1 - LANES)
+            relax_flat(
+                costs, flat_moves, flat_clearance, base + k, k, lengths, coarse, targets, limits, improved
+            )  # fmt: skip
+        for m in range(len(FLAT)):
+            u, v = i + MOVES[FLAT[m], 0], j + MOVES[FLAT[m], 1]
+            if improved[m] and not waiting[u, v]:
+                d, b = u * ny + v, (bin_number + _DELAY[FLAT[m]]) % _BINS
                 waiting[u, v], nexts[d], bins[b] = True, bins[b], d
                 remaining += 1
     return n
@@ -177,7 +159,7 @@ def clear_query(n: int, seeds: NDArray[np.int32], arrays: QueryArrays) -> None:
     for a in range(n):
         i, j = arrays.columns[a] // ny, arrays.columns[a] % ny
         if arrays.last[i, j] > 0:
-            arrays.cost[i, j, arrays.first[i, j] : arrays.last[i, j]] = np.inf
+            arrays.cost[i, j] = np.inf
         arrays.last[i, j] = 0
 
 

@@ -58,11 +58,11 @@ class SceneContext:
             if hasattr(part, "close"):
                 part.close()
 
-    def release(self) -> None:
-        """Release all parts; they are built again on the next use."""
+    def release(self, *but: str) -> None:
+        """Release all parts but some kinds; they are built again on the next use."""
         with self._lock:
-            while self._parts:
-                self.drop(next(reversed(self._parts)))
+            for kind in [kind for kind in reversed(self._parts) if kind not in but]:
+                self.drop(kind)
 
 
 def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:

@@ -6,15 +6,11 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.column_kernels import (
+    DOWN,
     FLAT,
-    KIND_OF,
-    KINDS,
     QUANTUM_M,
     UP,
-    departure_costs,
     move_lengths,
-    relax,
-    relax_vertical,
 )
 from aerialdojo_gen.planning.column_lanes import LANES, MIN_CELLS, relax_column, relax_flat
 from aerialdojo_gen.planning.preference import CLEARANCE_COST_UNIT
@@ -34,11 +30,29 @@ def columns(seed, count, n):
     return costs.ravel(), passable.ravel(), clearance.ravel()
 
 
+def relax_vertical(costs, moves, clearance_cost, first, last, length, coarse):
+    """Relax the vertical moves between the cells from `first` to before `last`, up and then down."""
+    for k in range(first + 1, last):
+        if moves[k - 1] >> UP & 1:
+            costs[k] = min(costs[k], costs[k - 1] + (length + coarse * clearance_cost[k - 1]))
+    for k in range(last - 2, first - 1, -1):
+        if moves[k + 1] >> DOWN & 1:
+            costs[k] = min(costs[k], costs[k + 1] + (length + coarse * clearance_cost[k + 1]))
+
+
+def relax(costs, moves, clearance_cost, target, n, m):
+    """Relax one level move from the first n cells to those from `target` on; return whether any cost decreased."""
+    reached = costs[:n] + (LENGTHS[m] + COARSE[m] * clearance_cost[:n])
+    better = (moves[:n] >> m & 1 == 1) & (reached <= LIMIT) & (reached < costs[target : target + n])
+    costs[target : target + n][better] = reached[better]
+    return bool(better.any())
+
+
 @njit
-def flat_by_groups(costs, passable, clearance, n, lengths, coarse, targets, limit, improved):
+def flat_by_groups(costs, passable, clearance, n, lengths, coarse, targets, limits, improved):
     for k in range(0, n, LANES):
         k = min(k, n - LANES)
-        relax_flat(costs, passable, clearance, k, k, lengths, coarse, targets, limit, improved)
+        relax_flat(costs, passable, clearance, k, k, lengths, coarse, targets, limits, improved)
 
 
 @given(st.integers(0, 2**32), st.integers(MIN_CELLS, 70))
@@ -55,14 +69,11 @@ def test_level_moves(seed, n):
     costs, passable, clearance = columns(seed, len(FLAT) + 1, n)
     expected, targets = costs.copy(), np.arange(1, len(FLAT) + 1) * n
     targets[seed % len(FLAT)] = -1
-    departures = np.empty(len(KINDS) * n, np.float32)
-    for number, kind in enumerate(KINDS):
-        departure_costs(expected, clearance, 0, n, LENGTHS[kind], COARSE[kind], departures, number * n)
     better = [
-        target >= 0 and relax(departures, KIND_OF[m] * n, passable, 0, expected, target, n, m, LIMIT)
+        target >= 0 and relax(expected, passable, clearance, target, n, m)
         for m, target in zip(FLAT, targets, strict=True)
     ]
     improved = np.zeros(len(FLAT), np.uint8)
-    flat_by_groups(costs, passable, clearance, n, LENGTHS, COARSE, targets, LIMIT, improved)
+    flat_by_groups(costs, passable, clearance, n, LENGTHS, COARSE, targets, np.full(len(FLAT), LIMIT), improved)
     np.testing.assert_array_equal(costs, expected)
     assert improved.tolist() == better
