@@ -11,9 +11,10 @@ from __future__ import annotations
 import json
 import math
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
+
+import tomli
 
 from aerialdojo_gen.base.errors import AerialDojoError, BeyondBounds, Malformed, StoreError, check_regular
 
@@ -59,8 +60,8 @@ def loads_toml(text: str, *, finite: bool = True) -> dict[str, Any]:
     """Parse TOML as `read_toml` does; `Malformed` names the place."""
     _scan(text, _TOML_TOKEN)
     try:
-        value = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        value = tomli.loads(text)
+    except tomli.TOMLDecodeError as error:
         raise Malformed(str(error)) from None
     except (ValueError, OverflowError, RecursionError) as error:
         raise Malformed(f"is no TOML ({error})") from None

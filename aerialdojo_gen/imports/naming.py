@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-import tomllib
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import tomli
 
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.errors import AssetError, Malformed, brief, check_regular
@@ -91,7 +92,7 @@ def _main(materials: Mapping[str, float]) -> str:
 
 @cache
 def _lists() -> dict[str, Any]:
-    return tomllib.loads(_WORDS_FILE.read_text(encoding="utf-8"))
+    return tomli.loads(_WORDS_FILE.read_text(encoding="utf-8"))
 
 
 @cache

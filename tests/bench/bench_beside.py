@@ -1,10 +1,11 @@
 """CPU, time and memory of making scenes, beside another checkout's, one after the other in turn.
 
-    python tests/bench/bench_beside.py OTHER [--scenes U_Mall_0 I_Harbor_0] [--until filter] [--rounds 1]
+    python tests/bench/bench_beside.py [OTHER] [--scenes U_Mall_0 I_Harbor_0] [--until filter] [--rounds 1]
 
 `OTHER` is a checkout of another commit whose kernels are compiled (`make env` there, or a first run); it is run with
 this environment's Python unless it has one of its own in `.venv`. Every scene is made from nothing, up to a stage, in
-one process, first by the other checkout and then by this one, and so on. Prints a Markdown table of medians.
+one process, first by the other checkout and then by this one, and so on. Prints a Markdown table of medians. Without
+`OTHER` this checkout is measured twice, which shows how far figures differ by themselves.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def made(checkout: Path, scene: str, until: str) -> tuple[float, float, float]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("other", type=Path)
+    parser.add_argument("other", type=Path, nargs="?", default=HERE)
     parser.add_argument("--scenes", nargs="+", default=SCENES)
     parser.add_argument("--until", default="filter")
     parser.add_argument("--rounds", type=int, default=1)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import cache
 from importlib.resources import files
 from typing import Any, Literal
 
+import tomli
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aerialdojo_gen.base.errors import UsageError
@@ -109,7 +109,7 @@ class Preset(BaseModel):
 def presets() -> dict[str, Preset]:
     """Return all presets by name, in their order."""
     text = files("aerialdojo_gen.benchmark.llm").joinpath("presets.toml").read_text(encoding="utf-8")
-    return {name: Preset.model_validate(value) for name, value in tomllib.loads(text).items()}
+    return {name: Preset.model_validate(value) for name, value in tomli.loads(text).items()}
 
 
 def preset(name: str) -> Preset:

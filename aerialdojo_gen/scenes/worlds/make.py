@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+
+import tomli
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.catalogue import Catalogue
@@ -58,7 +59,7 @@ def make_world(world: World, scene_assets: Path, catalogue: Catalogue) -> MadeWo
             refused.append(("plan is too long", f"{len(text):,} bytes"))
             continue
         try:
-            scene = build_tables(world.name, tomllib.loads(text), catalogue)
+            scene = build_tables(world.name, tomli.loads(text), catalogue)
         except AssetError as error:
             refused.append(("does not build", str(error)))
             continue
