@@ -44,9 +44,11 @@ def cross(a: Floats, b: Floats) -> Floats:
     """Vector products along the last axis."""
     # np.cross spends ten times the arithmetic on checking axes, and meshes are many and small.
     x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return np.stack([x, y, z], axis=-1)
+    out = np.empty((*x.shape, 3))
+    out[..., 0] = x
+    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out
 
 
 def product(a: Floats, b: Floats) -> Floats:

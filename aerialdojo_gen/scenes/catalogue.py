@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.designs import Design, load_sets
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
-from aerialdojo_gen.scenes.mesh import Mesh, areas, merge, rotation, to_part
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
+from aerialdojo_gen.scenes.mesh_kernels import placed_vertices
 from aerialdojo_gen.scenes.model import Instance, Part
 from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
 from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
@@ -236,16 +236,16 @@ def _placed(
     parts: Sequence[Part], position: Sequence[float], yaw_deg: float, scale: float
 ) -> tuple[tuple[Part, ...], list[NDArray[np.bool_]]]:
     """The placed parts, and which faces of each original part are kept."""
-    turn = rotation(0.0, 0.0, yaw_deg).T
+    turn = np.ascontiguousarray(rotation(0.0, 0.0, yaw_deg).T)
     offset = np.asarray(position, dtype=np.float64)
     out, kept_faces = [], []
     for p in parts:
-        vertices = single(product(p.vertices * scale, turn) + offset)
         # Far from the origin float32 may flatten a sliver to nothing.
-        solid = areas(vertices, p.faces) > 0.0
+        vertices, solid, count = placed_vertices(p.vertices, p.faces, float(scale), turn, offset)
         kept_faces.append(solid)
-        if solid.any():
-            out.append(Part(vertices, p.faces[solid], p.uv * np.float32(scale), p.material))
+        if count:
+            faces = p.faces if count == len(solid) else p.faces[solid]
+            out.append(Part(vertices, faces, p.uv * np.float32(scale), p.material))
     return tuple(out), kept_faces
 
 

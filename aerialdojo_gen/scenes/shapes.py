@@ -18,6 +18,7 @@ from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.portable import distances_along, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+from aerialdojo_gen.scenes.shape_kernels import band_faces
 
 Numbers = Sequence[float]
 
@@ -25,20 +26,19 @@ Numbers = Sequence[float]
 MAX_SEGMENTS, MAX_SIDES, MAX_POINTS = 256, 64, 2000
 _FARTHEST_M = 10_000.0
 
-_BOX_FACES = (
+_BOX_FACES = np.array([
     (0, 3, 2), (0, 2, 1), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
     (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
-)  # fmt: skip
+], dtype=np.int32)  # fmt: skip
 
 
 def box(*, size: Numbers, taper: Numbers = (1.0, 1.0)) -> Mesh:
     """Make a box on its bottom face; `taper` is the top's size along x and y as a fraction of the bottom's."""
     x, y, z = _positive("size", size, 3)
     fx, fy = _numbers("taper", taper, 2)
-    square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * (x, y)
-    bottom = np.column_stack([square, np.zeros(4)])
-    top = np.column_stack([square * (fx, fy), np.full(4, z)])
-    return mesh(np.concatenate([bottom, top]), _BOX_FACES)
+    u, v = 0.5 * x, 0.5 * y
+    bottom = [(-u, -v, 0.0), (u, -v, 0.0), (u, v, 0.0), (-u, v, 0.0)]
+    return mesh([*bottom, *((a * fx, b * fy, z) for a, b, _ in bottom)], _BOX_FACES)
 
 
 def sheet(*, size: Numbers) -> Mesh:
@@ -104,31 +104,14 @@ def lathe(*, points: Sequence[Numbers], segments: float = 12) -> Mesh:
     closed = len(profile) > 3 and bool(np.all(profile[0] == profile[-1]))
     rows = profile[:-1] if closed else profile
     vertices, rings = _ring_vertices(rows, n)
-    length = distances_along(profile)
-    around = 2 * np.pi * float(rows[:, 0].max()) / n
-    faces: list[tuple[int, int, int]] = []
-    uvs: list[tuple[tuple[float, float], ...]] = []
-    for r in range(len(profile) - 1):
-        low, high = rings[r], rings[(r + 1) % len(rows)]
-        v0, v1 = float(length[r]), float(length[r + 1])
-        for k in range(n):
-            a, b = low[k], low[(k + 1) % n]
-            c, d = high[(k + 1) % n], high[k]
-            u0, u1 = k * around, (k + 1) * around
-            if a != b:
-                faces.append((a, b, c))
-                uvs.append(((u0, v0), (u1, v0), (u1, v1)))
-            if c != d:
-                faces.append((a, c, d))
-                uvs.append(((u0, v0), (u1, v1), (u0, v1)))
-    nan = ((np.nan, np.nan),) * 3
-    if not closed:
-        for ring, down in ((rings[0], True), (rings[-1], False)):
-            if ring[0] != ring[1]:
-                fan = [(ring[0], ring[k], ring[k + 1]) for k in range(1, n - 1)]
-                faces += [(a, c, b) for a, b, c in fan] if down else fan
-                uvs += [nan] * len(fan)
-    return outward(mesh(vertices, faces, np.array(uvs)))
+    around = np.arange(n + 1) * (2 * np.pi * float(rows[:, 0].max()) / n)
+    sides, places = band_faces(rings, len(profile) - 1, around, distances_along(profile))
+    faces, uvs = [sides], [places]
+    for ring, down in () if closed else ((rings[0], True), (rings[-1], False)):
+        if ring[0] != ring[1]:
+            faces.append(ring[fan(n, down)])
+            uvs.append(np.full((n - 2, 3, 2), np.nan))
+    return outward(mesh(vertices, np.concatenate(faces), np.concatenate(uvs)))
 
 
 def crown(
@@ -154,20 +137,34 @@ def crown(
     return mesh(vertices * factor[:, None] * scale, faces)
 
 
-def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, list[list[int]]]:
+@lru_cache(maxsize=64)
+def circle(n: int) -> tuple[Floats, Floats]:
+    """Cosines and sines (n,) of the middles of n equal parts of a turn."""
     # Half a step of turn lets a square (4 segments) stand with its sides along x and y.
     angles = (np.arange(n) + 0.5) * 2 * np.pi / n
-    vertices: list[tuple[float, float, float]] = []
-    rings: list[list[int]] = []
-    for r, z in rows:
-        start = len(vertices)
-        if r == 0.0:
-            vertices.append((0.0, 0.0, float(z)))
-            rings.append([start] * n)
-        else:
-            vertices += [(float(r * np.cos(a)), float(r * np.sin(a)), float(z)) for a in angles]
-            rings.append(list(range(start, start + n)))
-    return np.array(vertices), rings
+    return np.cos(angles), np.sin(angles)
+
+
+@lru_cache(maxsize=64)
+def fan(n: int, reverse: bool = False) -> Ints:
+    """Triangles (n - 2, 3) of a ring of n vertices from its first, counter-clockwise as the ring or clockwise."""
+    k = np.arange(1, n - 1, dtype=np.int32)
+    return np.stack([0 * k, k + 1, k] if reverse else [0 * k, k, k + 1], axis=1)
+
+
+def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, Ints]:
+    """Vertices of the rings of a turned body, and their indices (r, n); a ring of radius 0 is one vertex."""
+    cos, sin = circle(n)
+    sizes = [1 if r == 0.0 else n for r in rows[:, 0].tolist()]
+    rings = np.empty((len(rows), n), dtype=np.int32)
+    vertices = np.empty((sum(sizes), 3))
+    start = 0
+    for k, (r, z) in enumerate(rows.tolist()):
+        own = vertices[start : start + sizes[k]]
+        own[:, 0], own[:, 1], own[:, 2] = (0.0, 0.0, z) if r == 0.0 else (r * cos, r * sin, z)
+        rings[k] = start if r == 0.0 else np.arange(start, start + n)
+        start += sizes[k]
+    return vertices, rings
 
 
 @lru_cache(maxsize=8)
@@ -195,7 +192,8 @@ def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
 
 def number(key: str, value: Any) -> float:
     """Check a shape's number, metres or a fraction, against its bounds."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+    # Most are plain: the general question costs as much as the rest.
+    if type(value) is not float and (isinstance(value, bool) or not isinstance(value, int | float | np.number)):
         raise ShapeError(f"{key} must be a number, got {str(value)[:40]!r}")
     held = float(value)
     if not -_FARTHEST_M <= held <= _FARTHEST_M:

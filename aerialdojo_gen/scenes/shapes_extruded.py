@@ -14,9 +14,10 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
-from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, unit
+from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, merge, mesh, outward
-from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, number, rows_of, whole
+from aerialdojo_gen.scenes.shape_kernels import band_faces, extruded, swept_rings
+from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, circle, fan, number, rows_of, whole
 
 _SECTIONS = ("gable", "wedge", "trapezoid")
 
@@ -59,8 +60,9 @@ def upright(faces: Sequence[Polygon], width_m: float, y_m: float = 0.0) -> Mesh:
     bodies = []
     for face in faces:
         body = extrude(face, width_m)
-        a, b, c = body.vertices.T
-        bodies.append(Mesh(np.column_stack([a, y_m + width_m / 2 - c, b]), body.faces))
+        vertices = body.vertices[:, [0, 2, 1]]
+        vertices[:, 1] = y_m + width_m / 2 - vertices[:, 1]
+        bodies.append(Mesh(vertices, body.faces))
     return merge(bodies)
 
 
@@ -93,9 +95,10 @@ def sweep(
     else:
         _positive("radius", (0.0 if radius is None else radius,), 1)
         n = whole("sides", sides, 3, MAX_SIDES)
-        angles = (np.arange(n) + 0.5) * 2 * np.pi / n
-        ring = np.column_stack([np.cos(angles), np.sin(angles)]) * radius
-    rings = _swept_rings(line, ring, closed)
+        ring = np.stack(circle(n), axis=1) * radius
+    rings = swept_rings(line, ring, closed)
+    if not len(rings):
+        raise ShapeError("the path turns back on itself")
     return _skin(rings, closed)
 
 
@@ -103,26 +106,13 @@ def extrude(plan: Polygon, height: float) -> Mesh:
     """Extrude a shapely polygon from z = 0 to `height` metres; wall textures run on around the corners."""
     if not isinstance(plan, Polygon) or plan.is_empty:
         raise ShapeError("the outline has no area, or is in pieces")
-    plan = _without_straight_corners(orient(plan))
-    flat, top = triangulate(plan)
-    n = len(flat)
-    vertices = np.concatenate([np.column_stack([flat, np.zeros(n)]), np.column_stack([flat, np.full(n, height)])])
-    faces = [top[:, ::-1], top + n]
-    uvs = [np.full((2 * len(top), 3, 2), np.nan)]
-    start = 0
-    for ring in (plan.exterior, *plan.interiors):
-        count = len(ring.coords) - 1
-        a = start + np.arange(count)
-        b = start + (np.arange(count) + 1) % count
-        lengths = norm(flat[b] - flat[a])
-        u1 = np.cumsum(lengths)
-        u0 = u1 - lengths
-        faces += [np.column_stack([a, b, b + n]), np.column_stack([a, b + n, a + n])]
-        z0, z1 = np.zeros(count), np.full(count, height)
-        uvs.append(np.stack([np.column_stack(p) for p in ((u0, z0), (u1, z0), (u1, z1))], axis=1))
-        uvs.append(np.stack([np.column_stack(p) for p in ((u0, z0), (u1, z1), (u0, z1))], axis=1))
-        start += count
-    return mesh(vertices, np.concatenate(faces), np.concatenate(uvs))
+    outlines = _without_straight_corners(orient(plan))
+    rings = [shapely.linearrings(outline) for outline in outlines]
+    corners = shapely.get_coordinates(shapely.constrained_delaunay_triangles(Polygon(rings[0], rings[1:])))
+    starts = np.cumsum([0, *(len(outline) for outline in outlines)])
+    vertices, faces, uv = extruded(np.concatenate(outlines), starts, corners.reshape(-1, 4, 2), float(height))
+    assert len(faces), "a triangle with a corner that is no vertex"
+    return mesh(vertices, faces, uv)
 
 
 def triangulate(plan: Polygon) -> tuple[Floats, Ints]:
@@ -155,55 +145,26 @@ def triangulate_all(plans: Sequence[Polygon]) -> tuple[Floats, NDArray[np.int64]
     return vertices, whose, faces
 
 
-def _without_straight_corners(plan: Polygon) -> Polygon:
-    # They add triangles to lids and walls, and no shape.
+def _without_straight_corners(plan: Polygon) -> list[Floats]:
+    """Rings of a polygon, (n, 2) each, the exterior first; straight corners add triangles to lids and no shape."""
     rings = []
-    for ring in (plan.exterior, *plan.interiors):
-        xy = np.array(ring.coords)[:-1, :2]
-        a, b = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
-        turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-        corners = xy[np.abs(turn) > 1e-9 * (1.0 + norm(a) * norm(b))]
+    points, ring = shapely.get_coordinates(shapely.get_rings(plan), return_index=True)
+    for closed in np.split(points, np.flatnonzero(np.diff(ring)) + 1):
+        xy = closed[:-1]
+        turned = np.concatenate([xy[-1:], xy, xy[:1]])
+        before, after = turned[1:-1] - turned[:-2], turned[2:] - turned[1:-1]
+        turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        corners = xy[np.abs(turn) > 1e-9 * (1.0 + norm(before) * norm(after))]
         if len(corners) < 3:
             raise ShapeError("the outline has no area")
         rings.append(corners)
-    return Polygon(rings[0], rings[1:])
+    return rings
 
 
 def _checked(plan: Polygon | None) -> Polygon:
     if plan is None or not plan.is_valid or plan.area <= 0.0:
         raise ShapeError("the outline is no simple polygon of three or more points")
     return plan
-
-
-def _swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
-    ahead = np.roll(line, -1, axis=0) - line
-    if not closed:
-        ahead[-1] = line[-1] - line[-2]
-    ahead = unit(ahead)
-    behind = np.roll(ahead, 1, axis=0)
-    if not closed:
-        behind[0] = ahead[0]
-    rings = []
-    right = np.array([0.0, -1.0, 0.0])
-    for p, t0, t1 in zip(line, behind, ahead, strict=True):
-        middle = t0 + t1
-        if norm(middle) < 1e-6:
-            raise ShapeError("the path turns back on itself")
-        middle = unit(middle)
-        level = cross(middle, UP)
-        # Nearly vertical stretches have no level direction of their own: carry the last one on.
-        right = level if norm(level) > 0.1 else right - middle * dot(right, middle)
-        right = unit(right)
-        up = cross(right, middle)
-        offsets = ring[:, :1] * right + ring[:, 1:] * up
-        bend = t1 - t0
-        bend = bend - middle * dot(bend, middle)
-        if norm(bend) > 1e-9:
-            bend = unit(bend)
-            stretch = min(1.0 / max(float(dot(middle, t1)), 0.1), 2.5) - 1.0
-            offsets = offsets + stretch * dot(offsets, bend)[:, None] * bend
-        rings.append(p + offsets)
-    return np.array(rings)
 
 
 def _skin(rings: Floats, closed: bool) -> Mesh:
@@ -213,18 +174,10 @@ def _skin(rings: Floats, closed: bool) -> Mesh:
     along = np.concatenate([[0.0], np.cumsum(steps)])
     edges = norm(np.roll(rings[0], -1, axis=0) - rings[0])
     around = np.concatenate([[0.0], np.cumsum(edges)])
-    faces, uvs = [], []
-    for r in range(rows if closed else rows - 1):
-        nxt = (r + 1) % rows
-        for k in range(n):
-            m = (k + 1) % n
-            a, b, c, d = r * n + k, r * n + m, nxt * n + m, nxt * n + k
-            u0, u1, v0, v1 = along[r], along[r + 1], around[k], around[k + 1]
-            faces += [(a, b, c), (a, c, d)]
-            uvs += [((u0, v0), (u0, v1), (u1, v1)), ((u0, v0), (u1, v1), (u1, v0))]
+    index = np.arange(rows * n, dtype=np.int32).reshape(rows, n)
+    faces, places = band_faces(index, rows if closed else rows - 1, around, along)
+    places = places[:, :, ::-1]
     if not closed:
-        last = (rows - 1) * n
-        faces += [(0, k + 1, k) for k in range(1, n - 1)]
-        faces += [(last, last + k, last + k + 1) for k in range(1, n - 1)]
-        uvs += [((np.nan, np.nan),) * 3] * (2 * (n - 2))
-    return outward(mesh(rings.reshape(-1, 3), faces, np.array(uvs)))
+        faces = np.concatenate([faces, fan(n, reverse=True), index[-1][fan(n)]])
+        places = np.concatenate([places, np.full((2 * (n - 2), 3, 2), np.nan)])
+    return outward(mesh(rings.reshape(-1, 3), faces, places))

@@ -11,9 +11,14 @@ from scipy.spatial import ConvexHull
 
 from aerialdojo_gen.geometry.portable import UP, cross, distances_along, dot, norm, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
+from aerialdojo_gen.scenes.shape_kernels import band_faces, limb_vertices
+from aerialdojo_gen.scenes.shapes import circle, fan
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 _CLUMP_CORNERS = 46
+_BLADE = np.array(
+    [(0, 1, 4), (0, 4, 2), (1, 3, 4), (4, 3, 2), (0, 5, 1), (0, 2, 5), (1, 5, 3), (5, 2, 3)], dtype=np.int32
+)
 
 
 def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
@@ -21,38 +26,25 @@ def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
     line = np.asarray(points, dtype=np.float64)
     tip = radii[-1] == 0.0
     rings = len(line) - 1 if tip else len(line)
-    ahead = np.gradient(line, axis=0)
-    ahead = unit(ahead)
-    angles = (np.arange(sides) + 0.5) * 2 * np.pi / sides
-    side = np.array([1.0, 0.0, 0.0]) if abs(ahead[0, 0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    vertices = []
-    for p, t, r in zip(line[:rings], ahead[:rings], radii[:rings], strict=True):
-        side = side - t * dot(side, t)
-        side = unit(side)
-        other = cross(t, side)
-        vertices.append(p + r * (np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other))
+    if len(radii) < rings:
+        raise ValueError("a limb needs a radius at each of its points")
+    cos, sin = circle(sides)
+    vertices = limb_vertices(line, np.asarray(radii, dtype=np.float64), rings, cos, sin)
     along = distances_along(line)
     width = 2 * np.pi * max(radii) / sides
-    # Two triangles a side of every stretch, ends of caps and tip after them.
-    k = np.arange(sides)
-    a = np.arange(rings - 1)[:, None] * sides + k
-    b = np.arange(rings - 1)[:, None] * sides + (k + 1) % sides
-    corners = [np.stack([a, b, b + sides, a, b + sides, a + sides], axis=2).reshape(-1, 3)]
-    u0, u1 = (np.broadcast_to(u * width, a.shape) for u in (k, k + 1))
-    v0, v1 = (np.broadcast_to(v[:, None], a.shape) for v in (along[: rings - 1], along[1:rings]))
-    places = [np.stack([u0, v0, u1, v0, u1, v1, u0, v0, u1, v1, u0, v1], axis=2).reshape(-1, 3, 2)]
-    last, c = (rings - 1) * sides, np.arange(1, sides - 1)
-    foot, top = (np.zeros_like(c), c + 1, c), (np.full_like(c, last), last + c, last + c + 1)
-    caps = np.stack(foot if tip else (*foot, *top), axis=1).reshape(-1, 3)
-    corners.append(caps)
-    places.append(np.full((len(caps), 3, 2), np.nan))
+    index = np.arange(rings * sides, dtype=np.int32).reshape(rings, sides)
+    faces, places = band_faces(index, rings - 1, np.arange(sides + 1) * width, along)
+    # Ends of caps and tip come after the sides.
+    foot, top = fan(sides, reverse=True), index[-1][fan(sides)]
+    caps = foot if tip else np.stack([foot, top], axis=1).reshape(-1, 3)
+    corners, given = [faces, caps], [places, np.full((len(caps), 3, 2), np.nan)]
     if tip:
-        vertices.append(line[-1:])
-        corners.append(np.column_stack([last + k, last + (k + 1) % sides, np.full(sides, rings * sides)]))
-        low, high = np.full(sides, along[-2]), np.full(sides, along[-1])
+        vertices = np.concatenate([vertices, line[-1:]])
+        k, low, high = np.arange(sides), np.full(sides, along[-2]), np.full(sides, along[-1])
+        corners.append(np.stack([index[-1], np.roll(index[-1], -1), np.full(sides, rings * sides)], axis=1))
         ends = (k * width, low, (k + 1) * width, low, (k + 0.5) * width, high)
-        places.append(np.stack(ends, axis=1).reshape(-1, 3, 2))
-    return outward(mesh(np.concatenate(vertices), np.concatenate(corners), np.concatenate(places)))
+        given.append(np.stack(ends, axis=1).reshape(-1, 3, 2))
+    return outward(mesh(vertices, np.concatenate(corners), np.concatenate(given)))
 
 
 def clump(
@@ -129,9 +121,7 @@ def blade(root: ArrayLike, bend: ArrayLike, tip: ArrayLike, width: float) -> Mes
     across = np.array([1.0, 0.0, 0.0]) if length < 1e-6 else across / length
     w = across * width / 2
     lift = np.array([0.0, 0.0, 0.01])
-    v = np.stack([a, b + w, b - w, c, b + lift, b - lift])
-    faces = [(0, 1, 4), (0, 4, 2), (1, 3, 4), (4, 3, 2), (0, 5, 1), (0, 2, 5), (1, 5, 3), (5, 2, 3)]
-    return outward(mesh(v, faces))
+    return outward(mesh(np.array([a, b + w, b - w, c, b + lift, b - lift]), _BLADE))
 
 
 def stone(rng: np.random.Generator, radii: ArrayLike, corners: int = 22, sunk: float = 0.3) -> Mesh:

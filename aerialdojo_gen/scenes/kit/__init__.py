@@ -12,14 +12,15 @@ import pkgutil
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, create_model
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # What a builder works on: the site; the terrain, which it returns changed; or nothing, and it returns parts.
-KINDS = ("site", "ground", "parts")
+# Each with the number of arguments that a plan does not give.
+KINDS = {"site": 1, "ground": 2, "parts": 0}
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,17 @@ class Builder:
     name: str
     kind: str  # One of `KINDS`
     function: Callable[..., Any]
-    arguments: type[BaseModel]
+
+    @cached_property
+    def arguments(self) -> type[BaseModel]:
+        """Model of the keyword parameters, made when it is first asked for: a scene calls some of the builders."""
+        hints = typing.get_type_hints(self.function, include_extras=True)
+        fields: dict[str, Any] = {}
+        for parameter in list(inspect.signature(self.function).parameters.values())[KINDS[self.kind] :]:
+            default = ... if parameter.default is inspect.Parameter.empty else parameter.default
+            fields[parameter.name] = (hints[parameter.name], default)
+        settings = ConfigDict(extra="forbid", arbitrary_types_allowed=True, frozen=True)
+        return create_model(self.name, __config__=settings, **fields)
 
     @property
     def summary(self) -> str:
@@ -42,30 +53,24 @@ _BUILDERS: dict[str, Builder] = {}
 
 def site_builder(function: Function) -> Function:
     """Register ``build(site, *, …)``, which adds structure and things to the site."""
-    return _register(function, "site", 1)
+    return _register(function, "site")
 
 
 def ground_builder(function: Function) -> Function:
     """Register ``build(site, terrain, *, …)``, which returns another terrain."""
-    return _register(function, "ground", 2)
+    return _register(function, "ground")
 
 
 def part_builder(function: Function) -> Function:
     """Register ``build(*, …)``, which returns parts: materials with meshes in the structure's frame."""
-    return _register(function, "parts", 0)
+    return _register(function, "parts")
 
 
-def _register(function: Function, kind: str, positional: int) -> Function:
+def _register(function: Function, kind: str) -> Function:
     name = function.__name__
     if name in _BUILDERS and _BUILDERS[name].function.__module__ != function.__module__:
         raise ValueError(f"two builders are called {name!r}")
-    hints = typing.get_type_hints(function, include_extras=True)
-    fields: dict[str, Any] = {}
-    for parameter in list(inspect.signature(function).parameters.values())[positional:]:
-        default = ... if parameter.default is inspect.Parameter.empty else parameter.default
-        fields[parameter.name] = (hints[parameter.name], default)
-    settings = ConfigDict(extra="forbid", arbitrary_types_allowed=True, frozen=True)
-    _BUILDERS[name] = Builder(name, kind, function, create_model(name, __config__=settings, **fields))
+    _BUILDERS[name] = Builder(name, kind, function)
     return function
 
 
