@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.glb import read_glb
+from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.plans.build import build_plan
-from aerialdojo_gen.scenes.recipe import Imported, load_imported
+from aerialdojo_gen.scenes.plans.build import build_tables
+from aerialdojo_gen.scenes.recipe import Imported, imported_of
 
 # Files of versions before 0.2.0, by what they gave as their layout, and the commands that make plans instead.
 _NOW_PLANS = {"town": "add-map", "relief": "add-terrain"}
@@ -41,15 +41,16 @@ def build_scene(path: Path, catalogue: Catalogue) -> Scene:
         The file is wrong, names something that the catalogue or the kit lacks, or the built scene has fewer instances
         of a category than `inventory` asks for.
     """
-    imported = load_imported(path)
+    body = read_toml(path)
+    imported = imported_of(path, body)
     if imported is not None:
         return _imported(path, imported)
-    layout = read_toml(path, AssetError).get("layout")
+    layout = body.get("layout")
     if layout is not None:
         again = _NOW_PLANS.get(layout) if isinstance(layout, str) else None
         mend = f"run {again} again, with --force" if again else "docs/plans.md has the format"
         raise AssetError(f"{path}: scenes are plans since version 0.2.0, without 'layout': {mend}")
-    return build_plan(path, catalogue)
+    return build_tables(path.stem, body, catalogue, where=str(path), folder=path.parent)
 
 
 def _imported(path: Path, imported: Imported) -> Scene:

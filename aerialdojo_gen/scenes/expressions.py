@@ -16,6 +16,7 @@ from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.geometry.portable import atan2, exp, power
 
 Floats = NDArray[np.float64]
+Computed = Callable[[Mapping[str, Any]], Any]
 
 _LONGEST = 200
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -73,12 +74,11 @@ def evaluate_arrays(text: str, names: Mapping[str, Floats | float]) -> Floats:
     Among them are ``exp``, ``pow``, ``hypot``, ``clip(t, low, high)``, ``eased(t, start, end)``, which climbs from
     0 to 1, and ``choose(t, a, b)``: a where t is positive, else b.
     """
-    tree, used = _parse(text, arrays=True)
-    unknown = sorted(used - names.keys())
-    if unknown:
-        raise ShapeError(f"{text!r} speaks of the unknown name {unknown[0]!r}")
+    computed, used = _parse(text, arrays=True)
+    if not names.keys() >= used:
+        raise ShapeError(f"{text!r} speaks of the unknown name {min(used - names.keys())!r}")
     with np.errstate(all="ignore"):
-        value = np.asarray(_value(tree, names, _OF_ARRAYS), dtype=np.float64)
+        value = np.asarray(computed(names), dtype=np.float64)
     if not np.isfinite(value).all():
         raise ShapeError(f"{text!r} gives numbers that are not finite")
     return value
@@ -86,12 +86,11 @@ def evaluate_arrays(text: str, names: Mapping[str, Floats | float]) -> Floats:
 
 def evaluate(text: str, names: Mapping[str, float]) -> float:
     """Compute an expression; `ShapeError` for what `names_in` refuses, an unknown name or no finite result."""
-    tree, used = _parse(text)
-    unknown = sorted(used - names.keys())
-    if unknown:
-        raise ShapeError(f"{text!r} speaks of the unknown parameter {unknown[0]!r}")
+    computed, used = _parse(text)
+    if not names.keys() >= used:
+        raise ShapeError(f"{text!r} speaks of the unknown parameter {min(used - names.keys())!r}")
     try:
-        value = float(_value(tree, names, _FUNCTIONS))
+        value = float(computed(names))
     except (ArithmeticError, ValueError) as error:
         raise ShapeError(f"{text!r}: {error}") from error
     if not math.isfinite(value):
@@ -100,7 +99,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _parse(text: str, arrays: bool = False) -> tuple[ast.expr, frozenset[str]]:
+def _parse(text: str, arrays: bool = False) -> tuple[Computed, frozenset[str]]:
     if len(text) > _LONGEST:
         raise ShapeError(f"{text[:40] + '...'!r} has {len(text):,} characters, an expression {_LONGEST} at most")
     try:
@@ -110,7 +109,7 @@ def _parse(text: str, arrays: bool = False) -> tuple[ast.expr, frozenset[str]]:
     used: set[str] = set()
     arity = {name: (_ARITY_OF_ARRAYS.get(name, 1),) * 2 for name in _OF_ARRAYS} if arrays else _ALL_ARITIES
     _check(tree, text, used, arity)
-    return tree, frozenset(used)
+    return _compiled(tree, _OF_ARRAYS if arrays else _FUNCTIONS), frozenset(used)
 
 
 def _check(node: ast.expr, text: str, used: set[str], arities: Mapping[str, tuple[int, int]]) -> None:
@@ -135,16 +134,23 @@ def _check(node: ast.expr, text: str, used: set[str], arities: Mapping[str, tupl
             raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")
 
 
-def _value(node: ast.expr, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]) -> Any:
+def _compiled(node: ast.expr, functions: Mapping[str, Callable[..., Any]]) -> Computed:
+    """Make a function of names, by which an expression that has been checked is computed many times."""
     match node:
         case ast.Constant(value=int() | float() as number):
-            return number
+            return lambda _names: number
+        case ast.Name(id=name) if name in _CONSTANTS:
+            return lambda names: names.get(name, _CONSTANTS[name])
         case ast.Name(id=name):
-            return names[name] if name in names else _CONSTANTS[name]
+            return lambda names: names[name]
         case ast.BinOp():
-            return _BINARY[type(node.op)](_value(node.left, names, functions), _value(node.right, names, functions))
+            left, right = _compiled(node.left, functions), _compiled(node.right, functions)
+            both = _BINARY[type(node.op)]
+            return lambda names: both(left(names), right(names))
         case ast.UnaryOp():
-            return _UNARY[type(node.op)](_value(node.operand, names, functions))
+            operand, sign = _compiled(node.operand, functions), _UNARY[type(node.op)]
+            return lambda names: sign(operand(names))
         case ast.Call(func=ast.Name(id=name)):
-            return functions[name](*(_value(a, names, functions) for a in node.args))
+            function, arguments = functions[name], [_compiled(one, functions) for one in node.args]
+            return lambda names: function(*[one(names) for one in arguments])
     raise ShapeError(f"{ast.unparse(node)!r} is not allowed")

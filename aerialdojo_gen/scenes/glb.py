@@ -54,7 +54,7 @@ def write_glb(scene: Scene, path: Path) -> None:
     document = writer.document(scene)
     head = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
-    body = bytes(writer.data)
+    body = b"".join(writer.data)
     with path.open("wb") as file:
         file.write(struct.pack("<4sII", _MAGIC, 2, 12 + 8 + len(head) + 8 + len(body)))
         file.write(struct.pack("<II", len(head), _JSON))
@@ -127,7 +127,8 @@ class _Writer:
     """Collects the glTF document and its binary chunk."""
 
     def __init__(self) -> None:
-        self.data = bytearray()
+        self.data: list[bytes] = []
+        self._size = 0
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
         self._materials: list[dict[str, Any]] = []
@@ -193,7 +194,7 @@ class _Writer:
             "materials": self._materials,
             "accessors": self._accessors,
             "bufferViews": self._views,
-            "buffers": [{"byteLength": len(self.data)}],
+            "buffers": [{"byteLength": self._size}],
         }
         used = sorted({name for entry in self._materials for name in entry.get("extensions", {})})
         if used:
@@ -217,9 +218,11 @@ class _Writer:
         return len(self._accessors) - 1
 
     def _view(self, raw: bytes, target: int | None) -> int:
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw)}
+        view = {"buffer": 0, "byteOffset": self._size, "byteLength": len(raw)}
         self._views.append(view if target is None else view | {"target": target})
-        self.data += raw + b"\0" * (-len(raw) % 4)
+        padding = b"\0" * (-len(raw) % 4)
+        self.data += [raw, padding]
+        self._size += len(raw) + len(padding)
         return len(self._views) - 1
 
 

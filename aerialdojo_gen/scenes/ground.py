@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -36,12 +35,6 @@ class Surface:
     material: str
     rise_m: float = 0.0  # Height over the terrain, metres: a pavement's 0.12, say; its edge becomes a kerb
     edge: str = "concrete"  # Material of that kerb
-
-    @cached_property
-    def bounds(self) -> tuple[float, float, float, float]:
-        """Least and greatest x and y: (x0, y0, x1, y1), metres."""
-        x0, y0, x1, y1 = self.area.bounds
-        return x0, y0, x1, y1
 
 
 def ground_meshes(
@@ -126,7 +119,7 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
     inside = shapely.covers(layer.area, tiles.plans.geometries[touched])
     pieces = [Mesh(corners, faces[touched[inside]])] if inside.any() else []
     cut = touched[~inside]
-    parts = shapely.intersection(layer.area, tiles.plans.geometries[cut])
+    parts = _cut(layer.area, tiles.plans.geometries[cut])
     seen = [polygons_of(part) for part in parts.tolist()]
     if any(seen):
         flat, whose, cut_faces = triangulate_all([piece for some in seen for piece in some])
@@ -142,6 +135,17 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
         return mesh([], [])
     whole = _compact(merge(pieces))
     return _from_above(mesh(whole.vertices + np.array([0.0, 0.0, layer.rise_m]), whole.faces))
+
+
+def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Intersect an area with triangles: with that piece of it alone where a triangle touches no other."""
+    pieces = shapely.get_parts(area)
+    whole = np.full(len(plans), area, dtype=object)
+    if len(pieces) > 1 and len(plans):
+        piece, plan = STRtree(plans).query(pieces)
+        alone = np.bincount(plan, minlength=len(plans))[plan] == 1
+        whole[plan[alone]] = pieces[piece[alone]]
+    return np.asarray(shapely.intersection(whole, plans))
 
 
 def _compact(m: Mesh) -> Mesh:

@@ -47,6 +47,7 @@ class MaterialLibrary:
         self._entries = entries
         self._source = source
         self._cache: dict[str, Material] = {}
+        self._checked: set[str] = set()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,6 +56,8 @@ class MaterialLibrary:
 
     def check(self, spec: str, where: str) -> None:
         """Raise an `AssetError` that begins with `where` if `spec` names no material."""
+        if spec in self._checked:
+            return
         name, colour, layout = _split(spec)
         if _COLOUR.fullmatch(spec):
             return
@@ -65,6 +68,7 @@ class MaterialLibrary:
         known = self.layouts(name)
         if layout and layout not in known:
             raise AssetError(f"{where}: {name} has no layout {layout!r}{nearest(layout, known)} (see {self._source})")
+        self._checked.add(spec)
 
     def layouts(self, spec: str) -> tuple[str, ...]:
         """Names of the layouts that a façade comes in; none of other surfaces."""

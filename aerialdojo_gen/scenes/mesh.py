@@ -39,9 +39,9 @@ class Mesh:
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
     """Make a mesh of array-likes; faces of fewer than three distinct vertices or of no area are dropped."""
-    v = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
-    f = np.asarray(faces, dtype=np.int32).reshape(-1, 3)
-    keep, every = larger_faces(*_for_kernels(v, f), _MIN_AREA_M2)
+    v = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
+    f = np.ascontiguousarray(faces, dtype=np.int32).reshape(-1, 3)
+    keep, every = larger_faces(v, f, _MIN_AREA_M2)
     if every:
         return Mesh(v, f, corner_uv)
     return Mesh(v, f[keep], None if corner_uv is None else corner_uv[keep])
@@ -75,6 +75,17 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
 def translated(m: Mesh, offset: ArrayLike) -> Mesh:
     """Move a mesh by (x, y, z) metres."""
     return Mesh(m.vertices + np.asarray(offset, dtype=np.float64), m.faces, m.corner_uv)
+
+
+def repeated(m: Mesh, offsets: Floats) -> Mesh:
+    """Put copies of a mesh together, each moved by one of some offsets (k, 3), metres."""
+    count = len(offsets)
+    starts = (np.arange(count) * len(m.vertices)).astype(np.int32)
+    return Mesh(
+        (m.vertices + offsets[:, None]).reshape(-1, 3),
+        (m.faces + starts[:, None, None]).reshape(-1, 3),
+        None if m.corner_uv is None else np.tile(m.corner_uv, (count, 1, 1)),
+    )
 
 
 def stretched(m: Mesh, factors: Floats) -> Mesh:

@@ -158,7 +158,11 @@ class Imported(BaseModel):
 
 def load_imported(path: Path) -> Imported | None:
     """Read the table ``[imported]`` of a scene's file; None where it is a plan."""
-    body = read_toml(path)
+    return imported_of(path, read_toml(path))
+
+
+def imported_of(path: Path, body: dict[str, Any]) -> Imported | None:
+    """Check the table ``[imported]`` of what a scene's file says; None where it is a plan."""
     if "imported" not in body:
         return None
     if set(body) != {"imported"} or not isinstance(body["imported"], dict):

@@ -9,6 +9,7 @@ from aerialdojo_gen.base.kernels import njit
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Triple = tuple[float, float, float]
 
 
 @njit(cache=True, error_model="numpy")
@@ -37,8 +38,8 @@ def band_faces(rings: Ints, bands: int, u: Floats, v: Floats) -> tuple[Ints, Flo
 
 
 @njit(cache=True, error_model="numpy")
-def limb_vertices(line: Floats, radii: Floats, rings: int, cos: Floats, sin: Floats) -> Floats:
-    """Rings of a limb along a line (n, 3), turned as little as can be from one to the next."""
+def limb_vertices(line: Floats, radii: Floats, rings: int, cos: Floats, sin: Floats) -> tuple[Floats, Floats]:
+    """Rings of a limb along a line (n, 3), turned as little as can be one to the next; distances along it (n,)."""
     last, sides = len(line) - 1, len(cos)
     out = np.empty((rings * sides, 3))
     x, y, z = 1.0, 0.0, 0.0
@@ -60,60 +61,74 @@ def limb_vertices(line: Floats, radii: Floats, rings: int, cos: Floats, sin: Flo
             out[i * sides + k, 0] = line[i, 0] + radii[i] * (cos[k] * x + sin[k] * ox)
             out[i * sides + k, 1] = line[i, 1] + radii[i] * (cos[k] * y + sin[k] * oy)
             out[i * sides + k, 2] = line[i, 2] + radii[i] * (cos[k] * z + sin[k] * oz)
-    return out
+    along = np.zeros(len(line))
+    for i in range(last):
+        x, y, z = line[i + 1, 0] - line[i, 0], line[i + 1, 1] - line[i, 1], line[i + 1, 2] - line[i, 2]
+        along[i + 1] = along[i] + np.sqrt(x * x + y * y + z * z)
+    return out, along
 
 
 @njit(cache=True, error_model="numpy")
-def _unit(v: Floats) -> Floats:
-    return v / _norm(v)
-
-
-@njit(cache=True, error_model="numpy")
-def _norm(v: Floats) -> float:
-    return np.sqrt(_dot(v, v))
-
-
-@njit(cache=True, error_model="numpy")
-def _dot(a: Floats, b: Floats) -> float:
+def _dot(a: Triple, b: Triple) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def _unit(v: Triple) -> Triple:
+    length = np.sqrt(_dot(v, v))
+    return v[0] / length, v[1] / length, v[2] / length
+
+
+@njit(cache=True, error_model="numpy")
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _beside(a: Triple, b: Triple) -> Triple:
+    """What is left of one vector beside another, of length 1."""
+    along = _dot(a, b)
+    return a[0] - b[0] * along, a[1] - b[1] * along, a[2] - b[2] * along
+
+
+@njit(cache=True, error_model="numpy")
+def _ahead(line: Floats, i: int, closed: bool) -> Triple:
+    """Direction of a path after its point i."""
+    n = len(line)
+    a, b = (n - 2, n - 1) if i == n - 1 and not closed else (i, (i + 1) % n)
+    return _unit((line[b, 0] - line[a, 0], line[b, 1] - line[a, 1], line[b, 2] - line[a, 2]))
 
 
 @njit(cache=True, error_model="numpy")
 def swept_rings(line: Floats, ring: Floats, closed: bool) -> Floats:
     """Rings (n, k, 3) of a section (k, 2) at the points of a path (n, 3); none where it turns back on itself."""
-    n, up = len(line), np.array([0.0, 0.0, 1.0])
-    ahead = np.empty((n, 3))
-    for i in range(n):
-        ahead[i] = _unit(line[n - 1] - line[n - 2] if i == n - 1 and not closed else line[(i + 1) % n] - line[i])
+    n = len(line)
     out = np.empty((n, len(ring), 3))
-    right = np.array([0.0, -1.0, 0.0])
+    right = (0.0, -1.0, 0.0)
     for i in range(n):
-        before = ahead[i] if i == 0 and not closed else ahead[i - 1]
-        middle = before + ahead[i]
-        if _norm(middle) < 1e-6:
-            return np.empty((0, 0, 3))
+        after = _ahead(line, i, closed)
+        before = after if i == 0 and not closed else _ahead(line, (i - 1) % n, closed)
+        middle = (before[0] + after[0], before[1] + after[1], before[2] + after[2])
+        if np.sqrt(_dot(middle, middle)) < 1e-6:
+            return out[:0]
         middle = _unit(middle)
-        level = _cross(middle, up)
+        level = _cross(middle, (0.0, 0.0, 1.0))
         # Nearly vertical stretches have no level direction of their own: carry the last one on.
-        right = _unit(level if _norm(level) > 0.1 else right - middle * _dot(right, middle))
+        right = _unit(level if np.sqrt(_dot(level, level)) > 0.1 else _beside(right, middle))
         above = _cross(right, middle)
-        bend = ahead[i] - before
-        bend = bend - middle * _dot(bend, middle)
-        bends = _norm(bend) > 1e-9
-        stretch = 0.0
+        bend = _beside((after[0] - before[0], after[1] - before[1], after[2] - before[2]), middle)
+        bends, stretch = np.sqrt(_dot(bend, bend)) > 1e-9, 0.0
         if bends:
             bend = _unit(bend)
-            stretch = min(1.0 / max(_dot(middle, ahead[i]), 0.1), 2.5) - 1.0
+            stretch = min(1.0 / max(_dot(middle, after), 0.1), 2.5) - 1.0
         for k in range(len(ring)):
-            offset = ring[k, 0] * right + ring[k, 1] * above
+            x = ring[k, 0] * right[0] + ring[k, 1] * above[0]
+            y = ring[k, 0] * right[1] + ring[k, 1] * above[1]
+            z = ring[k, 0] * right[2] + ring[k, 1] * above[2]
             if bends:
-                offset = offset + stretch * _dot(offset, bend) * bend
-            out[i, k] = line[i] + offset
+                out_by = stretch * _dot((x, y, z), bend)
+                x, y, z = x + out_by * bend[0], y + out_by * bend[1], z + out_by * bend[2]
+            out[i, k, 0], out[i, k, 1], out[i, k, 2] = line[i, 0] + x, line[i, 1] + y, line[i, 2] + z
     return out
 
 
@@ -158,7 +173,9 @@ def extruded(flat: Floats, starts: NDArray[np.int64], corners: Floats, height: f
             low, high = first + i, first + count + i
             faces[low, 0], faces[low, 1], faces[low, 2] = a, b, b + n
             faces[high, 0], faces[high, 1], faces[high, 2] = a, b + n, a + n
-            uv[low, 0], uv[low, 1], uv[low, 2] = (begin, 0.0), (end, 0.0), (end, height)
-            uv[high, 0], uv[high, 1], uv[high, 2] = (begin, 0.0), (end, height), (begin, height)
+            uv[low, 0, 0], uv[low, 1, 0], uv[low, 2, 0] = begin, end, end
+            uv[low, 0, 1], uv[low, 1, 1], uv[low, 2, 1] = 0.0, 0.0, height
+            uv[high, 0, 0], uv[high, 1, 0], uv[high, 2, 0] = begin, end, begin
+            uv[high, 0, 1], uv[high, 1, 1], uv[high, 2, 1] = 0.0, height, height
         first += 2 * count
     return vertices, faces, uv

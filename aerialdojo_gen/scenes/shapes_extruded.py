@@ -93,9 +93,9 @@ def sweep(
         w, h = _positive("section", section, 2)
         ring = np.array([(-w, -h), (w, -h), (w, h), (-w, h)]) / 2
     else:
-        _positive("radius", (0.0 if radius is None else radius,), 1)
+        (thick,) = _positive("radius", (0.0 if radius is None else radius,), 1)
         n = whole("sides", sides, 3, MAX_SIDES)
-        ring = np.stack(circle(n), axis=1) * radius
+        ring = np.stack(circle(n), axis=1) * thick
     rings = swept_rings(line, ring, closed)
     if not len(rings):
         raise ShapeError("the path turns back on itself")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Unpack, overload
@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.affinity import rotate, translate
-from shapely.geometry import LineString, MultiPoint, Point, Polygon
+from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
@@ -21,6 +21,7 @@ from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, placed
 from aerialdojo_gen.scenes.contact import CONTACT_M, stand
 from aerialdojo_gen.scenes.designs import of_side
+from aerialdojo_gen.scenes.footprints import Footprints, disc, footprint, hull
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
@@ -61,6 +62,9 @@ class Site:
         self._terrain = flat_terrain(head.size_m)
         self._base = "grass"
         self._surfaces: list[Surface] = []
+        self._areas = np.empty(0, dtype=object)
+        self._boxes = np.empty((4, 0))  # Least x and y, greatest x and y of each
+        self._outlines: dict[tuple[str, str | None], BaseGeometry] = {}
 
     def rng_for(self, *key: object) -> np.random.Generator:
         """Make the generator of one thing in this scene: adding another thing does not change its draws."""
@@ -101,6 +105,8 @@ class Site:
         """Paint an area of the ground over what was painted before; see `Surface`."""
         shapely.prepare(area)
         self._surfaces.append(Surface(area, material, rise_m, edge))
+        self._boxes = np.column_stack([self._boxes, area.bounds])
+        self._areas = np.append(self._areas, area)
 
     def ground_z(self, x: float, y: float) -> float:
         """Height of the painted ground at a point, metres."""
@@ -113,12 +119,11 @@ class Site:
         return self._base if surface is None else surface.material
 
     def _surface(self, x: float, y: float) -> Surface | None:
-        for surface in reversed(self._surfaces):
-            # Hundreds of lane marks are painted: test their boxes first.
-            x0, y0, x1, y1 = surface.bounds
-            if x0 <= x <= x1 and y0 <= y <= y1 and shapely.contains_xy(surface.area, x, y):
-                return surface
-        return None
+        # Hundreds of lane marks are painted: test their boxes first.
+        x0, y0, x1, y1 = self._boxes
+        near = ((x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1)).nonzero()[0]
+        holds = near[shapely.contains_xy(self._areas[near], x, y)] if len(near) else near
+        return self._surfaces[holds[-1]] if len(holds) else None
 
     # Things
 
@@ -211,11 +216,11 @@ class Site:
 
     def outline_of(self, category: str, variant: str | None, at: tuple[float, float], yaw_deg: float) -> BaseGeometry:
         """Outline of a thing on the ground, grown by 0.1 m, world frame."""
-        trial = self.catalogue.instantiate(
-            category, "outline", self.rng_for("outline", category, variant), variant=variant
-        )
-        shape = MultiPoint(trial.vertices[:, :2]).convex_hull.buffer(0.1, quad_segs=2)
-        return translate(rotate(shape, yaw_deg, origin=(0, 0)), *at)
+        key = category, variant
+        if key not in self._outlines:
+            trial = self.catalogue.instantiate(category, "outline", self.rng_for("outline", *key), variant=variant)
+            self._outlines[key] = hull(trial.vertices[:, :2]).buffer(0.1, quad_segs=2)
+        return translate(rotate(self._outlines[key], yaw_deg, origin=(0, 0)), *at)
 
     def _at_moved_pose(
         self, category: str, node: str, at: tuple[float, float, float], yaw_deg: float, options: Mapping[str, Any]
@@ -353,48 +358,3 @@ class Site:
             raise AssetError(f"{self.name}: more than {MAX_NODES:,} instances in the scene")
         self._nodes.add(node)
         return node
-
-
-_CELL_M = 10.0
-# Parts higher than this above a prop's base (a tree's crown, a lamp's arm) have no footprint.
-_REACH_M = 2.5
-
-
-class Footprints:
-    """Occupied areas, each over a range of heights, in a grid of buckets."""
-
-    def __init__(self) -> None:
-        self._buckets: dict[tuple[int, int], list[tuple[BaseGeometry, float, float]]] = {}
-
-    def add(self, area: BaseGeometry, z0_m: float, z1_m: float) -> None:
-        """Occupy an area (world frame) between two heights, metres."""
-        shapely.prepare(area)
-        for cell in _cells(area.bounds):
-            self._buckets.setdefault(cell, []).append((area, z0_m, z1_m))
-
-    def is_free(self, area: BaseGeometry, z0_m: float, z1_m: float) -> bool:
-        """Whether the area is unoccupied between two heights, metres."""
-        for cell in _cells(area.bounds):
-            for taken, low, high in self._buckets.get(cell, ()):
-                if low < z1_m and high > z0_m and taken.intersects(area):
-                    return False
-        return True
-
-
-def footprint(instance: Instance, base_z_m: float) -> BaseGeometry:
-    """Outline on the ground: the convex hull of what is less than 2.5 m above `base_z_m`, or of all if nothing is."""
-    v = instance.vertices
-    low = v[v[:, 2] < base_z_m + _REACH_M]
-    return MultiPoint((low if len(low) else v)[:, :2]).convex_hull
-
-
-def disc(x: float, y: float, radius_m: float) -> BaseGeometry:
-    """Round area about a point."""
-    return Point(x, y).buffer(radius_m, quad_segs=4)
-
-
-def _cells(bounds: tuple[float, float, float, float]) -> Iterator[tuple[int, int]]:
-    x0, y0, x1, y1 = (int(b // _CELL_M) for b in bounds)
-    for i in range(x0, x1 + 1):
-        for j in range(y0, y1 + 1):
-            yield i, j

@@ -13,7 +13,17 @@ from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
 from aerialdojo_gen.scenes.designs import ROUND
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mirrored, rotated, rotation, stretched, translated
+from aerialdojo_gen.scenes.mesh import (
+    Floats,
+    Mesh,
+    merge,
+    mirrored,
+    repeated,
+    rotated,
+    rotation,
+    stretched,
+    translated,
+)
 
 SHAPES: dict[str, Callable[..., Mesh]] = {
     f.__name__: f
@@ -31,6 +41,9 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 _MAX_COPIES = 2000
 # Turned bodies of so few sides are square posts; an axis so near to x, y or z lies along it.
 _SQUARE, _ALONG = 4, 0.999
+_UNTURNED = np.eye(3)
+_BODIES: dict[str, Mesh] = {}
+_KEPT_BODIES = 4000
 # A hundred times what the largest prop of the catalogue has.
 MAX_TRIANGLES = 300_000
 
@@ -69,8 +82,7 @@ def part_mesh(
     own = {k: v if (shape, k) in _WORDS else _number(v, names) for k, v in part.items() if k not in PLACEMENT_KEYS}
     if shape == "text":
         own["text"] = _fill(own["text"], words)
-    body = SHAPES[shape](**own)
-    turn = np.eye(3)
+    body, turn = _shape_body(shape, own), _UNTURNED
     if "rotate" in part:
         turn = rotation(*_triple("rotate", part["rotate"], names))
         body = rotated(body, turn)
@@ -86,6 +98,17 @@ def part_mesh(
     for axis in part.get("mirror", ""):
         body = merge([body, mirrored(body, _AXES[axis])])
     return body
+
+
+def _shape_body(shape: str, own: Mapping[str, Any]) -> Mesh:
+    """Make a shape, or find it: the same bars and wheels recur in every stretch of a prop, and in others."""
+    # As text, in which 1, 1.0 and true differ, and 0.0 and -0.0.
+    key = f"{shape} {own!r}"
+    if key not in _BODIES:
+        if len(_BODIES) >= _KEPT_BODIES:
+            _BODIES.clear()
+        _BODIES[key] = SHAPES[shape](**own)
+    return _BODIES[key]
 
 
 def copies_in(part: Mapping[str, Any], names: Mapping[str, float]) -> int:
@@ -118,14 +141,13 @@ def _factors_about(axis: int, stretch: Floats) -> Floats:
 
 
 def _arrayed(body: Mesh, array: Mapping[str, Any], names: Mapping[str, float], stretch: Floats) -> Mesh:
-    copies = [body]
     for count_key, step_key in (("count", "step"), ("count2", "step2")):
         if count_key not in array:
             continue
-        count = _count(array[count_key], names, len(copies) * len(body.faces))
+        count = _count(array[count_key], names, len(body.faces))
         step = np.array(_triple(step_key, array.get(step_key), names)) * stretch
-        copies = [translated(c, step * k) for k in range(count) for c in copies]
-    return merge(copies)
+        body = repeated(body, step * np.arange(count)[:, None])
+    return body
 
 
 def _ringed(body: Mesh, ring: Mapping[str, Any], names: Mapping[str, float]) -> Mesh:

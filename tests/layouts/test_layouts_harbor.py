@@ -5,13 +5,13 @@ import pytest
 import shapely
 from support.layout_checks import blank_site, each_scene, props_of
 
+from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.grammar_houses import HouseStyle
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.houses import house_row
 from aerialdojo_gen.scenes.kit.quays import quay
 from aerialdojo_gen.scenes.kit.yards import HIGH_M, LONG_M, Stack, container_stacks
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.site import footprint
 
 SCENES = ["I_Harbor_0", "I_Harbor_1"]
 of_each_scene = each_scene(SCENES)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
-from aerialdojo_gen.geometry.portable import UP, cross, distances_along, dot, norm, product, unit
+from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
 from aerialdojo_gen.scenes.shape_kernels import band_faces, limb_vertices
 from aerialdojo_gen.scenes.shapes import circle, fan
@@ -23,14 +23,13 @@ _BLADE = np.array(
 
 def limb(points: ArrayLike, radii: Sequence[float], sides: int = 6) -> Mesh:
     """Make a tapering trunk or branch along points (n, 3), metres; closed, u around and v along in metres."""
-    line = np.asarray(points, dtype=np.float64)
+    line = np.ascontiguousarray(points, dtype=np.float64)
     tip = radii[-1] == 0.0
     rings = len(line) - 1 if tip else len(line)
     if len(radii) < rings:
         raise ValueError("a limb needs a radius at each of its points")
     cos, sin = circle(sides)
-    vertices = limb_vertices(line, np.asarray(radii, dtype=np.float64), rings, cos, sin)
-    along = distances_along(line)
+    vertices, along = limb_vertices(line, np.asarray(radii, dtype=np.float64), rings, cos, sin)
     width = 2 * np.pi * max(radii) / sides
     index = np.arange(rings * sides, dtype=np.int32).reshape(rings, sides)
     faces, places = band_faces(index, rings - 1, np.arange(sides + 1) * width, along)

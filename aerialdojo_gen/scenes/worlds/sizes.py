@@ -8,7 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.site import footprint
+from aerialdojo_gen.scenes.footprints import footprint
 
 
 @cache
