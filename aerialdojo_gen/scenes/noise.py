@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from aerialdojo_gen.base.rng import generator
 
@@ -103,6 +102,9 @@ def shade(colour: Floats, value: Floats) -> Floats:
 
 
 def _nearest_two(points: Floats, queries: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    # Few textures need it, and it takes as long to load as all else that a catalogue needs.
+    from scipy.spatial import cKDTree
+
     distance, index = cKDTree(points, boxsize=np.ones(2)).query(queries, k=2)
     return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
 

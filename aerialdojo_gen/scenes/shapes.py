@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.base.rng import generator
@@ -29,6 +28,19 @@ _FARTHEST_M = 10_000.0
 _BOX_FACES = np.array([
     (0, 3, 2), (0, 2, 1), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
     (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
+], dtype=np.int32)  # fmt: skip
+
+
+# Corners of three golden rectangles.
+_S, _L = 0.5257311121191336, 0.85065080835204
+_ICOSAHEDRON = np.array([
+    (-_S, _L, 0.0), (_S, _L, 0.0), (-_S, -_L, 0.0), (_S, -_L, 0.0), (0.0, -_S, _L), (0.0, _S, _L),
+    (0.0, -_S, -_L), (0.0, _S, -_L), (_L, 0.0, -_S), (_L, 0.0, _S), (-_L, 0.0, -_S), (-_L, 0.0, _S),
+])  # fmt: skip
+_ICOSAHEDRON_FACES = np.array([
+    (0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6),
+    (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7),
+    (9, 8, 1),
 ], dtype=np.int32)  # fmt: skip
 
 
@@ -169,13 +181,17 @@ def _ring_vertices(rows: Floats, n: int) -> tuple[Floats, Ints]:
 
 @lru_cache(maxsize=8)
 def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
-    # That of trimesh multiplies matrices.
-    ball = trimesh.creation.icosahedron()
-    ball.vertices = unit(np.array(ball.vertices))
-    for _ in range(subdivisions):
-        ball = ball.subdivide()
-        ball.vertices = unit(np.array(ball.vertices))
-    return np.asarray(ball.vertices, dtype=np.float64), np.asarray(ball.faces, dtype=np.int32)
+    """Vertices and faces of an icosahedron about the origin, each face cut into four so many times."""
+    if not subdivisions:
+        return unit(_ICOSAHEDRON), _ICOSAHEDRON_FACES
+    vertices, faces = _icosphere(subdivisions - 1)
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, first, which = np.unique(edges @ (1, len(vertices)), return_index=True, return_inverse=True)
+    ab, bc, ca = which.reshape(-1, 3).T + len(vertices)
+    a, b, c = faces.T
+    middles = vertices[edges[first]].sum(axis=1) / 2.0
+    cut = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
+    return unit(np.concatenate([vertices, middles])), cut.astype(np.int32)
 
 
 def _radii(radius: float | None, radii: Numbers | None) -> tuple[float, ...]:

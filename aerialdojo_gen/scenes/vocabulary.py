@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,7 @@ _KEPT_BODIES = 4000
 MAX_TRIANGLES = 300_000
 
 
+@cache
 def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
     """List a shape's required keys, and all its keys."""
     parameters = inspect.signature(SHAPES[shape]).parameters

@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull
 
 from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, product, unit
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
@@ -75,6 +74,9 @@ def _ball() -> tuple[Floats, Ints]:
 
 def _hull(points: Floats) -> tuple[Floats, Ints]:
     """Convex hull of points about the origin: its corners, and faces wound outwards."""
+    # It takes as long to load as all else that a catalogue needs.
+    from scipy.spatial import ConvexHull
+
     hull = ConvexHull(points)
     used = np.sort(hull.vertices)
     index = np.zeros(len(points), dtype=np.int32)
