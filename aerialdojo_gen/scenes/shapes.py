@@ -186,7 +186,7 @@ def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
         return unit(_ICOSAHEDRON), _ICOSAHEDRON_FACES
     vertices, faces = _icosphere(subdivisions - 1)
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, first, which = np.unique(edges @ (1, len(vertices)), return_index=True, return_inverse=True)
+    _, first, which = np.unique(edges[:, 0] + edges[:, 1] * len(vertices), return_index=True, return_inverse=True)
     ab, bc, ca = which.reshape(-1, 3).T + len(vertices)
     a, b, c = faces.T
     middles = vertices[edges[first]].sum(axis=1) / 2.0
