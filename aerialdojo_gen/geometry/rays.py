@@ -56,6 +56,27 @@ def _hits(
 
 
 @njit(cache=True, error_model="numpy")
+def _segments(
+    origins: Floats, points: Floats, row: Ints, column: Ints, centre: Floats, tolerance_m: float
+) -> tuple[NDArray[np.int64], Singles, Singles, Singles]:
+    """Rays from rows of origins to rows of points: which are longer than a tolerance, and what Embree wants."""
+    n, k = len(row), 0
+    which, far = np.empty(n, np.int64), np.empty(n, np.float32)
+    start, aim = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    for i in range(n):
+        o, p = origins[row[i]], points[column[i]]
+        x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+        away = np.sqrt(x * x + y * y + z * z)
+        if not away > tolerance_m:
+            continue
+        which[k], far[k] = i, away - tolerance_m
+        aim[k, 0], aim[k, 1], aim[k, 2] = x / away, y / away, z / away
+        start[k, 0], start[k, 1], start[k, 2] = o[0] - centre[0], o[1] - centre[1], o[2] - centre[2]
+        k += 1
+    return which[:k], start[:k], aim[:k], far[:k]
+
+
+@njit(cache=True, error_model="numpy")
 def _towards(
     origins: Floats, points: Floats, centre: Floats, least_m: float
 ) -> tuple[NDArray[np.int64], Floats, Floats, Singles, Singles]:
@@ -121,17 +142,22 @@ class TriangleRayCaster:
         distance, face = _hits(hit["primID"], hit["tfar"], o, unit, self._corner, self._normal, self._face)
         return distance, face
 
-    def unobstructed(self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3) -> NDArray[np.bool_]:
+    def unobstructed(
+        self, origins: ArrayLike, points: ArrayLike, tolerance_m: float = 5e-3, ends: tuple[Ints, Ints] | None = None
+    ) -> NDArray[np.bool_]:
         """Whether segments from origins to points, (n, 3) world metres, are free but for the last `tolerance_m`.
 
-        (n,) bool.
+        (n,) bool. `ends` names the rows of origins and points that each segment joins, where these are not in pairs.
         """
-        o, p = _pairs(origins, points)
-        free = np.ones(len(p), dtype=np.bool_)
-        far, length, _, start, aim = _towards(o, p, self._centre, tolerance_m)
+        if ends is None:
+            o, p = _pairs(origins, points)
+            ends = (np.arange(len(p), dtype=np.int32),) * 2
+        else:
+            o, p = np.ascontiguousarray(origins, dtype=np.float64), np.ascontiguousarray(points, dtype=np.float64)
+        free = np.ones(len(ends[0]), dtype=np.bool_)
+        far, start, aim, dists = _segments(o, p, *ends, self._centre, tolerance_m)
         if len(far):
             # Any hit will do, and Embree need not find the first one: twice as fast as `first_hit`.
-            dists = (length - tolerance_m).astype(np.float32)
             free[far] = np.asarray(self._scene.run(start, aim, dists=dists, query="OCCLUDED")) < 0
         return free
 

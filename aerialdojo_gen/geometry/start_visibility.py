@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,9 +14,14 @@ from aerialdojo_gen.geometry.rays import TriangleRayCaster
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 Codes = NDArray[np.int8]
+Flags = NDArray[np.bool_]
 
 # So many rays a pose find triangles that hide the target; most of the others meet one of these too.
 _PROBES = 16
+# Points are tested together: all, then a quarter of them, and so on down to so many neighbours.
+_BALL, _PARTS = 16, 4
+# Rays cost less than a triangle that covers a smaller share of the target.
+_LEAST_SHARE = 0.02
 # Rays end that much before the point (`TriangleRayCaster.unobstructed`). A ray must miss a triangle's edges, and meet
 # its plane before that, by the margin: float32 then decides no other way. Flatter and nearer triangles are left out.
 _TOLERANCE_M, _MARGIN_M, _LEAST_COSINE, _NEAR_M = 5e-3, 2e-3, 0.01, 0.05
@@ -71,65 +78,160 @@ def _shadow(corners: Floats, normal: Floats, eye: Floats, planes: Floats) -> boo
 
 
 @njit(cache=True)
-def _hidden(planes: Floats, x: float, y: float, z: float) -> bool:
-    """Whether a point, seen from the eye, lies in the shadow of a triangle (`_shadow`)."""
-    length = np.sqrt(x * x + y * y + z * z)
-    behind = planes[3, 0] * x + planes[3, 1] * y + planes[3, 2] * z
-    if behind < planes[3, 3] + _TOLERANCE_M + _MARGIN_M or behind < _LEAST_COSINE * length:
-        return False
-    inside = True
+def _is_smaller(corners: Floats, normal: Floats, eye: Floats, least: float) -> bool:
+    """Whether an eye sees a triangle under a solid angle of less than about so many steradians."""
+    height = twice = square = 0.0
     for a in range(3):
-        inside = inside and planes[a, 0] * x + planes[a, 1] * y + planes[a, 2] * z >= planes[a, 3] * length
-    return inside
+        b, c = (a + 1) % 3, (a + 2) % 3
+        height += normal[a] * (corners[0, a] - eye[a])
+        twice += normal[a] * (
+            (corners[1, b] - corners[0, b]) * (corners[2, c] - corners[0, c])
+            - (corners[1, c] - corners[0, c]) * (corners[2, b] - corners[0, b])
+        )
+        middle = (corners[0, a] + corners[1, a] + corners[2, a]) / 3.0 - eye[a]
+        square += middle * middle
+    return abs(height * twice) < 2.0 * least * square * np.sqrt(square)
 
 
 @njit(cache=True)
-def _undecided(
-    points: Floats, box: Floats, poses: Floats, faces: Ints, triangles: Floats, normals: Floats
-) -> tuple[Ints, Ints, Codes]:
-    """Poses and points in a view that no triangle among the pose's faces (n, p) surely parts, with their views."""
+def _hidden(planes: Floats, x: float, y: float, z: float, radius: float, length: float) -> int:
+    """Whether a ball, seen from the eye, lies in a triangle's shadow (`_shadow`): 1 for all of it, -1 for nothing."""
+    inside = planes[3, 0] * x + planes[3, 1] * y + planes[3, 2] * z
+    if inside + radius < planes[3, 3]:
+        return -1
+    least, most = inside - radius, length + radius
+    whole = least >= planes[3, 3] + _TOLERANCE_M + _MARGIN_M and least >= _LEAST_COSINE * most
+    for a in range(3):
+        inside = planes[a, 0] * x + planes[a, 1] * y + planes[a, 2] * z
+        if inside + radius < 0.0:
+            return -1
+        whole = whole and inside - radius >= planes[a, 3] * most
+    return 1 if whole else 0
+
+
+@njit(cache=True)
+def _uncovered(
+    points: Floats, balls: Floats, ranges: Ints, poses: Floats, faces: Ints, triangles: Floats, normals: Floats
+) -> Flags:
+    """Points that no triangle among the pose's faces (n, p) surely hides: (n, m) bool."""
     n, m = len(poses), len(points)
-    row, column, view, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), np.empty(n * m, np.int8), 0
-    left, planes = np.empty(m, np.int32), np.empty((4, 4))
+    out = np.ones((n, m), np.bool_)
+    at, planes = np.empty((len(balls), 4)), np.empty((4, 4))
     for i in range(n):
-        eye = poses[i]
-        cos, sin = np.cos(eye[3]), np.sin(eye[3])
-        many = m
-        for k in range(m):
-            left[k] = k
+        ex, ey, ez = poses[i, 0], poses[i, 1], poses[i, 2]
+        total, placed = m, False
+        x, y, z = balls[0, 0] - ex, balls[0, 1] - ey, balls[0, 2] - ez
+        # At least `_NEAR_M`: the eye may be at the ball's centre.
+        away = max(x * x + y * y + z * z, _NEAR_M * _NEAR_M)
+        least = _LEAST_SHARE * np.pi * balls[0, 3] * balls[0, 3] / away
         for j in range(faces.shape[1]):
             f = faces[i, j]
             fresh = f >= 0
             for earlier in range(j):
                 fresh = fresh and faces[i, earlier] != f
-            if not fresh or not _shadow(triangles[f], normals[f], eye, planes):
+            if not fresh or _is_smaller(triangles[f], normals[f], poses[i], least):
                 continue
-            # A shadow is convex: where the corners of the points' box lie in it, all points do.
-            corner = 0
-            while corner < 8 and _hidden(
-                planes,
-                box[corner & 1, 0] - eye[0],
-                box[corner >> 1 & 1, 1] - eye[1],
-                box[corner >> 2, 2] - eye[2],
-            ):
-                corner += 1
-            if corner == 8:
-                many = 0
+            if not _shadow(triangles[f], normals[f], poses[i], planes):
+                continue
+            if not placed:
+                placed = True
+                for b in range(len(balls)):
+                    x, y, z = balls[b, 0] - ex, balls[b, 1] - ey, balls[b, 2] - ez
+                    at[b, 0], at[b, 1], at[b, 2], at[b, 3] = x, y, z, np.sqrt(x * x + y * y + z * z)
+            # Into the balls on the shadow's border, past those within it and outside.
+            b = 0
+            while b < len(balls):
+                part = _hidden(planes, at[b, 0], at[b, 1], at[b, 2], balls[b, 3], at[b, 3])
+                if part == 0 and ranges[b, 2] > b + 1:
+                    b += 1
+                    continue
+                if part >= 0:
+                    for k in range(ranges[b, 0], ranges[b, 1]):
+                        if out[i, k]:
+                            x, y, z = points[k, 0] - ex, points[k, 1] - ey, points[k, 2] - ez
+                            if part > 0 or _hidden(planes, x, y, z, 0.0, np.sqrt(x * x + y * y + z * z)) > 0:
+                                out[i, k] = False
+                                total -= 1
+                b = ranges[b, 2]
+            if total == 0:
                 break
-            kept = 0
-            for n_left in range(many):
-                k = left[n_left]
-                if not _hidden(planes, points[k, 0] - eye[0], points[k, 1] - eye[1], points[k, 2] - eye[2]):
-                    left[kept] = k
-                    kept += 1
-            many = kept
-        for n_left in range(many):
-            k = left[n_left]
-            seen_by = view_towards(points[k, 0] - eye[0], points[k, 1] - eye[1], points[k, 2] - eye[2], cos, sin)
-            if seen_by >= 0:
-                row[count], column[count], view[count] = i, k, seen_by
-                count += 1
+    return out
+
+
+@njit(cache=True)
+def _in_view(points: Floats, poses: Floats, uncovered: Flags) -> tuple[Ints, Ints, Codes]:
+    """Poses and points of a mask (n, m) that a view holds, and by which view."""
+    n, m = uncovered.shape
+    row, column, view, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), np.empty(n * m, np.int8), 0
+    for i in range(n):
+        x, y, z = poses[i, 0], poses[i, 1], poses[i, 2]
+        cos, sin = np.cos(poses[i, 3]), np.sin(poses[i, 3])
+        for k in range(m):
+            if uncovered[i, k]:
+                seen_by = view_towards(points[k, 0] - x, points[k, 1] - y, points[k, 2] - z, cos, sin)
+                if seen_by >= 0:
+                    row[count], column[count], view[count] = i, k, seen_by
+                    count += 1
     return row[:count], column[:count], view[:count]
+
+
+@njit(cache=True)
+def _pairs(mask: Flags) -> tuple[Ints, Ints]:
+    """Rows and columns of what is set in a mask (n, m)."""
+    n, m = mask.shape
+    row, column, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), 0
+    for i in range(n):
+        for k in range(m):
+            row[count], column[count] = i, k
+            count += mask[i, k]
+    return row[:count], column[:count]
+
+
+@lru_cache(maxsize=4)
+def _ranges(n: int) -> Ints:
+    """First and end of each part of n points that is tested together, and the next range outside it; (k, 3)."""
+    rows: list[list[int]] = []
+
+    def add(begin: int, end: int, size: int) -> None:
+        row = [begin, end, 0]
+        rows.append(row)
+        size //= _PARTS
+        if size >= _BALL:
+            for k in range(begin, end, size):
+                add(k, min(k + size, end), size)
+        row[2] = len(rows)
+
+    size = _BALL
+    while size < n:
+        size *= _PARTS
+    add(0, n, size)
+    return np.array(rows, dtype=np.int32)
+
+
+@njit(cache=True)
+def _balls(points: Floats, ranges: Ints) -> Floats:
+    """Centre and radius of a ball around each range of points, (k, 4)."""
+    out = np.zeros((len(ranges), 4))
+    for b in range(len(ranges)):
+        group = points[ranges[b, 0] : ranges[b, 1]]
+        for a in range(3):
+            out[b, a] = (group[:, a].min() + group[:, a].max()) / 2.0
+        for k in range(len(group)):
+            x, y, z = group[k, 0] - out[b, 0], group[k, 1] - out[b, 1], group[k, 2] - out[b, 2]
+            out[b, 3] = max(out[b, 3], np.sqrt(x * x + y * y + z * z))
+    return out
+
+
+@njit(cache=True)
+def _codes(points: Floats, low: Floats, cell_m: float) -> NDArray[np.int64]:
+    """Morton's codes of points, (n,): those of neighbours differ little."""
+    out = np.zeros(len(points), np.int64)
+    for k in range(len(points)):
+        for a in range(3):
+            cell = int((points[k, a] - low[a]) / cell_m)
+            for bit in range(10):
+                out[k] |= (cell >> bit & 1) << (3 * bit + a)
+    return out
 
 
 def start_visibility(
@@ -140,25 +242,29 @@ def start_visibility(
     And the view that sees most of them (-1 for none).
     """
     p, q = np.asarray(points, dtype=np.float64), np.asarray(poses, dtype=np.float64)
-    pose, point, view = _left_to_cast(scene, p, q)
-    free = scene.unobstructed(q[pose, :3], p[point])
+    low, high = p.min(axis=0), p.max(axis=0)
+    p = p[np.argsort(_codes(p, low, max(float((high - low).max()), 1e-6) / 1023.0), kind="stable")]
+    pose, point, view = _in_view(p, q, _left_to_cast(scene, p, q))
+    free = scene.unobstructed(q[:, :3], p, ends=(pose, point))
     pose, point, view = pose[free], point[free], view[free]
     votes = np.bincount(pose * len(VIEWS) + view, minlength=len(q) * len(VIEWS)).reshape(len(q), -1)
     some = np.flatnonzero(votes.any(axis=1))
     share = np.zeros(len(q))
     # What the target itself hides matters only where something is seen.
-    facing = np.zeros((len(q), len(p)), dtype=np.bool_)
-    facing[pose, point] = True
-    rest, hidden = np.nonzero(~facing[some])
-    facing[some[rest], hidden] = own.unobstructed(q[some[rest], :3], p[hidden])
-    share[some] = votes[some].sum(axis=1) / facing[some].sum(axis=1)
+    unseen = np.ones((len(q), len(p)), dtype=np.bool_)
+    unseen[pose, point] = False
+    rest, hidden = _pairs(unseen[some] & _left_to_cast(own, p, q[some]))
+    facing = own.unobstructed(q[some, :3], p, ends=(rest, hidden))
+    seen = votes[some].sum(axis=1)
+    share[some] = seen / (seen + np.bincount(rest[facing], minlength=len(some)))
     return share, np.where(votes.any(axis=1), votes.argmax(axis=1), -1)
 
 
-def _left_to_cast(scene: TriangleRayCaster, points: Floats, poses: Floats) -> tuple[Ints, Ints, Codes]:
-    """Poses, points and views of the rays to cast: a few rays a pose tell which triangles hide most of the points."""
+def _left_to_cast(caster: TriangleRayCaster, points: Floats, poses: Floats) -> Flags:
+    """Points (n, m) to cast rays to: a few rays a pose tell which triangles hide most of them."""
     probes = points[:: max(1, len(points) // _PROBES)]
     origins = np.repeat(poses[:, :3], len(probes), axis=0)
-    _, faces = scene.first_hit(origins, np.tile(probes, (len(poses), 1)) - origins)
-    box = np.stack([points.min(axis=0), points.max(axis=0)])
-    return _undecided(points, box, poses, faces.reshape(len(poses), len(probes)), *scene.triangles)
+    _, faces = caster.first_hit(origins, np.tile(probes, (len(poses), 1)) - origins)
+    ranges = _ranges(len(points))
+    faces = faces.reshape(len(poses), len(probes))
+    return _uncovered(points, _balls(points, ranges), ranges, poses, faces, *caster.triangles)
