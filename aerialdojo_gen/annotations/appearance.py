@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,7 @@ def _pixel_shares(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> d
     return shares
 
 
+@lru_cache(maxsize=1024)
 def _material_shares(material: Material) -> dict[str, float]:
     """Return a material's share by colour name: stripes count as two colours, not as their mean."""
     pixels = np.array([material.colour])

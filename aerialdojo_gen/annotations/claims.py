@@ -99,6 +99,9 @@ class SceneClaims:
             self.geometry.index[m.node]: m.name for m in sorted(landmarks, key=lambda m: m.id, reverse=True)
         }
         self._nouns = vocabulary.nouns
+        self._by_noun: dict[str, list[int]] = {}
+        for j, noun in enumerate(self._nouns):
+            self._by_noun.setdefault(f" {noun.name.lower()}", []).append(j)
         self._count = Counter(noun.name for noun in self._nouns)
         self._short = Counter(noun.short for noun in self._nouns)
         self._known: dict[int, tuple[Claim, ...]] = {}
@@ -253,8 +256,8 @@ class SceneClaims:
         """Landmarks and instances of a name; a picnic bench is a bench, too."""
         ending = f" {noun.lower()}"
         marks = [j for j, name in self._landmark_names.items() if f" {name.lower()}" == ending]
-        things = (j for j, n in enumerate(self._nouns) if j not in marks)
-        return [*marks, *(j for j in things if f" {self._nouns[j].name.lower()}".endswith(ending))]
+        things = (j for name, same in self._by_noun.items() if name.endswith(ending) for j in same if j not in marks)
+        return [*marks, *sorted(things)]
 
     @cached_property
     def _keys_of(self) -> Mapping[str, frozenset[str]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from aerialdojo_gen.annotations.appearance import DEGREES, SHADES
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
@@ -59,6 +59,12 @@ def _relations() -> dict[tuple[str, ...], str]:
 
 def _tokens(text: str) -> tuple[str, ...]:
     return tuple(_TOKEN.findall(_CORNER.sub(r"\1\2", text.lower())))
+
+
+@lru_cache(maxsize=4096)
+def _written(text: str) -> frozenset[str]:
+    """Words of a text, whatever their case."""
+    return frozenset(re.findall(r"[^\W_]+", text.casefold()))
 
 
 @dataclass
@@ -156,6 +162,8 @@ class Matcher:
         marked: list[tuple[str, str]] = []
         for look in () if imported else vocabulary.catalogue_looks(self._instances[i]):
             for wording in look.wordings:
+                if not _written(wording) <= _written(text):
+                    continue
                 pattern = r"[\W_]+".join(map(re.escape, re.findall(r"[^\W_]+", wording.lower())))
                 mark = f" {_MARK}{len(marked)} "
                 left = re.sub(

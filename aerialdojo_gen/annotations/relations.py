@@ -49,7 +49,12 @@ class SceneGeometry:
         self.index = {instance.node: i for i, instance in enumerate(scene.instances)}
         self.boxes: Floats = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
         self.centres: Floats = self.boxes.mean(axis=1)
+        self._heights_m: list[list[float]] = self.boxes[:, :, 2].tolist()
         self._outlines: dict[int, shapely.Geometry] = {}
+        # One pair is asked for by several relations, and by claims of other things.
+        self._level_gaps: dict[tuple[int, int], float] = {}
+        self._bearings: dict[tuple[int, int], float | None] = {}
+        self._close: dict[tuple[int, float], list[int]] = {}
         self._supports: dict[int, int | None] = {}
         self._corners: dict[int, Floats] = {}
         self._covers: dict[int, frozenset[int]] = {}
@@ -93,19 +98,24 @@ class SceneGeometry:
 
     def level_gap_m(self, i: int, j: int) -> float:
         """Horizontal distance between the outlines of two instances, metres."""
-        return float(shapely.distance(self.outline(i), self.outline(j)))
+        if (i, j) not in self._level_gaps:
+            self._level_gaps[i, j] = float(shapely.distance(self.outline(i), self.outline(j)))
+        return self._level_gaps[i, j]
 
     def _rise_m(self, i: int, j: int) -> float:
-        (low_i, high_i), (low_j, high_j) = self.boxes[i, :, 2], self.boxes[j, :, 2]
-        return max(0.0, float(low_j - high_i), float(low_i - high_j))
+        (low_i, high_i), (low_j, high_j) = self._heights_m[i], self._heights_m[j]
+        return max(0.0, low_j - high_i, low_i - high_j)
 
     def neighbours(self, i: int, radius_m: float) -> list[int]:
         """Other instances whose boxes are within a distance of an instance's box."""
-        (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
-        r = radius_m
-        hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
-        level = (self.boxes[hits, 0, 2] <= z1 + r) & (self.boxes[hits, 1, 2] >= z0 - r)
-        return [int(j) for j in hits[level] if j != i]
+        key = i, radius_m
+        if key not in self._close:
+            (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
+            r = radius_m
+            hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
+            level = (self.boxes[hits, 0, 2] <= z1 + r) & (self.boxes[hits, 1, 2] >= z0 - r)
+            self._close[key] = [j for j in hits[level].tolist() if j != i]
+        return self._close[key]
 
     def support(self, i: int) -> int | None:
         """The supporting instance: the highest surface close to the bottom."""
@@ -194,13 +204,12 @@ class SceneGeometry:
 
     def bearing_rad(self, i: int, j: int) -> float | None:
         """Direction from the nearest point of `j`'s outline to the centre of `i`; None inside the outline."""
-        x, y = self.centres[i, :2]
-        here = shapely.Point(x, y)
-        line = shapely.shortest_line(self.outline(j), here)
-        if line is None or shapely.length(line) < 0.05:
-            return None
-        px, py = line.coords[0]
-        return math.atan2(y - py, x - px)
+        if (i, j) not in self._bearings:
+            x, y = self.centres[i, :2].tolist()
+            line = shapely.get_coordinates(shapely.shortest_line(self.outline(j), shapely.points(x, y)))
+            far = len(line) > 0 and math.dist(*line) >= 0.05
+            self._bearings[i, j] = math.atan2(y - line[0, 1], x - line[0, 0]) if far else None
+        return self._bearings[i, j]
 
     def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` is close to `j`, not on, under or over it."""

@@ -48,6 +48,8 @@ def quaternion_xyzw_to_yaw(quaternion: ArrayLike) -> Floats:
 
 def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
     """Bring angles in radians, of any shape, into (-π, π]."""
+    if isinstance(angle_rad, float) and -math.pi < angle_rad <= math.pi:
+        return np.asarray(angle_rad)
     angle = np.asarray(angle_rad, dtype=np.float64)
     inside = (angle > -math.pi) & (angle <= math.pi)
     wrapped = math.pi - np.mod(math.pi - angle, 2.0 * math.pi)

@@ -7,7 +7,7 @@ import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 from aerialdojo_gen.base.errors import AnnotationError
@@ -32,7 +32,7 @@ class Frame:
     share: float  # Of the template's weight
     held_out: bool  # Whether training tasks have no text with its template
 
-    @property
+    @cached_property
     def slots(self) -> frozenset[str]:
         """Its slots."""
         return frozenset(_SLOT.findall(self.text))

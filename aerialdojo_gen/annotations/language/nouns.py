@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class NounPhrase:
     own: tuple[str, ...] = ()
     tail: str = ""  # "full of soil"
 
-    @property
+    @cached_property
     def bare(self) -> str:
         """Without article."""
         own = " ".join([*self.own, self.name.head])

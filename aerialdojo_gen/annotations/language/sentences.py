@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -61,7 +62,9 @@ def compose(
         kinds |= {kind: _KINDS[kind] for kind in ("at_telling" if details[0][1] else "at_with",)}
     names, weights = list(kinds), np.array(list(kinds.values()))
     kind = names[int(rng.choice(len(names), p=weights / weights.sum()))]
-    first = _choose([f for f in frames(section, kind) if f.held_out == held_out and _fits(f, content)], rng)
+    # Nothing is "with ..." twice, and no tail stands: "a planter with flowers standing by ...".
+    tailed = bool(content.phrase.tail) or " with " in content.phrase.bare
+    first = _choose(_fitting(section, kind, held_out, bool(content.verb[1]), tailed), rng)
     if first is None:
         return None
     slots = _slots(content, rng)
@@ -115,15 +118,15 @@ def _slots(content: Content, rng: np.random.Generator) -> dict[str, str]:
     }
 
 
-def _fits(frame: Frame, content: Content) -> bool:
-    """Whether a frame goes with the noun phrase and the verb."""
-    if "ing" in frame.slots and not content.verb[1]:
-        return False
-    phrase = content.phrase
-    # Nothing is "with ..." twice, and no tail stands: "a planter with flowers standing by ...".
-    if phrase.tail or " with " in phrase.bare:
-        return not (_WITH.search(frame.text) or _GOES_ON.search(frame.text))
-    return True
+@cache
+def _fitting(section: str, kind: str, held_out: bool, participle: bool, tailed: bool) -> tuple[Frame, ...]:
+    """Frames of first sentences that go with a verb and a noun phrase: with a participle or a tail, or without."""
+    return tuple(
+        f for f in frames(section, kind)
+        if f.held_out == held_out
+        if participle or "ing" not in f.slots
+        if not tailed or not (_WITH.search(f.text) or _GOES_ON.search(f.text))
+    )  # fmt: skip
 
 
 def _choose(pool: Sequence[Frame], rng: np.random.Generator) -> Frame | None:
