@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.frames import compass_direction
-from aerialdojo_gen.scenes.claims import valid_looks
 from aerialdojo_gen.scenes.model import Instance
 
 KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
@@ -106,6 +105,7 @@ class SceneClaims:
         self._short = Counter(noun.short for noun in self._nouns)
         self._known: dict[int, tuple[Claim, ...]] = {}
         self._fitting: dict[Mention, frozenset[int]] = {}
+        self._mentions: dict[int, Mention] = {}
 
     @cached_property
     def bearings(self) -> list[Bearing | None]:
@@ -236,6 +236,11 @@ class SceneClaims:
 
     def _mention_of(self, j: int) -> Mention:
         """Name a thing by as few words as are unique in the scene, else by its short noun phrase."""
+        if j not in self._mentions:
+            self._mentions[j] = self._shortest(j)
+        return self._mentions[j]
+
+    def _shortest(self, j: int) -> Mention:
         node, noun = self.scene.instances[j].node, self._nouns[j]
         if j in self._landmark_names:
             return Mention(node, self._landmark_names[j], (), True)
@@ -296,8 +301,8 @@ class SceneClaims:
         instance = self.scene.instances[j]
         if slack <= 1.0:
             return claim.key in self.vocabulary.true_looks(instance)
-        looks = [look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key]
-        return bool(valid_looks(looks, instance, self.scene.materials))
+        looks = (look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key)
+        return any(self.vocabulary.is_valid(look, instance) for look in looks)
 
     def _place_holds(self, claim: Claim, j: int, slack: float) -> bool:
         place = claim.key.lower()
@@ -346,10 +351,12 @@ class SceneClaims:
         return seen and (towards or k not in self.landmarks)
 
 
-def _words(text: str) -> set[str]:
-    return {_SPELT.get(word, word) for word in re.findall(r"[^\W_]+", text.lower())}
+@lru_cache(maxsize=4096)
+def _words(text: str) -> frozenset[str]:
+    return frozenset(_SPELT.get(word, word) for word in re.findall(r"[^\W_]+", text.lower()))
 
 
+@lru_cache(maxsize=4096)
 def _covers(own: str, said: str) -> bool:
     """Whether a value may be called by another one: dark green is green, and silver is grey."""
     mine = _words(own)

@@ -55,6 +55,7 @@ class SceneGeometry:
         self._level_gaps: dict[tuple[int, int], float] = {}
         self._bearings: dict[tuple[int, int], float | None] = {}
         self._close: dict[tuple[int, float], list[int]] = {}
+        self._columns: dict[tuple[float, float], list[tuple[int, Floats]]] = {}
         self._supports: dict[int, int | None] = {}
         self._corners: dict[int, Floats] = {}
         self._covers: dict[int, frozenset[int]] = {}
@@ -76,11 +77,12 @@ class SceneGeometry:
             instance = self.scene.instances[i]
             xy = instance.vertices[:, :2]
             if np.ptp(xy, axis=0).max() < _LARGE_M or len(instance.faces) > _MANY_FACES:
-                outline = shapely.convex_hull(shapely.multipoints(xy))
+                # A line, because GEOS makes an object of every one of several points.
+                outline = shapely.convex_hull(shapely.linestrings(xy))
             else:
                 triangles = shapely.polygons(xy[instance.faces])
                 solid = shapely.area(triangles) > 1e-6
-                hull = shapely.convex_hull(shapely.multipoints(xy))
+                hull = shapely.convex_hull(shapely.linestrings(xy))
                 outline = shapely.union_all(triangles[solid], grid_size=_GRID_M) if solid.any() else hull
             shapely.prepare(outline)
             self._outlines[i] = outline
@@ -164,13 +166,11 @@ class SceneGeometry:
 
     def columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
         """Other instances with surfaces above or below a point, and their heights."""
-        found = []
-        for j in np.sort(self._tree.query(shapely.Point(x, y))):
-            if j != i:
-                heights = self._heights(int(j), x, y)
-                if len(heights):
-                    found.append((int(j), heights))
-        return found
+        if (x, y) not in self._columns:
+            things = np.sort(self._tree.query(shapely.Point(x, y))).tolist()
+            crossed = ((j, self._heights(j, x, y)) for j in things)
+            self._columns[x, y] = [(j, heights) for j, heights in crossed if len(heights)]
+        return [(j, heights) for j, heights in self._columns[x, y] if j != i]
 
     def surfaces(self, j: int, x: float, y: float) -> list[tuple[str, Floats]]:
         """Materials of an instance above or below a point, and their heights, metres."""

@@ -8,7 +8,7 @@ from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.claims import Body
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
@@ -28,6 +28,8 @@ class Vocabulary:
         self.kinds = {category: catalogue[category].kind for category in catalogue}
         self._looks = {category: catalogue[category].looks for category in catalogue}
         self._surface = Surface(scene)
+        self._bodies: dict[Instance, Body] = {}
+        self._valid: dict[tuple[Instance, str], bool] = {}
         self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
         by_category: dict[str, Words] = {}
@@ -65,10 +67,19 @@ class Vocabulary:
         """Phrases that the catalogue has for an instance's category."""
         return self._looks.get(instance.category, ())
 
+    def is_valid(self, look: Look, instance: Instance) -> bool:
+        """Whether a phrase of the catalogue is true of an instance, visible or not; measured once."""
+        key = instance, look.phrase
+        if key not in self._valid:
+            if instance.anatomy is not None and instance not in self._bodies:
+                self._bodies[instance] = Body(instance, self.scene.materials)
+            self._valid[key] = instance in self._bodies and not self._bodies[instance].false_claims(look)
+        return self._valid[key]
+
     def true_looks(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, and visible; measured once."""
         if instance not in self._true:
-            true = valid_looks(self.catalogue_looks(instance), instance, self.scene.materials)
+            true = [look for look in self.catalogue_looks(instance) if self.is_valid(look, instance)]
             self._true[instance] = tuple(look.phrase for look in true if self._surface.shows(look, instance))
         return self._true[instance]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class About:
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
         self.details = [w for w in said if w.details and _sayable(w)]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
+        same = self.instance.category
+        self._others = [j for j, it in enumerate(scene.scene.instances) if it.category == same and j != i]
         self.telling = cache(self._telling)
         self._fits = cache(lambda index, j: scene.holds(claims[index], j, DISTRACTOR_SLACK))
 
@@ -77,9 +79,7 @@ class About:
 
     def _telling(self, index: int) -> bool:
         """Whether a claim is false of every other of the category in the scene, and there are others."""
-        instances = self.scene.scene.instances
-        others = [j for j, it in enumerate(instances) if it.category == self.instance.category and j != self.i]
-        return bool(others) and not self.fitting(index, others)
+        return bool(self._others) and not self.fitting(index, self._others)
 
     def names_again(self, index: int, plan: Plan) -> bool:
         """Whether a claim of place names what one of the plan names, or is a second phrase of place."""
@@ -99,9 +99,10 @@ def _sayable(wording: Wording) -> bool:
     return min(lengths) > 1 and max(lengths) <= _SHORT_DETAIL
 
 
-def _named(claim: Claim) -> set[str]:
+@lru_cache(maxsize=1024)
+def _named(claim: Claim) -> frozenset[str]:
     words = [m.noun.split()[-1] for m in claim.things] or claim.key.replace("'s", "").split()
-    return {word.removesuffix("s") for word in words if len(word) > 2}
+    return frozenset(word.removesuffix("s") for word in words if len(word) > 2)
 
 
 def _seen(looks: Mapping[str, Look], key: str, shown: Collection[str] | None) -> bool:

@@ -68,9 +68,9 @@ class LocationWords:
     def _words(self, table: str, key: str, i: int, nodes: Sequence[int], rng: np.random.Generator) -> str:
         """Choose a wording whose conditions hold; empty if the table has none for the key."""
         words = relation_words()[table].get(key) or (relation_words()["relation"][key] if table == "vague" else ())
-        for k in rng.permutation(len(words)):
-            if all(words[int(k)].holds(self._claims, i, j) for j in nodes):
-                return words[int(k)].say
+        for k in rng.permutation(len(words)).tolist():
+            if all(words[k].holds(self._claims, i, j) for j in nodes):
+                return words[k].say
         return ""
 
     def _place(self, phrase: str) -> Sequence[str]:

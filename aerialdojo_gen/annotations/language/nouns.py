@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -81,6 +81,7 @@ def noun_phrase(name: Name, adjectives: Sequence[str], tail: str = "") -> NounPh
     return NounPhrase(name, whole, tuple(own), tail)
 
 
+@cache
 def name_of(text: str) -> Name:
     """Split a noun into its collective and its head."""
     group, of, head = text.partition(" of ")
