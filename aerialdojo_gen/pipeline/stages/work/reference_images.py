@@ -76,9 +76,13 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
             row |= zip(_BOX, box_of(mask), strict=True)
         else:
             counts["not_in_view"] += 1
-        row["parts_shown"] = _parts_shown(rays, k, thing, camera, pose, mask, view_pose(place, yaw, "front"))
-        missing = missing_tells(thing, camera, pose, mask)
-        if thing.anatomy is not None and thing.anatomy.identifying_parts:
+        if thing.anatomy is None:
+            continue
+        alone = instance_caster(thing)
+        at_anchor = view_pose(place, yaw, "front")
+        row["parts_shown"] = _parts_shown(rays, alone, k, thing, camera, pose, mask, at_anchor)
+        missing = missing_tells(thing, camera, pose, mask, alone)
+        if thing.anatomy.identifying_parts:
             row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.identifying_parts)
             row["tells_missing"] = ", ".join(missing) or None
     pictures = sum(row["reference_image"] is not None for row in rows)
@@ -86,15 +90,13 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
 
 
 def _parts_shown(
-    rays: RayCaster, k: int, thing: Instance, camera: Camera, pose: NDArray[np.float64], mask: NDArray[np.bool_],
-    at_anchor: NDArray[np.float64],
+    rays: RayCaster, alone: TriangleRayCaster, k: int, thing: Instance, camera: Camera, pose: NDArray[np.float64],
+    mask: NDArray[np.bool_], at_anchor: NDArray[np.float64],
 ) -> list[str]:  # fmt: skip
     """Names of the parts that the picture shows, and the view from the anchor, too."""
-    if thing.anatomy is None:
-        return []
+    assert thing.anatomy is not None
     some = np.zeros_like(mask)
     some[::_SOME_PX, ::_SOME_PX] = True
-    alone = instance_caster(thing)
     seen = _seen_faces(alone, len(thing.faces), camera, pose, mask & some)
     if not np.allclose(pose, at_anchor):
         pixels = np.flatnonzero(boxed(camera, at_anchor, thing.vertices) & some)
@@ -116,14 +118,14 @@ def _seen_faces(
 
 
 def missing_tells(
-    instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_]
-) -> list[str]:
+    instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_],
+    alone: TriangleRayCaster,
+) -> list[str]:  # fmt: skip
     """Names of the identifying parts with less than `LEAST_SHARE` of a picture's pixels; mask is (H, W) bool."""
     names = () if instance.anatomy is None else instance.anatomy.identifying_parts
     if not names:
         return []
     parts = [instance.faces_of(name) for name in names]
-    alone = instance_caster(instance)
     shares = part_shares(alone, instance, parts, camera, world_from_camera, mask, LEAST_SHARE)
     return [name for name, share in zip(names, shares, strict=True) if share < LEAST_SHARE]
 
@@ -144,14 +146,14 @@ def instance_mask(
         if drawn is None:
             mask[v0:v1, u0:u1] = _window(rays, camera, world_from_camera, u0, v0, u1, v1) == instance
         else:
-            directions = product(_rays_of(camera, u0, v0, u1, v1), world_from_camera[:3, :3].T)
-            mask[v0:v1, u0:u1] = _mended(rays, instance, drawn[v0:v1, u0:u1], world_from_camera[:3, 3], directions)
+            local = _rays_of(camera, u0, v0, u1, v1)
+            mask[v0:v1, u0:u1] = _mended(rays, instance, drawn[v0:v1, u0:u1], world_from_camera, local)
     return mask
 
 
 def _mended(
-    rays: RayCaster, instance: int, drawn: NDArray[np.int32], eye: NDArray[np.float64],
-    directions: NDArray[np.float64],
+    rays: RayCaster, instance: int, drawn: NDArray[np.int32], world_from_camera: NDArray[np.float64],
+    local: NDArray[np.float64],
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Cast rays where a drawn map may be wrong about an instance, and wider where it is."""
     mask = drawn == instance
@@ -162,7 +164,8 @@ def _mended(
     cast = np.zeros_like(mask)
     while to_check.any():
         cast |= to_check
-        hit = rays.first_hit(eye, directions[to_check])[1] == instance
+        directions = product(local[to_check], world_from_camera[:3, :3].T)
+        hit = rays.first_hit(world_from_camera[:3, 3], directions)[1] == instance
         wrong = np.zeros_like(shown)
         wrong[to_check] = hit != mask[to_check]
         mask[to_check] = hit
