@@ -13,11 +13,9 @@ _T = TypeVar("_T")
 
 def _digest(seed: int, stage: str, key: tuple[object, ...]) -> bytes:
     """Hash (seed, stage, key); lengths are part of the hash, so that ("a", "bc") and ("ab", "c") differ."""
-    h = hashlib.blake2b(digest_size=16)
-    for part in (str(seed), stage, *(str(k) for k in key)):
-        raw = part.encode()
-        h.update(len(raw).to_bytes(4, "little") + raw)
-    return h.digest()
+    parts = [str(part).encode() for part in (seed, stage, *key)]
+    raw = b"".join([len(part).to_bytes(4, "little") + part for part in parts])
+    return hashlib.blake2b(raw, digest_size=16).digest()
 
 
 def generator(seed: int, stage: str, *key: object) -> np.random.Generator:

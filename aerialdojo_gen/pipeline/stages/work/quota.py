@@ -83,34 +83,36 @@ def rank_candidates(
     kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> dict[str, NDArray[np.int64]]:
     """Rows of each setting's tasks in the order of selection by `select_quota`."""
-    scores, tie_rank = _score(kept, counts, path_m, seed, preference)
-    return {name: _best(scores, tie_rank, rows) for name, rows in _groups(kept, counts).items()}
+    groups = _groups(kept, counts)
+    scores = _score(kept, counts, groups, path_m, seed, preference)
+    return {name: _best(scores, rows) for name, rows in groups.items()}
 
 
 def _groups(kept: Kept, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
-    return {name: np.flatnonzero(np.asarray(kept.settings) == name) for name in sorted(counts)}
+    """Rows of each setting, by key: ties are broken by it, not by row order."""
+    by_key = np.argsort(np.asarray(kept.sampling_keys))
+    settings = np.asarray(kept.settings)[by_key]
+    return {name: by_key[settings == name] for name in sorted(counts)}
 
 
-def _best(scores: Floats, tie_rank: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def _best(scores: Floats, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Sort rows by their scores, the largest first."""
-    return rows[np.lexsort((tie_rank[rows], -scores[rows]))]
+    return rows[np.argsort(-scores[rows], kind="stable")]
 
 
 def _score(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`; and the ranks (n,) that break ties."""
+    kept: Kept, counts: Mapping[str, int], groups: Mapping[str, NDArray[np.int64]], path_m: float, seed: int,
+    preference: float,
+) -> Floats:  # fmt: skip
+    """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`."""
     length_m = kept.length_m
     gumbel_scores = np.array([_gumbel(seed, key) for key in kept.sampling_keys]) + preference * kept.levels
-    # Ties are broken by key, not by row order.
-    tie_rank = np.argsort(np.argsort(np.asarray(kept.sampling_keys)))
-    groups = [(rows, counts[name]) for name, rows in _groups(kept, counts).items()]
 
     def tilted(tilt: float) -> Floats:
         return np.asarray(gumbel_scores + tilt * length_m / _SCALE_M)
 
     def total(scores: Floats) -> float:
-        return float(sum(length_m[_best(scores, tie_rank, rows)[:n]].sum() for rows, n in groups))
+        return float(sum(length_m[_best(scores, rows)[: counts[name]]].sum() for name, rows in groups.items()))
 
     low, high = -_STEEPEST, _STEEPEST
     best = tilted(0.0)
@@ -127,7 +129,7 @@ def _score(
             high = middle
         if abs(reached - path_m) <= 1e-4 * path_m:
             break
-    return best, tie_rank
+    return best
 
 
 def _gumbel(seed: int, key: str) -> float:

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
-_LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+_LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action", "agent_action")
 
 
 def _train_fraction(scene: str, out_of_distribution: bool, config: SplitConfig) -> float:
@@ -38,9 +38,10 @@ def _take(table: pa.Table, key: str, ids: pa.ChunkedArray) -> pa.Table:
 def routes_table(
     scene: str, kept: pa.Table, pairs: pa.Table, plans: pa.Table, goals: pa.Table, key: bytes
 ) -> pa.Table:
-    """Make the routes of the kept candidates."""
+    """Make the routes of the kept candidates, without their lists: ``plan`` is the row of `plans` that has them."""
+    plan = pc.index_in(kept.column("pair_id"), value_set=plans.column("pair_id").combine_chunks())
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
-    plans = _take(plans, "pair_id", kept.column("pair_id"))
+    plans = plans.drop_columns(list(_LISTS)).take(plan)
     goal = _take(goals, "object_id", pairs.column("target_object_id"))
     pair_ids = kept.column("pair_id").to_pylist()
     columns: dict[str, Any] = {
@@ -52,12 +53,20 @@ def routes_table(
         **{name: pairs.column(name) for name in ("euclidean_m", *(field.name for field in START_VIEW))},
         "detour_ratio": pc.divide(plans.column("length_m"), pc.max_element_wise(pairs.column("euclidean_m"), 1e-12)),
         **{name: plans.column(name) for name in ("length_m", "n_actions", *(field.name for field in DIFFICULTY))},
-        **{name: plans.column(name) for name in ("min_clearance_m", *_LISTS, "agent_action")},
+        "min_clearance_m": plans.column("min_clearance_m"),
     }
-    routes = pa.table({name: columns[name] for name in ROUTES.schema.names}, schema=ROUTES.schema)
+    schema = pa.schema([field for field in ROUTES.schema if field.name not in _LISTS])
+    routes = pa.table({name: columns[name] for name in schema.names}, schema=schema).append_column("plan", plan)
     routes = routes.append_column("action_budget", kept.column("action_budget"))
     routes = routes.append_column("sampling_key", pa.array([sampling_key(scene, p) for p in pair_ids], pa.string()))
     return routes.sort_by([(column, "ascending") for column in ROUTES.order])
+
+
+def with_lists(routes: pa.Table, plans: pa.Table) -> pa.Table:
+    """Give routes of `routes_table` their lists: after the draw, because they are most of what a route has."""
+    lists = plans.select(_LISTS).take(routes.column("plan"))
+    columns = {name: (lists if name in _LISTS else routes).column(name) for name in ROUTES.schema.names}
+    return pa.table(columns, schema=ROUTES.schema).append_column("action_budget", routes.column("action_budget"))
 
 
 def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
@@ -86,7 +95,8 @@ def tasks_table(
     """Make both instances of every navigation task, 2n rows of `TASKS`."""
     n = routes.num_rows
     said, seen_frame = _said(routes, train, objects)
-    target = _take(objects, "object_id", routes.column("target_object_id"))
+    # Without the texts: every task would take all of its target's with it.
+    target = _take(objects.drop_columns("paraphrases"), "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
     seen_and_split = splits_of(routes, train, out) | {
         "frame_seen_in_train": seen_frame, "shape_seen_in_train": pc.invert(target.column("shape_held_out")),
@@ -148,9 +158,8 @@ def run(job: Job, config: SplitConfig) -> Output:
     verdicts = job.read("verdicts")
     kept = verdicts.filter(verdicts.column("keep"))
     key = key_of(config.salt, job.seed)
-    routes = routes_table(
-        job.scene, kept, job.read("pairs"), job.read("plans"), anchors.filter(anchors.column("selected")), key
-    )
+    plans = job.read("plans")
+    routes = routes_table(job.scene, kept, job.read("pairs"), plans, anchors.filter(anchors.column("selected")), key)
     objects = described(objects, job.read("descriptions"))
     references = _take(job.read("references"), "object_id", objects.column("object_id"))
     names = [reference_id(job.scene, k, key) for k in objects.column("object_id").to_pylist()]
@@ -173,9 +182,10 @@ def run(job: Job, config: SplitConfig) -> Output:
     train = train_mask(
         routes.column("sampling_key").to_pylist(), routes.column("setting").to_pylist(), trains, job.seed
     )
+    routes = with_lists(routes, plans)
     out = held_out(job.scene, objects.column("object_id").to_pylist(), config.held_out_fraction, key)
     tasks = tasks_table(routes, train, scene, named, out)
-    routes = routes.drop_columns(["action_budget", "sampling_key"])
+    routes = routes.drop_columns("action_budget")
     is_train = pc.equal(tasks.column("subset"), "train")
     tables = {
         "tasks/train": tasks.filter(is_train),
