@@ -20,7 +20,8 @@ from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
 from aerialdojo_gen.store.schemas.columns import DIFFICULTY, START_VIEW
 
-_LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action", "agent_action")
+_POSE = ("x_m", "y_m", "z_m", "yaw_rad")
+_LISTS = (*_POSE, "action", "agent_action")
 
 
 def _train_fraction(scene: str, out_of_distribution: bool, config: SplitConfig) -> float:
@@ -42,14 +43,15 @@ def routes_table(
     plan = pc.index_in(kept.column("pair_id"), value_set=plans.column("pair_id").combine_chunks())
     pairs = _take(pairs, "pair_id", kept.column("pair_id"))
     plans = plans.drop_columns(list(_LISTS)).take(plan)
-    goal = _take(goals, "object_id", pairs.column("target_object_id"))
+    # Without the pictures: every route would take a copy of its goal's.
+    goal = _take(goals.select(["object_id", *_POSE]), "object_id", pairs.column("target_object_id"))
     pair_ids = kept.column("pair_id").to_pylist()
     columns: dict[str, Any] = {
         "nav_id": pa.array([nav_id(scene, p, key) for p in pair_ids], pa.string()),
         "scene": pa.repeat(scene, kept.num_rows),
         "setting": kept.column("setting"),
         **{name: pairs.column(name) for name in ("start_object_id", "start_anchor_id", "target_object_id")},
-        **{f"goal_{name}": goal.column(name) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
+        **{f"goal_{name}": goal.column(name) for name in _POSE},
         **{name: pairs.column(name) for name in ("euclidean_m", *(field.name for field in START_VIEW))},
         "detour_ratio": pc.divide(plans.column("length_m"), pc.max_element_wise(pairs.column("euclidean_m"), 1e-12)),
         **{name: plans.column(name) for name in ("length_m", "n_actions", *(field.name for field in DIFFICULTY))},
@@ -96,7 +98,8 @@ def tasks_table(
     n = routes.num_rows
     said, seen_frame = _said(routes, train, objects)
     # Without the texts: every task would take all of its target's with it.
-    target = _take(objects.drop_columns("paraphrases"), "object_id", routes.column("target_object_id"))
+    told = ["object_id", "name", "landmark", "direction", "reference_image_id", "step_back_m", "shape_held_out"]
+    target = _take(objects.select(told), "object_id", routes.column("target_object_id"))
     nulls = pa.nulls(n, pa.string())
     seen_and_split = splits_of(routes, train, out) | {
         "frame_seen_in_train": seen_frame, "shape_seen_in_train": pc.invert(target.column("shape_held_out")),
@@ -112,7 +115,7 @@ def tasks_table(
             "setting": routes.column("setting"),
             "modality": pa.repeat(modality, n),
             "action_budget": routes.column("action_budget"),
-            **{f"start_{name}": pc.list_element(routes.column(name), 0) for name in ("x_m", "y_m", "z_m", "yaw_rad")},
+            **{f"start_{name}": pc.list_element(routes.column(name), 0) for name in _POSE},
             "target_name": target.column("name"),
             "landmark": target.column("landmark"),
             "direction": target.column("direction"),
