@@ -150,3 +150,6 @@ def test_unobstructed_says_what_the_first_hit_says():
     assert 0.2 < expected.mean() < 0.9
     assert (caster.unobstructed(origins, points) == expected).mean() > 0.999
     assert caster.unobstructed(origins[0], origins[:1]).all()
+    row, column = (rng.integers(3000, size=500).astype(np.int32) for _ in range(2))
+    named = caster.unobstructed(origins, points, ends=(row, column))
+    assert (named == caster.unobstructed(origins[row], points[column])).all()
