@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Protocol
 
 import numpy as np
@@ -38,19 +38,14 @@ class Materials(Protocol):
         ...
 
 
-def false_claims(look: Look, instance: Instance, materials: Materials) -> list[str]:
-    """List the claims of a phrase that do not hold of an instance."""
-    if instance.anatomy is None:
-        return ["its parts are unknown"]
-    return Body(instance, materials).false_claims(look)
-
-
 class Body:
     """Measurements of an instance's mesh in its own frame."""
 
     def __init__(self, instance: Instance, materials: Materials) -> None:
         assert instance.anatomy is not None
         self._instance, self._materials = instance, materials
+        # Phrases speak of the same few parts.
+        self._faces_of, self._copies_of = cache(instance.faces_of), cache(instance.copies_of)
         yaw = instance.anatomy.yaw_rad
         cos, sin = np.cos(yaw), np.sin(yaw)
         x, y, z = (instance.vertices - instance.bounds[0]).T
@@ -61,15 +56,15 @@ class Body:
 
     def false_claims(self, look: Look) -> list[str]:
         """List the claims of a phrase that do not hold."""
-        wrong = [f"has no {name}" for name in look.parts if not len(self._instance.faces_of(name))]
-        wrong += [f"has {name}" for name in look.lacks if len(self._instance.faces_of(name))]
+        wrong = [f"has no {name}" for name in look.parts if not len(self._faces_of(name))]
+        wrong += [f"has {name}" for name in look.lacks if len(self._faces_of(name))]
         if wrong:
             return wrong
         for name, (least, most) in look.count.items():
             n = self.count(name)
             wrong += [] if least <= n <= most else [f"has {n} x {name}"]
         for name, form in look.form.items():
-            copies = self._instance.copies_of(name)
+            copies = self._copies_of(name)
             if not all(_FORMS[form](self, faces) for faces in copies):
                 wrong.append(f"its {name} is not {form}")
         for name, words in look.colour.items():
@@ -84,14 +79,16 @@ class Body:
 
     def count(self, name: str) -> int:
         """Number of copies of a part; copies at the same place count once."""
-        middles = np.array([self._box(faces).mean(axis=0) for faces in self._instance.copies_of(name)])
+        middles = np.array([self._box(faces).mean(axis=0) for faces in self._copies_of(name)])
         return len(np.unique(np.round(middles / _SAME_PLACE_M), axis=0)) if len(middles) else 0
 
     def _shown(self, name: str, word: Callable[[Material], str]) -> str:
-        faces = self._instance.faces_of(name)
+        faces = self._faces_of(name)
+        parts = self._part_of[faces].tolist()
+        words = {k: word(self._materials[self._instance.parts[k].material]) for k in set(parts)}
         area: defaultdict[str, float] = defaultdict(float)
-        for k, size in zip(self._part_of[faces], self._areas[faces], strict=True):
-            area[word(self._materials[self._instance.parts[int(k)].material])] += float(size)
+        for k, size in zip(parts, self._areas[faces].tolist(), strict=True):
+            area[words[k]] += size
         return max(sorted(area), key=lambda key: area[key])
 
     @cached_property
@@ -113,7 +110,7 @@ class Body:
 
     def measure(self, part: str, measure: str) -> float:
         """Length, width or height of the body (part empty) or of a part, metres; of copies the largest."""
-        boxes = [self._box(faces) for faces in self._instance.copies_of(part)] if part else [self._whole]
+        boxes = [self._box(faces) for faces in self._copies_of(part)] if part else [self._whole]
         sizes = np.array([high - low for low, high in boxes])
         across = np.sort(sizes[:, :2], axis=1)
         return float({"length": across[:, 1], "width": across[:, 0], "height": sizes[:, 2]}[measure].max())
@@ -124,10 +121,10 @@ class Body:
         return own > limit if c.greater else own < limit
 
     def _ordered(self, order: Order) -> bool:
-        a = self._box(self._instance.faces_of(order.part))
+        a = self._box(self._faces_of(order.part))
         if not order.other:
             return _PLACES[order.relation](a, self._whole)
-        return _RELATIONS[order.relation](a, self._box(self._instance.faces_of(order.other)))
+        return _RELATIONS[order.relation](a, self._box(self._faces_of(order.other)))
 
     def extents(self, faces: Ints) -> Floats:
         """Extents of faces along their principal axes, (3,) float64, metres, ascending."""
@@ -168,8 +165,8 @@ def _upright(body: Body, faces: Ints) -> Floats:
 _FORMS: Mapping[str, Callable[[Body, Ints], bool]] = {
     "round": lambda b, f: b.few_directions(f) <= _ROUND_SHARE,
     "boxy": lambda b, f: b.few_directions(f) >= _BOXY_SHARE,
-    "flat": lambda b, f: bool(b.extents(f)[0] < _FLAT * b.extents(f)[1]),
-    "slender": lambda b, f: bool(b.extents(f)[2] > _SLENDER * b.extents(f)[1]),
+    "flat": lambda b, f: bool((size := b.extents(f))[0] < _FLAT * size[1]),
+    "slender": lambda b, f: bool((size := b.extents(f))[2] > _SLENDER * size[1]),
     "tapering": lambda b, f: b.narrowing(f) <= _TAPERING,
     "pointed": lambda b, f: b.narrowing(f) <= _POINTED,
     "sloping": lambda b, f: b.sloping(f) >= _SLOPING_SHARE,

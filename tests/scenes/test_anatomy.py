@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.anatomy import FRONTS, Run, parse_anatomy, remap_runs
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.claims import false_claims, valid_looks
+from aerialdojo_gen.scenes.claims import Body, valid_looks
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
 
@@ -74,8 +74,9 @@ def test_phrases_are_true_of_the_variants_that_bear_them_out_whichever_way_they_
 
 
 def test_a_phrase_that_is_not_true_says_what_is(assets):
-    catalogue, thing = load_catalogue(assets), lamp(assets, "double")
-    wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in catalogue["lamp"].looks}
+    catalogue = load_catalogue(assets)
+    body = Body(lamp(assets, "double"), catalogue.materials)
+    wrong = {look.phrase: body.false_claims(look) for look in catalogue["lamp"].looks}
     assert wrong["one arm"] == ["has 2 x arm"]
     assert wrong["a red glass"] == ["its glass is white"]
     assert wrong["a wooden foot"] == ["its foot is of paint"]

@@ -7,7 +7,7 @@ from itertools import product
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, false_claims
+from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, Body
 
 MIN_LOOKS = 3
 
@@ -36,7 +36,8 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
             for tell in thing.anatomy.identifying_parts:
                 if not len(thing.faces_of(tell)):
                     faults.append(f"{prop.source} {made}: tells: it has no {tell}")
-            wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in prop.looks}
+            body = Body(thing, catalogue.materials)
+            wrong = {look.phrase: body.false_claims(look) for look in prop.looks}
             true = sum(not w for w in wrong.values())
             if true < min(MIN_TRUE_LOOKS, len(prop.looks)):
                 faults.append(f"{prop.source} {made}: {true} looks are true of it: {_message(wrong)}")
