@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import product
+from types import MappingProxyType
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, Body
+from aerialdojo_gen.scenes.model import Instance
 
 MIN_LOOKS = 3
 
 
-def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = None, every: bool = True) -> list[str]:
-    """Build the target categories and list the false statements about them.
+def catalogue_faults(
+    catalogue: Catalogue, categories: Iterable[str] | None = None, every: bool = True,
+    things: Mapping[tuple[str, str], Instance] = MappingProxyType({}),
+) -> list[str]:  # fmt: skip
+    """Build the target categories, but for `things` by variant and design; list the false statements about them.
 
     Every variant in every design; or every variant in the first design, and the first variant in every design.
     """
@@ -31,7 +36,9 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
                 continue
             made = f"variant {variant.name!r}" + (f", design {design.name!r}" if design.name != "plain" else "")
             rng = generator(0, "check", name, variant.name)
-            thing = catalogue.instantiate(name, "thing", rng, variant=variant.name, design=design.name)
+            thing = things.get((variant.name, design.name)) or catalogue.instantiate(
+                name, "thing", rng, variant=variant.name, design=design.name
+            )
             assert thing.anatomy is not None
             for tell in thing.anatomy.identifying_parts:
                 if not len(thing.faces_of(tell)):
