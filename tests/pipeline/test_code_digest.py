@@ -147,10 +147,11 @@ def test_figures_of_the_paper_count_where_they_are_read():
 
 def test_libraries_that_shape_the_bytes_count():
     libraries = {name: set(stage_code(name).libraries) for name in NAMES}
-    assert {"numpy", "scipy", "trimesh", "shapely", "cv2", "pyarrow"} <= libraries["build-scenes"]
+    assert {"numpy", "scipy", "shapely", "cv2", "pyarrow"} <= libraries["build-scenes"]
     assert {"numba", "fcl", "numpy", "pyarrow"} <= libraries["plan"]
     assert {"moderngl", "pybullet", "av", "cv2"} <= libraries["render"]
     assert not {"av", "moderngl", "pybullet"} & libraries["filter"]
+    assert all("trimesh" not in found for found in libraries.values())
     assert not {"av", "moderngl", "pybullet", "embreex"} & libraries["split"]
     assert all(not {"pydantic", "tqdm", "typer", "gymnasium"} & found for found in libraries.values())
     for name in NAMES:
