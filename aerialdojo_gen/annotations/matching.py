@@ -246,16 +246,16 @@ class _Reading:
         elif not self._subject:
             self._subject = name
             self.matched.called = name if self._matcher.contradicts(self._i, name) else ""
-            self._settle(named=self._adjacent)
+            self._resolve_pending(named=self._adjacent)
         self._values = []
 
     def end_clause(self) -> None:
         """End what a relation or a verb governs."""
         # After "beside a bench with ..." the values belong to the bench, not to the subject.
         if not self._relation:
-            self._settle(named=False)
+            self._resolve_pending(named=False)
         self._values, self._relation, self._words, self._things = [], "", [], []
 
-    def _settle(self, named: bool) -> None:
+    def _resolve_pending(self, named: bool) -> None:
         for claim, words in self._matcher.values(self._i, self._values, named):
             self.matched.claims.setdefault(claim, words)

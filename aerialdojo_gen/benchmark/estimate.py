@@ -104,8 +104,8 @@ def _measure_steps(
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
-    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
-    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, tell=tell)
+    body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
+    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, hints=hints)
     # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]

@@ -333,7 +333,7 @@ _TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list
         "How episodes went", {
             "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
             "service": ("requests", "tokens in", "tokens out", "USD"),
-        }, run_rows, tables.conduct_cells,
+        }, run_rows, tables.outcome_cells,
     ),
     "type": TableSpec("By scene type", _type_rows, _by_run, "scene type"),
     "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),

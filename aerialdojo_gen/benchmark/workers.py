@@ -40,8 +40,8 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
         suits(release_fingerprint(data))
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
-    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
-    flight = Flight(data, sensors, embodiment=body, renderer=renderer, tell=tell)
+    body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
+    flight = Flight(data, sensors, embodiment=body, renderer=renderer, hints=hints)
     secrets = Secrets(evaluation.options)
     try:
         yield Worker(agent, flight, data, evaluation.identity(), evaluation.retry_policy, secrets)

@@ -95,13 +95,13 @@ def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Lis
     from aerialdojo_gen.dataset.contents import check_release
     from aerialdojo_gen.dataset.provenance import made_of_scenes
     from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
+    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
     from aerialdojo_gen.dataset.stats.tables import benchmark_table, tables
 
     made = made_of_scenes(root, check_release(root, scenes))
     names = [m.scene for m in made]
     tasks = read_tasks(root, names)
-    measured = [*worth_tables(read_goals(root, names), tasks), *difficulty_tables(tasks)]
+    measured = [*goal_tables(read_goals(root, names), tasks), *difficulty_tables(tasks)]
     return [*tables(made), *measured, benchmark_table(made)]
 
 

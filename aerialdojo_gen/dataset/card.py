@@ -20,7 +20,7 @@ from aerialdojo_gen.dataset.croissant import CITE_AS
 from aerialdojo_gen.dataset.provenance import made_of_scenes, makers
 from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
 from aerialdojo_gen.dataset.stats.tables import Made
 from aerialdojo_gen.dataset.stats.variety import read_variety, variety_table
 from aerialdojo_gen.store import schemas
@@ -149,7 +149,7 @@ def render_card(data: Where) -> str:
         made_by=sorted({maker.name for maker in known.values()} - {""}),
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),
-        worth={table.title: _rows(table) for table in worth_tables(read_goals(root, names), tasks)},
+        worth={table.title: _rows(table) for table in goal_tables(read_goals(root, names), tasks)},
         variety=_rows(variety_table(measured)) if (measured := read_variety(root, names)) else "",
         least_detour=float(np.min(tasks["plan_detour"].to_numpy())) if len(tasks) else None,
         most_visible=float(np.max(tasks["target_visible_at_start"].to_numpy())) if len(tasks) else None,

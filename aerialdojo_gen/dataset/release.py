@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.contents import scenes_in_release
-from aerialdojo_gen.dataset.lookup import SIDES, FoundTask, ReleasedScene, find_task, read_side
+from aerialdojo_gen.dataset.lookup import SIDES, ReleasedScene, TaskRecord, find_task, read_side
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
@@ -138,7 +138,7 @@ class Release:
         """Read the anchors."""
         return self.table("anchors", scene=scene)
 
-    def task(self, task_id: str) -> FoundTask:
+    def task(self, task_id: str) -> TaskRecord:
         """Find a task by its ``task_id`` or ``nav_id``; UsageError if there is none, with the nearest."""
         return find_task(self._data, task_id)
 

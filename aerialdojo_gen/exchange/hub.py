@@ -181,7 +181,9 @@ def pull_release(
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     if not replace:
-        _keep_own(root, {name: sibling for name, sibling in wanted.items() if _is_beside(name)}, repo)
+        _refuse_overwrite(
+            root, {name: sibling for name, sibling in wanted.items() if _is_outside_release(name)}, repo
+        )
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
@@ -193,7 +195,7 @@ def pull_release(
     _fetch(hub, commit, list(wanted.values()), partial, reporter)
     size = sum(_place(partial, name).stat().st_size for name in wanted)
     _check(open_root(partial), {name for name in wanted if _is_mesh(name)})
-    _settle(root, partial, sorted(wanted))
+    _move_into_place(root, partial, sorted(wanted))
     return Moved(str(root.path / FOLDER), commit, len(scenes), len(wanted), size, sum(map(_is_mesh, wanted)), left)
 
 
@@ -223,7 +225,7 @@ def _is_policy(name: str) -> bool:
     return is_plain(training) and name == _policy_file(training)
 
 
-def _is_beside(name: str) -> bool:
+def _is_outside_release(name: str) -> bool:
     """Whether a file lies beside the release in a data directory, and not in it."""
     return _is_mesh(name) or _is_policy(name)
 
@@ -244,10 +246,10 @@ def _weights(root: LocalRoot, name: str) -> Path:
     return path
 
 
-def _keep_own(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
+def _refuse_overwrite(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
     """Refuse to take the place of other meshes or weights: without a release they may be all that somebody has."""
     others = [name for name in sorted(wanted) if (root.path / name).is_file()]
-    others = [name for name in others if not _is_as_told(root.path / name, wanted[name])]
+    others = [name for name in others if not _matches_server(root.path / name, wanted[name])]
     if others:
         more = f" and {len(others) - 1} more" if others[1:] else ""
         raise UsageError(
@@ -261,11 +263,11 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
 
     def one(sibling: Any) -> None:
         path = _place(folder, sibling.rfilename)
-        if path.is_file() and _is_as_told(path, sibling):
+        if path.is_file() and _matches_server(path, sibling):
             return
         below = path.parents[len(PurePosixPath(sibling.rfilename).parts) - 1]
         hub.api.hf_hub_download(hub.repo, sibling.rfilename, repo_type="dataset", revision=commit, local_dir=below)
-        if not _is_as_told(path, sibling):
+        if not _matches_server(path, sibling):
             path.unlink(missing_ok=True)
             raise StoreError(f"{sibling.rfilename} of {hub.repo} came damaged: the same command fetches it again")
 
@@ -279,7 +281,7 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
             pool.shutdown(cancel_futures=True)
 
 
-def _is_as_told(path: Path, sibling: Any) -> bool:
+def _matches_server(path: Path, sibling: Any) -> bool:
     """Whether a file has the size and the digest that the server has: SHA-256 of a large one, else git's own."""
     size = path.stat().st_size
     if sibling.size is not None and size != sibling.size:
@@ -296,7 +298,7 @@ def _is_as_told(path: Path, sibling: Any) -> bool:
 
 def _place(folder: Path, name: str) -> Path:
     """Return where a file of a data set lies in a data directory: meshes and weights beside the release."""
-    return folder / name if _is_beside(name) else folder / FOLDER / name
+    return folder / name if _is_outside_release(name) else folder / FOLDER / name
 
 
 def _check(root: DataRoot, meshes: Collection[str]) -> None:
@@ -310,14 +312,14 @@ def _check(root: DataRoot, meshes: Collection[str]) -> None:
             raise StoreError(f"{root.at(name)} is not the mesh that the release was made from: pull --no-meshes")
 
 
-def _settle(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
+def _move_into_place(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
     """Give the fetched files their places: the release in one step, what lies beside it before."""
-    for name in filter(_is_beside, names):
+    for name in filter(_is_outside_release, names):
         with root.commit(name) as temporary:
             _place(partial, name).replace(temporary)
     with root.lock(), atomic_folder(root.path / FOLDER) as folder:
         for name in names:
-            if not _is_beside(name):
+            if not _is_outside_release(name):
                 make_folder((folder / name).parent)
                 _place(partial, name).replace(folder / name)
     shutil.rmtree(partial, ignore_errors=True)

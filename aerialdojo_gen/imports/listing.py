@@ -28,7 +28,7 @@ _SHOWN = 12
 
 
 @dataclass(frozen=True)
-class Guess:
+class FileAxes:
     """Axis and units that a file's shape suggests."""
 
     up: str  # The axis along which more surface is level
@@ -36,7 +36,7 @@ class Guess:
     units: tuple[tuple[float, str], ...]  # tuple of (float, str)
 
 
-def guess(nodes: Sequence[RawNode]) -> Guess:
+def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
     """Guess the up axis and the unit of a mesh."""
     level = np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -64,12 +64,12 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
         for scale, unit in _UNITS
         if _WIDE_M[0] <= wide * scale <= _WIDE_M[1] and _HIGH_M[0] <= tall * scale <= _HIGH_M[1]
     )
-    return Guess(up, sure, fit or _UNITS[:1])
+    return FileAxes(up, sure, fit or _UNITS[:1])
 
 
-def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming) -> Guess:
+def _infer_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming) -> FileAxes:
     """Guess without sky domes, whose shape hides axis and scale."""
-    guessed = guess(nodes)
+    guessed = infer_axes(nodes)
     for up in (guessed.up, "z" if guessed.up == "y" else "y"):
         taken = scale or guessed.units[0][0]
         source = SourceMesh.of(nodes, MeshOptions(up, taken, naming=naming))
@@ -77,7 +77,7 @@ def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: N
             # Convert back to the file's axes and unit.
             v = [b.vertices / taken for b in source.bodies]
             own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
-            return guess([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
+            return infer_axes([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
     return guessed
 
 
@@ -85,7 +85,7 @@ def describe_mesh(
     nodes: Sequence[RawNode], up: str | None, scale: float | None, naming: Naming, width: int | None
 ) -> list[str]:
     """Describe the content of a file, in lines for a terminal."""
-    guessed = _guess_within_domes(nodes, scale, naming)
+    guessed = _infer_within_domes(nodes, scale, naming)
     taken_up, taken_scale = up or guessed.up, scale or guessed.units[0][0]
     source = SourceMesh.of(nodes, MeshOptions(taken_up, taken_scale, naming=naming))
     triangles = sum(len(b.faces) for b in (*source.bodies, *source.domes))

@@ -62,7 +62,7 @@ class Teacher:
                     out[k] = agent_actions(route.actions)
         return out
 
-    def keep_fields(self) -> AbstractContextManager[None]:
+    def cache_fields(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
         return self._planner.keeping_fields(*_FIELDS_MB)
 
@@ -149,7 +149,7 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     goals, told = goal_poses(part, index), goals_of(part, index)
     order = np.lexsort((np.arange(len(index)), *index.goal.T))
     flown: dict[int, FlownEpisode] = {}
-    with torch.inference_mode(), teacher.keep_fields():
+    with torch.inference_mode(), teacher.cache_fields():
         for k in range(0, len(order), _PARALLEL_EPISODES):
             rows = order[k : k + _PARALLEL_EPISODES]
             own = [FlownEpisode(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
@@ -170,7 +170,7 @@ def _understood(
     images = np.zeros((len(rows), *told["images"].shape[1:]), np.uint8)
     images[shown] = told["images"][told["image"][rows[shown]]]
     tokens = np.array([vocabulary.encode(text) for text in told["text"][rows, 1 - shown.astype(np.int64)].tolist()])
-    return network.understand(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
+    return network.encode_goal(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
 
 
 def _fly(

@@ -47,7 +47,7 @@ class Epoch:
     number: int
     loss: float
     accuracy: float
-    kept_back: Assessment | None
+    held_out: Assessment | None
     left_s: float
 
 
@@ -149,13 +149,13 @@ class Learner:
         self.optimiser.step()
 
     def learn(
-        self, pool: Pool, exploration: Pool | None, kept_back: NDArray[np.bool_], epochs: int, learning_rate: float,
+        self, pool: Pool, exploration: Pool | None, held_out: NDArray[np.bool_], epochs: int, learning_rate: float,
         log: TrainingLog,
     ) -> None:  # fmt: skip
-        """Train through a phase's epochs, from where the progress is; `kept_back` (n,) are not learned from."""
+        """Train through a phase's epochs, from where the progress is; `held_out` (n,) are not learned from."""
         self.share_cores()
-        anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
-        lengths = np.where(kept_back, 0, pool.lengths)
+        anywhere = np.flatnonzero(np.repeat(~held_out, pool.lengths))
+        lengths = np.where(held_out, 0, pool.lengths)
         frames = self._frames(pool)
         self._about = [(pool, frames, anywhere)]
         if exploration is not None:
@@ -167,7 +167,7 @@ class Learner:
         self.run_epochs(
             [len(batches(epoch)) for epoch in range(epochs)], batches, learning_rate, log,
             step=lambda episodes, rate: self._step(pool, frames, episodes, rate),
-            assess=lambda: self.assess(pool, frames, kept_back),
+            assess=lambda: self.assess(pool, frames, held_out),
         )  # fmt: skip
 
     def run_epochs(
@@ -258,7 +258,7 @@ class Learner:
         # A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them.
         network = self.network
         with self.autocast():
-            goal = network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
+            goal = network.encode_goal(batch["tokens"], batch["images"], batch["told_by_image"])
             seen = network.features(batch.get("pictures"), goal, batch["mask"])
             blank = network.blank(len(seen)).to(self.device)
             guess, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
@@ -277,8 +277,8 @@ class Learner:
             looks.append((self._pictures(pool, frames, chosen), *at))
         pictures, pose, number, blocked = (self.torch.cat(same) for same in zip(*looks, strict=True))
         with self.autocast():
-            seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
-            place, heading, scene, _ = self.network.whereabouts.found(seen)
+            seen = self.network.encode_pictures(pictures.flatten(0, 1)).reshape(n, -1)
+            place, heading, scene, _ = self.network.whereabouts.locate(seen)
             blocked_at = self.network.blocked(seen)
         return pose_loss(place, heading, scene, pose, number) + blocked_loss(blocked_at, blocked)
 

@@ -39,8 +39,8 @@ class LocalizationOutput(NamedTuple):
     @property
     def scene_nats(self) -> Any:
         """How unsure each step's pictures are of which scene they show: (n, T), nats, 0 where there is no doubt."""
-        told = self.scene.log_softmax(dim=-1)
-        return -(told.exp() * told).sum(dim=-1)
+        log_chances = self.scene.log_softmax(dim=-1)
+        return -(log_chances.exp() * log_chances).sum(dim=-1)
 
     def with_goal_offset(self, offset_m: Any) -> LocalizationOutput:
         """Set the goal where an offset (n, T, 3), metres ahead, left and up, says that it is."""
@@ -71,7 +71,7 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         """Numbers that are carried from step to step."""
         return _SUMS + self.scenes
 
-    def found(self, seen: Any) -> tuple[Any, Any, Any, Any]:
+    def locate(self, seen: Any) -> tuple[Any, Any, Any, Any]:
         """Guess by pictures alone where bodies are: logits of places, headings, scenes, and how far to trust them."""
         place, heading, scene, trust = self.body(seen).float().split([_PLACES, _HEADINGS, self.scenes, 1], dim=-1)
         return place, heading, scene, functional.softplus(trust) + _LEAST
@@ -79,7 +79,7 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[LocalizationOutput, Any]:
         """Estimate poses for steps (n, T) of episodes from features and odometry; also the sums (n, sums) after."""
         steps = seen.shape[1]
-        seen_at, facing, scene, trust = self.found(seen)
+        seen_at, facing, scene, trust = self.locate(seen)
         # The offset's loss teaches which steps to trust; intervals learn by their own, which is steadier.
         place, spread = places(seen_at.detach())
         place, weight = place / UNIT_M, trust / ((spread / UNIT_M).square() + _FLOOR**2)
@@ -100,10 +100,10 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         goal_at, _ = places(target.detach())
         # The mean place minus where own motion leads from the start, turned as the start faced, is the start.
         c, s = start.unbind(-1)
-        led = torch.stack(
+        moved_start = torch.stack(
             [c * moves[..., 0] - s * moves[..., 1], s * moves[..., 2] + c * moves[..., 3], moves[..., 4]], dim=-1
         )
-        away = goal_at / UNIT_M - (been - led) / weights
+        away = goal_at / UNIT_M - (been - moved_start) / weights
         ahead = torch.cat([_rotate_back(away[..., :2], start), away[..., 2:]], dim=-1) - moved
         offset = torch.cat([_rotate_back(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
         return LocalizationOutput(offset, seen_at, facing, scene, target), total[:, -1]

@@ -160,17 +160,17 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         # The last, so that the others begin as they do without it.
         self.sight = PatchClassifier(shape.named, shape.channels) if shape.named else None
 
-    def look(self, pictures: Any) -> Any:
+    def encode_pictures(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
         patches = self.patches(as_patches(pictures))
         # As they lie in memory, channels last: on a CPU convolutions take half the time so.
         return self.eye(patches.permute(0, 3, 1, 2))
 
-    def understand(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
+    def encode_goal(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
         """Encode goals from tokens (n, length) and pictures (n, H, W, 4) uint8; (n, features)."""
         said = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
         said = said.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
-        shown = self.look(images) * told_by_image[:, None]
+        shown = self.encode_pictures(images) * told_by_image[:, None]
         return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
 
     def forward(
@@ -187,7 +187,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         n, steps = mask.shape
         if pictures is None:
             return goal[:, None].expand(n, steps, -1)
-        looked = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
+        looked = self.encode_pictures(pictures.flatten(0, 1)).reshape(len(pictures), -1)
         flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
         rows = mask.flatten().nonzero()[:, 0]
         return flat.index_copy(0, rows, looked).reshape(n, steps, -1)

@@ -132,7 +132,7 @@ class Policy(AgentBase):
         image = torch.from_numpy(goal_picture(goal.image, about.shape["size_px"])[None]).to(self._device)
         shown = torch.tensor([goal.image is not None], device=self._device)
         with torch.inference_mode():
-            self._goal = self.network.understand(tokens, image, shown)
+            self._goal = self.network.encode_goal(tokens, image, shown)
         self._reckoning, self._previous, self._memory = DeadReckoning(), N_ACTIONS, None
         self._doubt: list[float] = []
         # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
@@ -172,7 +172,7 @@ class Policy(AgentBase):
         """Search what was seen so far: a map that was trusted may turn out to be of somewhere else."""
         for pictures, odometry in self._unsearched:
             chances = self.network.sight(pictures).log_softmax(dim=-1).flatten(0, 1)
-            search.look(chances.cpu().numpy(), pictures.cpu().numpy(), odometry)
+            search.observe(chances.cpu().numpy(), pictures.cpu().numpy(), odometry)
         self._unsearched.clear()
 
 

@@ -69,7 +69,7 @@ class Search:
         self._corner = self._since = 0
         self._last: _Candidate | None = None
 
-    def look(
+    def observe(
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
     ) -> None:
         """Add what is seen at a step: log chances (patches, words + 1), pictures (views, H, W, 4), odometry (4,)."""

@@ -92,15 +92,15 @@ def _leans(instance: Instance, kind: str, feet: NDArray[np.int64]) -> bool:
         return False
     high = float(np.ptp(instance.bounds[:, 2]))
     # Whichever way it faces.
-    foot, narrow = _narrow_side(instance.vertices[feet]), _narrow_side(instance.vertices)
-    low = high <= _SLENDER * narrow
+    foot, shorter_side = _shorter_side(instance.vertices[feet]), _shorter_side(instance.vertices)
+    low = high <= _SLENDER * shorter_side
     if kind == "vehicle":
         # A boat on land lies on its keel.
-        return foot >= _LEAST_M or (low and narrow >= _LEAST_M)
+        return foot >= _LEAST_M or (low and shorter_side >= _LEAST_M)
     return foot >= _LEAST_M and low
 
 
-def _narrow_side(points: Floats) -> float:
+def _shorter_side(points: Floats) -> float:
     """Shorter side of the smallest rectangle about points (n, 3) seen from above, metres."""
     around = shapely.minimum_rotated_rectangle(shapely.multipoints(np.round(points[:, :2], 4)))
     if around.geom_type != "Polygon":

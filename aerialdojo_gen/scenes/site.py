@@ -145,7 +145,7 @@ class Site:
         z, at = thing.z, (thing.x, thing.y)
         settle_m = room.get("settle_m")
         if z is None and settle_m is not None:
-            z = self.settled_z(*at, settle_m)
+            z = self.foot_z(*at, settle_m)
         base = self.ground_z(*at) if z is None else z
         before = dict(self._counts)
         name = thing.node or self.node(thing.category)
@@ -173,13 +173,13 @@ class Site:
         if thing.z is None:
             self._on_ground.append(len(self.instances))
         self.instances.append(moved or instance)
-        self._keep_free(thing, instance, room)
+        self._reserve(thing, instance, room)
         return instance
 
     def _has_room(self, area: BaseGeometry, low: float, high: float) -> bool:
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
 
-    def _keep_free(self, thing: Placement, instance: Instance, room: Room) -> None:
+    def _reserve(self, thing: Placement, instance: Instance, room: Room) -> None:
         if room.get("clear_m"):
             self.occupy(disc(thing.x, thing.y, room["clear_m"]))
         if room.get("margin_m"):
@@ -203,7 +203,7 @@ class Site:
         used = Counter(i.variant for i in self.instances if i.category == category)
         return min(names, key=lambda name: (used[name], names.index(name)), default=None)
 
-    def settled_z(self, x: float, y: float, radius_m: float = 0.5) -> float:
+    def foot_z(self, x: float, y: float, radius_m: float = 0.5) -> float:
         """Give the height at which a prop of that radius neither floats nor is buried on a slope, metres."""
         angles = np.arange(6) * np.pi / 3
         ring = [self.ground_z(x + radius_m * float(np.cos(a)), y + radius_m * float(np.sin(a))) for a in angles]

@@ -25,7 +25,7 @@ from aerialdojo_gen.benchmark import figures, registry, score_rows, tables
 from aerialdojo_gen.benchmark.metrics import PROFILES, Profile, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, load_runs
-from aerialdojo_gen.benchmark.tables import conduct_cells
+from aerialdojo_gen.benchmark.tables import outcome_cells
 from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow
@@ -152,7 +152,7 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
 
 def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
     for run in runs:
-        cells = conduct_cells(run, AT_3)
+        cells = outcome_cells(run, AT_3)
         assert sum(map(float, cells[:3])) == pytest.approx(100.0, abs=0.15)
         assert float(cells[1]) == pytest.approx(100.0 * run.episodes.collision.mean(), abs=0.05)
         assert (cells[-1] == "–") == (run.agent != "explorer")

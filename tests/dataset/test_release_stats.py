@@ -25,11 +25,11 @@ from aerialdojo_gen.dataset.stats.measures import (
     difficulty_tables,
     flight_table,
     goal_table,
+    goal_tables,
     held_out_table,
+    novelty_table,
     scene_table,
-    seen_table,
     setting_table,
-    worth_tables,
 )
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
 from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
@@ -210,7 +210,7 @@ def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
     tasks = read_tasks(smoke, check_release(smoke))
     test = frame[frame["subset"] == "test"]
     new = [~test[f"{what}_seen_in_train"] for what in ("target", "start", "pair")]
-    seen = {row.name: row.ours for row in seen_table(tasks).rows}["all"]
+    seen = {row.name: row.ours for row in novelty_table(tasks).rows}["all"]
     assert seen == pytest.approx((
         len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
         new[2].sum(), 100 * new[2].mean(),
@@ -256,9 +256,7 @@ def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
         100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
     ))  # fmt: skip
     assert (
-        max(
-            len(line) for t in worth_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80)
-        )
+        max(len(line) for t in goal_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80))
         <= 80
     )
 
@@ -302,7 +300,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
     scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
     names = [m.scene for m in scenes]
     tasks = read_tasks(smoke, names)
-    measured = [*worth_tables(read_goals(smoke, names), tasks), *difficulty_tables(tasks)]
+    measured = [*goal_tables(read_goals(smoke, names), tasks), *difficulty_tables(tasks)]
     made = [*tables(scenes), *measured, benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)

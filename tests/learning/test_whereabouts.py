@@ -164,7 +164,7 @@ def episode():
     }
     images = torch.randint(0, 256, (2, 32, 32, 4), dtype=torch.uint8, generator=draw)
     with torch.no_grad():
-        goal = network.understand(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
+        goal = network.encode_goal(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
     return network, goal, given
 
 

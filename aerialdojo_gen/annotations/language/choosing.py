@@ -58,13 +58,13 @@ class About:
         said = [
             w for w in wordings_of(claims, looks, self.instance.category)
             if w.adjectives or w.tails or w.details
-            if w.key != "part" or _seen(looks, claims[w.index].key, shown)
+            if w.key != "part" or _is_visible(looks, claims[w.index].key, shown)
         ]  # fmt: skip
         self.looks = {wording.index: wording for wording in said}
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
         self.details = [w for w in said if w.details and _sayable(w)]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
-        self.telling = cache(self._telling)
+        self.is_unique = cache(self._is_unique)
         self._fits = cache(lambda index, j: scene.holds(claims[index], j, DISTRACTOR_SLACK))
 
     def distractors(self, indices: Collection[int]) -> list[int]:
@@ -75,13 +75,13 @@ class About:
         """Those of some things that a claim fits as well."""
         return [j for j in things if self._fits(index, j)]
 
-    def _telling(self, index: int) -> bool:
+    def _is_unique(self, index: int) -> bool:
         """Whether a claim is false of every other of the category in the scene, and there are others."""
         instances = self.scene.scene.instances
         others = [j for j, it in enumerate(instances) if it.category == self.instance.category and j != self.i]
         return bool(others) and not self.fitting(index, others)
 
-    def names_again(self, index: int, plan: Plan) -> bool:
+    def repeats(self, index: int, plan: Plan) -> bool:
         """Whether a claim of place names what one of the plan names, or is a second phrase of place."""
         claim = self.claims[index]
         own = _named(claim)
@@ -104,7 +104,7 @@ def _named(claim: Claim) -> set[str]:
     return {word.removesuffix("s") for word in words if len(word) > 2}
 
 
-def _seen(looks: Mapping[str, Look], key: str, shown: Collection[str] | None) -> bool:
+def _is_visible(looks: Mapping[str, Look], key: str, shown: Collection[str] | None) -> bool:
     look = looks.get(key)
     return look is None or shown is None or all(set(part.split("|")) & set(shown) for part in look.parts)
 
@@ -116,16 +116,16 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         chance = (_COLOUR if wording.key == "colour" else _VALUE)[level]
         keys = {w.key for w in plan.adjectives}
         # One phrase after the noun is enough, and of "brown wooden" one word.
-        again = not wording.adjectives and any(not w.adjectives for w in plan.adjectives)
-        again = again or {wording.key, *keys} >= _ONE_OF
-        if rng.random() < chance and not again:
+        redundant = not wording.adjectives and any(not w.adjectives for w in plan.adjectives)
+        redundant = redundant or {wording.key, *keys} >= _ONE_OF
+        if rng.random() < chance and not redundant:
             plan.adjectives.append(wording)
     ranked = _ranked(about, level, used, rng)
     if ranked:
         plan.places.append(ranked[0])
     left = about.distractors(plan.indices)
     while left:
-        places = [k for k in ranked if len(plan.places) < _MOST_PLACES and not about.names_again(k, plan)]
+        places = [k for k in ranked if len(plan.places) < _MOST_PLACES and not about.repeats(k, plan)]
         rest = [k for k in (*places, *about.looks) if k not in plan.indices]
         best = min(rest, key=lambda k: len(about.fitting(k, left)), default=None)
         if best is None or len(remaining := about.fitting(best, left)) == len(left):
@@ -134,7 +134,7 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         _add(plan, about, best, rng)
     _drop_needless(plan, about)
     if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MOST_PLACES:
-        plan.places += [k for k in ranked if k not in plan.places and not about.names_again(k, plan)][:1]
+        plan.places += [k for k in ranked if k not in plan.places and not about.repeats(k, plan)][:1]
     spare = [w for w in about.details if w.index not in plan.indices]
     if rng.random() < _MORE_DETAILS[level] and spare and not plan.details:
         _add(plan, about, pick(spare, rng).index, rng)

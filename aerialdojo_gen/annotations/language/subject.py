@@ -70,10 +70,10 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
         adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
     # "Five round" says "round" as well.
     kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
-    return None if _again(kept, name.text) else noun_phrase(name, kept, tail)
+    return None if _repeats_word(kept, name.text) else noun_phrase(name, kept, tail)
 
 
-def _again(adjectives: Sequence[str], noun: str) -> bool:
+def _repeats_word(adjectives: Sequence[str], noun: str) -> bool:
     """Whether a word or a part of a compound is said twice: "striped blue-striped", "A-shaped A-board"."""
     words = [*(word for text in adjectives for word in text.split()), *(w for w in noun.split() if "-" in w)]
     parts = [part for word in words for part in word.split("-") if part != "and"]

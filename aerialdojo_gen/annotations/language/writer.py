@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.choosing import About, Plan, choose
-from aerialdojo_gen.annotations.language.locations import LocationWords
+from aerialdojo_gen.annotations.language.locations import LocationPhrases
 from aerialdojo_gen.annotations.language.nouns import Names
 from aerialdojo_gen.annotations.language.sentences import Content, compose
 from aerialdojo_gen.annotations.language.subject import fresh, phrase_of
@@ -43,7 +43,7 @@ class Writer:
         vocabulary, instances = claims.vocabulary, claims.scene.instances
         words = {it.category: own for it, own in zip(instances, vocabulary.words, strict=True)}
         self._names = Names(words, landmarks)
-        self._locations = LocationWords(claims, self._names)
+        self._locations = LocationPhrases(claims, self._names)
         self._said: set[str] = set()
         self._openings: set[str] = set()
 
@@ -101,7 +101,7 @@ class Writer:
             return None
         said = phrase.bare
         details = [
-            (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.telling(w.index))
+            (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.is_unique(w.index))
             for w in plan.details
         ]
         if not all(wording.details for wording, _ in details):

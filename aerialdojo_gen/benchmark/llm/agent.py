@@ -33,7 +33,7 @@ _BY_KIND = {
 _STATUS = re.compile(r": HTTP (\d{3}): ")
 
 
-def _mend_of(error: UsageError, model: str, key_variable: str) -> str:
+def _remedy(error: UsageError, model: str, key_variable: str) -> str:
     status = _STATUS.search(str(error))
     code = status[1] if status else ""
     if code == "404":
@@ -201,7 +201,7 @@ class LanguageModelAgent(AgentBase):
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
             # Not what was asked for is wrong, but what stands behind it: the exit code is 1.
-            raise ServiceDown(f"{error}: {_mend_of(error, self.options.model, variable)}") from None
+            raise ServiceDown(f"{error}: {_remedy(error, self.options.model, variable)}") from None
 
     def settled(self) -> dict[str, Any]:
         """Return options that `check` has settled, for the agents that fly."""

@@ -98,7 +98,7 @@ def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
 
 
 def _ground(data: SceneData) -> TriangleRayCaster | None:
-    return data.keep("ground", lambda: open_ground(scene_mesh(data).scene))
+    return data.cached("ground", lambda: open_ground(scene_mesh(data).scene))
 
 
 def open_ground(scene: Scene) -> TriangleRayCaster | None:

@@ -21,7 +21,7 @@ _PATH_SHARE = 0.005
 
 
 @dataclass(frozen=True)
-class Tally:
+class SceneCounts:
     """What a scene of the release holds, for the counts of the whole."""
 
     scene: str  # Name
@@ -32,7 +32,7 @@ class Tally:
     complete: bool = False  # Whether all of its tables could be read
 
 
-def tally_of(data: SceneData, complete: bool) -> Tally:
+def count_scene(data: SceneData, complete: bool) -> SceneCounts:
     """Count what a scene holds."""
     routes: Counter[tuple[str, str]] = Counter()
     tasks: Counter[str] = Counter()
@@ -47,10 +47,10 @@ def tally_of(data: SceneData, complete: bool) -> Tally:
         tasks.update(rows.parts[k].split("/")[-2] for k in rows.part_of)
     if "objects" in data.tables:
         images = [text for text in data["objects"].texts("reference_image_id") if text]
-    return Tally(data.scene, routes, tasks, path, tuple(images), complete)
+    return SceneCounts(data.scene, routes, tasks, path, tuple(images), complete)
 
 
-def scene_counts(data: SceneData, tally: Tally) -> Outcome:
+def scene_counts(data: SceneData, tally: SceneCounts) -> Outcome:
     """Hold a scene's landmarks, objects and tasks by setting and subset to the paper's, where the paper has it."""
     outcome = Outcome("scene_counts", "counts")
     paper = inventory().get(data.scene)
@@ -77,7 +77,9 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
     return outcome
 
 
-def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
+def whole_counts(
+    release: Release, tallies: Sequence[SceneCounts], pipeline: Pipeline, every_scene: bool
+) -> list[Outcome]:
     """Check what only all scenes together can tell."""
     outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
@@ -96,7 +98,7 @@ WHOLE_CHECKS = {
 }
 
 
-def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _splits(outcome: Outcome, _release: Release, tallies: Sequence[SceneCounts], pipeline: Pipeline) -> str:
     if why := _not_the_papers(tallies, pipeline):
         return why
     for (side, subset), settings in splits().items():
@@ -109,7 +111,7 @@ def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipel
     return ""
 
 
-def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _path(outcome: Outcome, _release: Release, tallies: Sequence[SceneCounts], pipeline: Pipeline) -> str:
     if why := _not_the_papers(tallies, pipeline):
         return why
     found, expected = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
@@ -120,7 +122,7 @@ def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipelin
     return ""
 
 
-def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+def _card(outcome: Outcome, release: Release, tallies: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
     card = _text(release, "README.md")
     if card is None:
         outcome.rows = 1
@@ -169,7 +171,7 @@ def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
     ]
 
 
-def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+def _images(outcome: Outcome, _release: Release, tallies: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
     first: dict[str, str] = {}
     for tally in tallies:
         for image_id in tally.images:
@@ -180,7 +182,7 @@ def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipe
     return ""
 
 
-def _not_the_papers(tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _not_the_papers(tallies: Sequence[SceneCounts], pipeline: Pipeline) -> str:
     if not pipeline.split.paper_counts:
         return "the pipeline has no paper_counts"
     missing = len(set(inventory()) - {tally.scene for tally in tallies})

@@ -183,7 +183,7 @@ class SceneData:
     sample: int | None = None  # How many routes FCL checks; None for all
     pictures: int | None = None  # How many reference images are rendered again; None for all
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
-    kept: dict[str, Any] = field(default_factory=dict)
+    cache: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Rows:
         """Return a table's rows."""
@@ -202,11 +202,11 @@ class SceneData:
                 mask |= self.faulty[table, name]
         return mask
 
-    def keep(self, name: str, make: Callable[[], T]) -> T:
+    def cached(self, name: str, make: Callable[[], T]) -> T:
         """Return what one check has made for all others, made now where none has."""
-        if name not in self.kept:
-            self.kept[name] = make()
-        kept: T = self.kept[name]
+        if name not in self.cache:
+            self.cache[name] = make()
+        kept: T = self.cache[name]
         return kept
 
     def sampled_routes(self, *faults: str) -> Iterator[tuple[int, int]]:

@@ -65,4 +65,4 @@ def scene_mesh(data: SceneData) -> SceneMesh:
     if data.flagged("scenes", MESH_CHECKS).any():
         raise UncheckedError("no mesh")
     digest = str(data["scenes"].texts("mesh_sha256")[0])
-    return data.keep("mesh", lambda: SceneMesh(open_scene(mesh_path(data), digest).scene))
+    return data.cached("mesh", lambda: SceneMesh(open_scene(mesh_path(data), digest).scene))

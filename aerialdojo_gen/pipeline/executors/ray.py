@@ -130,7 +130,7 @@ class RayExecutor(Executor):
                             f"{task.label}: its process was lost {_TRIES} times (out of memory, or "
                             "lost nodes): run again, finished shards are kept"
                         ) from None
-                    waiting.put_back(task)
+                    waiting.requeue(task)
                 except self._ray.exceptions.RayTaskError as error:
                     raise error.cause from error
                 else:

@@ -31,7 +31,7 @@ def strew_things(
         for pose in spots:
             if not site.is_free(pose.x, pose.y, 0.6 + clear_m):
                 continue
-            z = site.settled_z(pose.x, pose.y)
+            z = site.foot_z(pose.x, pose.y)
             thing = site.place(Placement(category, *pose, z=z, place=place), "skip")
             if thing is not None:
                 (x0, y0, _), (x1, y1, _) = thing.bounds

@@ -234,7 +234,7 @@ class Draft:
             slots.sort(key=lambda s: rank(self.world.seed, STAGE, self._trial, kind, s.x, s.y, s.on))
             share = self.number(*self.kind.slots[kind].share, "share", kind) if slots else 0.0
             for slot in slots[: round(share * len(slots))]:
-                what = self._dealt(self.kind.slots[kind], slot, used)
+                what = self._draw_category(self.kind.slots[kind], slot, used)
                 if what is not None:
                     rows.setdefault((kind, slot.on, slot.settle_m), []).append(self._thing(what, slot))
         unknown_kinds = {slot.kind for slot in self._slots} - set(self.kind.slots)
@@ -251,7 +251,7 @@ class Draft:
     def _levelled(self, on: float | str | None) -> Entry:
         return {"level": True} if self.level_things and on is None else {}
 
-    def _dealt(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
+    def _draw_category(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
         """Draw what stands at a slot; None where nothing that is left has room."""
         weights = {
             what: weight for what, weight in slots.of.items()
