@@ -24,7 +24,7 @@ from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.frames import compass_direction
-from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.model import Instance
 
 KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
@@ -134,7 +134,7 @@ class SceneClaims:
     def _find(self, i: int) -> list[Claim]:
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
-        found += [Claim("part", say) for say in self.vocabulary.looks(instance)]
+        found += [Claim("part", say) for say in self.vocabulary.unrepeated_phrases(instance)]
         found += self._place(i)
         found += self._relations(i)
         bearing = self.bearings[i]
@@ -292,9 +292,9 @@ class SceneClaims:
     def _part_holds(self, claim: Claim, j: int, slack: float) -> bool:
         instance = self.scene.instances[j]
         if slack <= 1.0:
-            return claim.key in self.vocabulary.true_looks(instance)
-        looks = [look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key]
-        return bool(valid_looks(looks, instance, self.scene.materials))
+            return claim.key in self.vocabulary.true_phrases(instance)
+        appearances = [one for one in self.vocabulary.appearances_of(instance) if one.phrase == claim.key]
+        return bool(valid_phrases(appearances, instance, self.scene.materials))
 
     def _place_holds(self, claim: Claim, j: int, slack: float) -> bool:
         place = claim.key.lower()

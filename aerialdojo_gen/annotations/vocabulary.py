@@ -7,10 +7,10 @@ from dataclasses import replace
 from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.context import context_of
-from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 # Categories of imported meshes that are never objects.
@@ -26,7 +26,7 @@ class Vocabulary:
         self.scene = scene
         self.names = {category: catalogue[category].name for category in catalogue}
         self.kinds = {category: catalogue[category].kind for category in catalogue}
-        self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._appearances = {category: catalogue[category].looks for category in catalogue}
         self._surface = Surface(scene)
         self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
@@ -61,17 +61,17 @@ class Vocabulary:
             return instance
         return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
 
-    def catalogue_looks(self, instance: Instance) -> tuple[Look, ...]:
+    def appearances_of(self, instance: Instance) -> tuple[Appearance, ...]:
         """Phrases that the catalogue has for an instance's category."""
-        return self._looks.get(instance.category, ())
+        return self._appearances.get(instance.category, ())
 
-    def true_looks(self, instance: Instance) -> tuple[str, ...]:
+    def true_phrases(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, and visible; measured once."""
         if instance not in self._true:
-            true = valid_looks(self.catalogue_looks(instance), instance, self.scene.materials)
-            self._true[instance] = tuple(look.phrase for look in true if self._surface.shows(look, instance))
+            true = valid_phrases(self.appearances_of(instance), instance, self.scene.materials)
+            self._true[instance] = tuple(one.phrase for one in true if self._surface.shows(one, instance))
         return self._true[instance]
 
-    def looks(self, instance: Instance) -> tuple[str, ...]:
+    def unrepeated_phrases(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
-        return tuple(say for say in self.true_looks(instance) if not repeats(say, instance))
+        return tuple(say for say in self.true_phrases(instance) if not repeats(say, instance))

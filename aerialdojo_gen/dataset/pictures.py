@@ -8,7 +8,7 @@ from typing import Any
 
 from aerialdojo_gen.annotations.language.sides import described
 from aerialdojo_gen.base.names import choose_scenes
-from aerialdojo_gen.dataset.contents import no_release, parts_there
+from aerialdojo_gen.dataset.contents import existing_parts, no_release
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.shards import read_scene, shards
 
@@ -18,7 +18,7 @@ def scenes_with_pictures(where: Where, patterns: Sequence[str] | None = None) ->
     root = open_root(where)
     folders = {PurePosixPath(path).name for path in root.list("references")}
     staged = {scene for scene in folders if shards(root, "references", scene)}
-    there = sorted(staged | set(parts_there(root)["release/objects"]))
+    there = sorted(staged | set(existing_parts(root)["release/objects"]))
     if not there:
         raise no_release(root)
     return choose_scenes(patterns, there)

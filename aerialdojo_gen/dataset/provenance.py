@@ -12,7 +12,7 @@ from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import FOLDER, scenes_there
+from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes
 from aerialdojo_gen.dataset.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -73,7 +73,7 @@ def makers(data: Where) -> dict[str, Maker]:
             known |= dict.fromkeys(entry["scenes"], maker)
     except (ValueError, KeyError, TypeError):
         known = {}  # damaged: as if nothing were known, which is the cautious side
-    return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
+    return {scene: known.get(scene, Maker()) for scene in existing_scenes(root)}
 
 
 def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, part_name, scenes_there
+from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, existing_scenes, part_name
 from aerialdojo_gen.exchange.hub_client import Hub, check_revision
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -166,7 +166,7 @@ def pull_release(
     check_revision(revision)
     if root.path.exists() and not root.path.is_dir():
         raise StoreError(f"{root.path} is no folder: name another with --data")
-    if scenes_there(root) and not replace:
+    if existing_scenes(root) and not replace:
         raise UsageError(f"there is a release in {root.url}: name another folder with --data, or add --replace")
     reporter = reporter or Reporter(quiet=True)
     hub = Hub(repo, "pull")

@@ -187,10 +187,10 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         n, steps = mask.shape
         if pictures is None:
             return goal[:, None].expand(n, steps, -1)
-        looked = self.encode_pictures(pictures.flatten(0, 1)).reshape(len(pictures), -1)
-        flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
+        encoded = self.encode_pictures(pictures.flatten(0, 1)).reshape(len(pictures), -1)
+        flat = torch.zeros(n * steps, encoded.shape[1], dtype=encoded.dtype, device=encoded.device)
         rows = mask.flatten().nonzero()[:, 0]
-        return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
+        return flat.index_copy(0, rows, encoded).reshape(n, steps, -1)
 
     def choose(self, seen: Any, guess: LocalizationOutput) -> PolicyOutput:
         """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else."""

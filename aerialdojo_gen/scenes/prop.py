@@ -10,9 +10,9 @@ from typing import Any
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.anatomy import FRONTS
+from aerialdojo_gen.scenes.appearances import Appearance, parse_appearances
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, parse_designs
-from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
@@ -47,7 +47,7 @@ class Category:
     category: str  # Its key, e.g. ``"delivery_van"``
     name: str  # Common noun, e.g. ``"delivery van"``
     kind: str  # One of `KINDS`
-    looks: tuple[Look, ...]
+    looks: tuple[Appearance, ...]
     params: Mapping[str, Range]  # Sizes drawn once an instance; a fixed one has low == high
     roles: Mapping[str, str]  # Default material of every role
     parts: tuple[Mapping[str, Any], ...]  # Tables of the parts; empty where a builder makes them
@@ -109,7 +109,7 @@ def parse_category(
         raise AssetError(f"{where}: {len(parts):,} parts, the maximum is {_MAX_PARTS}")
     tags = {tag for p in parts for tag in tags_of(p)}
     named = sorted({*tags, *roles, *(p["role"] for p in parts)})
-    looks = parse_looks(body.get("looks", []), named, materials.names, where)
+    looks = parse_appearances(body.get("looks", []), named, materials.names, where)
     identifying_parts = _identifying_parts(body.get("tells", []), named, where)
     raw = body.get("variants", [])
     if not isinstance(raw, list):

@@ -7,7 +7,7 @@ from itertools import product
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, false_claims
+from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, false_claims
 
 MIN_LOOKS = 3
 
@@ -38,7 +38,7 @@ def catalogue_faults(catalogue: Catalogue, categories: Iterable[str] | None = No
                     faults.append(f"{prop.source} {made}: tells: it has no {tell}")
             wrong = {look.phrase: false_claims(look, thing, catalogue.materials) for look in prop.looks}
             true = sum(not w for w in wrong.values())
-            if true < min(MIN_TRUE_LOOKS, len(prop.looks)):
+            if true < min(MIN_TRUE_PHRASES, len(prop.looks)):
                 faults.append(f"{prop.source} {made}: {true} looks are true of it: {_message(wrong)}")
             for say, claims in wrong.items():
                 why[say].append(f"{variant.name}: {', '.join(claims)}" if claims else "")

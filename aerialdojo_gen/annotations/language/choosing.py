@@ -13,7 +13,7 @@ from aerialdojo_gen.annotations.language.locations import WHERE
 from aerialdojo_gen.annotations.language.subject import Wording, wordings_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.base.rng import pick
-from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.appearances import Appearance
 
 _MOST_PLACES = 3
 _SHORT_DETAIL = 10  # words of a detail that is said
@@ -49,18 +49,18 @@ class About:
     """An object's claims, and which other things each fits."""
 
     def __init__(
-        self, scene: SceneClaims, i: int, claims: Sequence[Claim], looks: Mapping[str, Look],
+        self, scene: SceneClaims, i: int, claims: Sequence[Claim], appearances: Mapping[str, Appearance],
         shown: Collection[str] | None,
     ) -> None:  # fmt: skip
         self.scene, self.i, self.claims = scene, i, claims
         self.instance = scene.scene.instances[i]
         self.noun = scene.vocabulary.nouns[i].name
         said = [
-            w for w in wordings_of(claims, looks, self.instance.category)
+            w for w in wordings_of(claims, appearances, self.instance.category)
             if w.adjectives or w.tails or w.details
-            if w.key != "part" or _is_visible(looks, claims[w.index].key, shown)
+            if w.key != "part" or _is_visible(appearances, claims[w.index].key, shown)
         ]  # fmt: skip
-        self.looks = {wording.index: wording for wording in said}
+        self.wordings = {wording.index: wording for wording in said}
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
         self.details = [w for w in said if w.details and _sayable(w)]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
@@ -104,9 +104,9 @@ def _named(claim: Claim) -> set[str]:
     return {word.removesuffix("s") for word in words if len(word) > 2}
 
 
-def _is_visible(looks: Mapping[str, Look], key: str, shown: Collection[str] | None) -> bool:
-    look = looks.get(key)
-    return look is None or shown is None or all(set(part.split("|")) & set(shown) for part in look.parts)
+def _is_visible(appearances: Mapping[str, Appearance], key: str, shown: Collection[str] | None) -> bool:
+    appearance = appearances.get(key)
+    return appearance is None or shown is None or all(set(part.split("|")) & set(shown) for part in appearance.parts)
 
 
 def choose(about: About, level: str, used: Collection[int], rng: np.random.Generator) -> Plan | None:
@@ -126,7 +126,7 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
     left = about.distractors(plan.indices)
     while left:
         places = [k for k in ranked if len(plan.places) < _MOST_PLACES and not about.repeats(k, plan)]
-        rest = [k for k in (*places, *about.looks) if k not in plan.indices]
+        rest = [k for k in (*places, *about.wordings) if k not in plan.indices]
         best = min(rest, key=lambda k: len(about.fitting(k, left)), default=None)
         if best is None or len(remaining := about.fitting(best, left)) == len(left):
             return None
@@ -160,7 +160,7 @@ def _ranked(about: About, level: str, used: Collection[int], rng: np.random.Gene
 
 
 def _add(plan: Plan, about: About, index: int, rng: np.random.Generator) -> None:
-    wording = about.looks.get(index)
+    wording = about.wordings.get(index)
     if wording is None:
         plan.places.append(index)
     elif wording.details and not (wording.adjectives and rng.random() < 0.5):

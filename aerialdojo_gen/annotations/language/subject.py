@@ -12,8 +12,8 @@ from aerialdojo_gen.annotations.claims import Claim
 from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, noun_phrase
 from aerialdojo_gen.annotations.phrases import phrases_of_value
 from aerialdojo_gen.base.rng import pick
+from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.colours import COLOURS
-from aerialdojo_gen.scenes.looks import Look
 
 # Small words, which may be said again; so may colours.
 _SMALL = re.compile(r"an?|the|and|or|of|on|in|at|to|by|for|from|with|without|over|under|its?|them|no|up|out|off")
@@ -32,13 +32,13 @@ class Wording:
     clauses: tuple[str, ...] = ()  # "it lies on its roof"
 
 
-def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: str) -> list[Wording]:
+def wordings_of(claims: Sequence[Claim], appearances: Mapping[str, Appearance], category: str) -> list[Wording]:
     """Word the claims of the looks of a thing of a category."""
     found = []
     for index, claim in enumerate(claims):
         if claim.kind == "part":
-            look = looks.get(claim.key)
-            said = (look.details, look.adjectives, look.clauses) if look is not None else ((claim.key,), (), ())
+            own = appearances.get(claim.key)
+            said = (own.details, own.adjectives, own.clauses) if own is not None else ((claim.key,), (), ())
             found.append(Wording(index, "part", said[1], (), said[0], said[2]))
         elif claim.kind in ("colour", "size", "attribute"):
             key, _, value = claim.key.rpartition("=")

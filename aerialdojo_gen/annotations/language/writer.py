@@ -54,8 +54,8 @@ class Writer:
         """
         instance = self._claims.scene.instances[i]
         rng = generator(self._seed, self._stage, self._claims.scene.name, instance.node)
-        looks = {look.phrase: look for look in self._claims.vocabulary.catalogue_looks(instance)}
-        about = About(self._claims, i, claims, looks, shown)
+        appearances = {one.phrase: one for one in self._claims.vocabulary.appearances_of(instance)}
+        about = About(self._claims, i, claims, appearances, shown)
         found: list[Text] = []
         for level, held_out in _orders(n, rng):
             text = self._write(about, level, held_out, found, rng)

@@ -66,7 +66,7 @@ def agent_class(name: str) -> Callable[..., Any]:
     except AerialDojoError:
         raise
     except Exception as error:
-        raise attach_traceback(UsageError(f"cannot load agent {name!r}: {error_location(error)}"), error) from error
+        raise add_traceback(UsageError(f"cannot load agent {name!r}: {error_location(error)}"), error) from error
     cls = getattr(module, class_name, None)
     if cls is None:
         raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
@@ -89,11 +89,9 @@ def load_agent(name: str, **options: Any) -> Agent:
     except AerialDojoError:
         raise
     except (TypeError, ValueError) as error:
-        raise attach_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
+        raise add_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
     except Exception as error:
-        raise attach_traceback(
-            UsageError(f"agent {name!r} cannot be made: {error_location(error)}"), error
-        ) from error
+        raise add_traceback(UsageError(f"agent {name!r} cannot be made: {error_location(error)}"), error) from error
     if not isinstance(agent, Agent):
         raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
     return agent
@@ -142,7 +140,7 @@ def error_location(error: BaseException) -> str:
     return f"{type(error).__name__}{where}: {first_line(error)}"
 
 
-def attach_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
+def add_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
     """Set an agent's own traceback on the error that is made of it: unlike a cause, it is pickled with it."""
     at = cause.__traceback__
     while at is not None and at.tb_frame.f_code.co_filename.startswith(_LIBRARIES):

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.constants import FOV_DEG
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet
 
-_LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
+_VIEW_DIRECTIONS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ ANSWER
 def _sensors(sight: Sight) -> str:
     if not sight.views:
         return "You see nothing."
-    cameras = ", ".join(f"{view} (looks {_LOOKS[view]})" for view in sight.views)
+    cameras = ", ".join(f"{view} (looks {_VIEW_DIRECTIONS[view]})" for view in sight.views)
     text = (
         f"Before every action you see a colour picture from each of these cameras: {cameras}. Each picture has "
         f"{sight.width} x {sight.height} pixels and a horizontal field of view of {sight.fov_deg:g}°."

@@ -98,8 +98,8 @@ def validate(
             bar.advance()
     outcomes = [foreign_files(release, every)]
     outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
-    tallies = [by_scene[scene][1] for scene in chosen]
-    outcomes += whole_counts(release, tallies, options.pipeline, len(chosen) == len(every))
+    totals = [by_scene[scene][1] for scene in chosen]
+    outcomes += whole_counts(release, totals, options.pipeline, len(chosen) == len(every))
     return Report(tuple(chosen), tuple(outcomes))
 
 
@@ -109,10 +109,10 @@ def check_scene(options: ValidationOptions, scene: str) -> tuple[list[Outcome], 
     found, outcomes = read_tables(release, scene)
     data = SceneData(scene, release, options.pipeline, found, options.meshes, options.use_meshes, options.sample,
                      options.pictures)  # fmt: skip
-    tally = count_scene(data, len(found) == len(release_tables()))
+    counts = count_scene(data, len(found) == len(release_tables()))
     outcomes += run_checks(data, SCENE_CHECKS)
-    outcomes.append(scene_counts(data, tally))
-    return outcomes, tally
+    outcomes.append(scene_counts(data, counts))
+    return outcomes, counts
 
 
 def _check(work: _Work) -> tuple[list[Outcome], SceneCounts]:

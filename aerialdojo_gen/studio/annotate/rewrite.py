@@ -113,7 +113,7 @@ class Rewriter:
     def __init__(self, agent: LanguageModelAgent, claims: SceneClaims) -> None:
         self._agent, self._claims, self._matcher = agent, claims, Matcher(claims)
         self._index = claims.geometry.index
-        looks = (look for i in claims.scene.instances for look in claims.vocabulary.catalogue_looks(i))
+        looks = (look for i in claims.scene.instances for look in claims.vocabulary.appearances_of(i))
         self._adjectives = {adjective for look in looks for adjective in look.adjectives}
 
     def estimate(self, objects: Sequence[Object]) -> str:
