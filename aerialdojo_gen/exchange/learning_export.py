@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -14,9 +13,7 @@ from typing import Any
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import renderer_name
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
+from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import PartialExport, check_target, part_folder, whole_folder, write_json
@@ -70,36 +67,6 @@ class Estimate:
             f"CPU, {self.size_bytes / self.frames / 1e3:.1f} kB a frame)\n"
             f"about {duration(self.wall_s)} with {self.workers} {processes} on idle cores, {size} on disk"
         )
-
-
-def export_options(
-    *,
-    split: Sequence[str] = (),
-    setting: Sequence[str] = (),
-    scene: Sequence[str] = (),
-    limit: int = 0,
-    seed: int = 0,
-    views: Sequence[str] = ("front",),
-    size: int | tuple[int, int] = 128,
-    rgb: bool = True,
-    depth: bool = True,
-    goal: Sequence[str] = ("text",),
-    source: str = "render",
-    renderer: str = "auto",
-    jpeg_quality: int = 0,
-    run: Sequence[str] = (),
-) -> ExportOptions:
-    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `ExportOptions`."""
-    if limit < 0:
-        raise UsageError(f"a limit is 0, for all, or more, not {limit}")
-    width, height = (size, size) if isinstance(size, int) else size
-    sensors = Sensors(tuple(views), rgb, depth, width, height)
-    name = "" if source == "recordings" else renderer_name(renderer)
-    splits = Selection(tuple(split)).splits  # ``train``, ``test`` and ``all`` written out
-    return ExportOptions(
-        splits, tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
-        jpeg_quality, tuple(run),
-    )  # fmt: skip
 
 
 def export_for_learning(

@@ -128,7 +128,7 @@ class Furniture:
         prop = self._site.catalogue[category]
         alike = next(iter(v.name for v in prop.variants), None) if category in _ALIKE else None
         return self._placer.place(
-            category, *pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
+            category, pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
             drawn=prop.kind == "vegetation",
         )  # fmt: skip
 
@@ -239,7 +239,7 @@ class Furniture:
             for pose in poisson_disc(room, 7.0, rng, limit=4):
                 if rng.random() < _SHARE_FURNITURE:
                     self._placer.place(
-                        _ON_ROOFS[turn % len(_ON_ROOFS)], pose.x, pose.y, 90.0 * round(pose.yaw_deg / 90.0),
+                        _ON_ROOFS[turn % len(_ON_ROOFS)], pose._replace(yaw_deg=90.0 * round(pose.yaw_deg / 90.0)),
                         phrase="on the roof", on=round(base + body["top_m"] - PARAPET_M, 3),
                     )  # fmt: skip
                     turn += 1

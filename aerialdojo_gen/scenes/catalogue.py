@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,18 @@ _DESIGNS = "designs.toml"
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
 _SHAPE_DIGITS = 12
+
+
+class Overrides(NamedTuple):
+    """What an instance has in place of its category's values; the stretch multiplies its design's."""
+
+    params: Mapping[str, float] | None = None
+    roles: Mapping[str, str] | None = None
+    attributes: Mapping[str, str] | None = None
+    stretch: tuple[float, float, float] | None = None
+
+
+_NONE = Overrides()
 
 
 class Catalogue:
@@ -70,28 +83,24 @@ class Catalogue:
         yaw_deg: float = 0.0,
         variant: str | None = None,
         scale: float = 1.0,
-        params: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-        attributes: Mapping[str, str] | None = None,
         design: str | None = None,
-        stretch: tuple[float, float, float] | None = None,
+        own: Overrides = _NONE,
     ) -> Instance:
         """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order.
 
-        Its design is the first of its category where none is given. `scale` multiplies the category's own, `stretch`
-        the design's.
+        Its design is the first of its category where none is given. `scale` multiplies the category's own.
         """
         prop = self[category]
         kind = self._draw_variant(prop, variant, rng)
         form = prop.designs[0] if design is None else prop.design(design)
-        if stretch is not None:
-            x, y, z = (own * factor for own, factor in zip(form.stretch, stretch, strict=True))
+        if own.stretch is not None:
+            x, y, z = (mine * factor for mine, factor in zip(form.stretch, own.stretch, strict=True))
             form = replace(form, stretch=(x, y, z))
-        sizes = self._draw_params(prop, kind, {**form.params, **(params or {})}, rng)
+        sizes = self._draw_params(prop, kind, {**form.params, **(own.params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
-        surfaces = dict(prop.roles) | dict(kind.roles) | dict(roles or {})
-        refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
-        words = dict(kind.attributes) | dict(attributes or {})
+        surfaces = dict(prop.roles) | dict(kind.roles) | dict(own.roles or {})
+        refuse_unknown(own.roles or {}, prop.roles, f"{prop.source} roles")
+        words = dict(kind.attributes) | dict(own.attributes or {})
         if prop.builder is not None:
             assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:

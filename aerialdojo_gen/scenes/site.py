@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator, rank
-from aerialdojo_gen.scenes.catalogue import Catalogue, placed
+from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
 from aerialdojo_gen.scenes.contact import CONTACT_M, stand
 from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
@@ -152,9 +152,9 @@ class Site:
         variant = self.next_variant(thing.category) if thing.variant is None else thing.variant
         attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
         options: dict[str, Any] = {
-            "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
-            "stretch": thing.stretch, "roles": thing.roles, "attributes": attributes or None,
+            "variant": None if variant == DRAWN else variant, "scale": thing.scale,
             "design": thing.design or self.design(thing.category, name),
+            "own": Overrides(thing.params, thing.roles, attributes or None, thing.stretch),
         }  # fmt: skip
         instance = self.catalogue.instantiate(
             thing.category, name, self.rng_for("prop", name), (*at, base), thing.yaw_deg, **options
@@ -239,7 +239,8 @@ class Site:
         base = self.ground_z(*target) + above
         self._moved_nodes.add(node)
         if move.place is not None:
-            options = {**options, "attributes": {**(options.get("attributes") or {}), "place": move.place}}
+            own = options["own"]
+            options = {**options, "own": own._replace(attributes={**(own.attributes or {}), "place": move.place})}
         return self.catalogue.instantiate(
             category, node, self.rng_for("prop", node), (*target, base + move.up_m), yaw_deg + move.turn_deg,
             **options,

@@ -96,7 +96,7 @@ def test_all_candidates_at_once_step_back_as_far_as_each_by_the_definition(found
 def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(found):
     which = np.arange(0, len(found.positions_m), 2)
     places = found.positions_m[which] + np.where(which[:, None] % 4, [0.3, -0.2, 0.1], 0.0)
-    moved = found.moved(which, places, RADIUS, CONFIG)
+    moved = found.moved(which, places, CONFIG.fov_deg)
     anew = Candidates.of(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
     for name in (
         "positions_m",
@@ -114,7 +114,7 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
 
 
 def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pictures(found):
-    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), RADIUS, CONFIG)
+    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), CONFIG)
     away = found.positions_m - found.world.scene.instances[found.instance].centroid
     turn = np.arctan2(away[:, 1], away[:, 0])[looked.which]
     front, apart = found.before_front[looked.which], math.radians(CONFIG.separation_deg)

@@ -15,7 +15,7 @@ from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
 from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
-from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, TELLS_WEIGHT, clarity_score
+from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, PARTS_WEIGHT, clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import SLACK_M
 
 _SAME_M = 1e-4
@@ -64,7 +64,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     known = rows.floats("part_tells", "part_front")
     for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
         yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
-    share = np.where(np.isnan(known), 0.0, [TELLS_WEIGHT, FRONT_WEIGHT])
+    share = np.where(np.isnan(known), 0.0, [PARTS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))

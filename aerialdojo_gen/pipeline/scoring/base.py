@@ -35,7 +35,7 @@ class AnchorView:
 
 
 @dataclass(frozen=True)
-class Known:
+class CandidateMeasures:
     """Measurements of a candidate anchor before it is pictured."""
 
     shown: float  # See `AnchorView`
@@ -44,7 +44,7 @@ class Known:
     part_visibility: tuple[float, ...]  # By ray casts: at least what the picture's would be
     off_front_rad: float | None
     framed: float  # See `AnchorView`: from here, and from behind, None if there is no picture from there
-    framed_behind: float | None
+    framed_behind: float | None = None
 
 
 class Scorer(Protocol):

@@ -77,7 +77,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         else:
             counts["not_in_view"] += 1
         row["parts_shown"] = _parts_shown(rays, k, thing, camera, pose, mask, view_pose(place, yaw, "front"))
-        missing = missing_tells(thing, camera, pose, mask)
+        missing = missing_parts(thing, camera, pose, mask)
         if thing.anatomy is not None and thing.anatomy.identifying_parts:
             row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.identifying_parts)
             row["tells_missing"] = ", ".join(missing) or None
@@ -115,7 +115,7 @@ def _seen_faces(
     return np.bincount(hit[hit >= 0], minlength=faces)
 
 
-def missing_tells(
+def missing_parts(
     instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_]
 ) -> list[str]:
     """Names of the identifying parts with less than `LEAST_SHARE` of a picture's pixels; mask is (H, W) bool."""
