@@ -120,8 +120,6 @@ class Site:
                 return surface
         return None
 
-    # Things
-
     @overload
     def place(self, thing: Placement, fit: Literal["as_is", "must"] = ..., **room: Unpack[Room]) -> Instance: ...
 
@@ -239,7 +237,7 @@ class Site:
         base = self.ground_z(*target) + above
         self._moved_nodes.add(node)
         if move.place is not None:
-            own = options["own"]
+            own: Overrides = options["own"]
             options = {**options, "own": own._replace(attributes={**(own.attributes or {}), "place": move.place})}
         return self.catalogue.instantiate(
             category, node, self.rng_for("prop", node), (*target, base + move.up_m), yaw_deg + move.turn_deg,
