@@ -176,7 +176,7 @@ def check_hints(hints: Sequence[str]) -> tuple[str, ...]:
     """Return the names of hints in their fixed order; UsageError for an unknown one."""
     for name in hints:
         if name not in HINTS:
-            raise UsageError(unknown("nothing to tell called", name, HINTS))
+            raise UsageError(unknown("no hint", name, HINTS))
     return tuple(name for name in HINTS if name in hints)
 
 

@@ -269,7 +269,9 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
         hub.api.hf_hub_download(hub.repo, sibling.rfilename, repo_type="dataset", revision=commit, local_dir=below)
         if not _matches_server(path, sibling):
             path.unlink(missing_ok=True)
-            raise StoreError(f"{sibling.rfilename} of {hub.repo} came damaged: the same command fetches it again")
+            raise StoreError(
+                f"{sibling.rfilename} of {hub.repo} was damaged in transfer: the same command fetches it again"
+            )
 
     with reporter.bar("pull", len(files), "files") as bar, hub.explain_errors("read"):
         pool = ThreadPoolExecutor(_AT_ONCE)

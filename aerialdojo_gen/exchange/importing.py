@@ -330,7 +330,7 @@ def _check(task: Task, seen: set[str]) -> None:
     except StoreError as error:
         raise BadField("scene", str(error)) from None
     if task.source_id in seen:
-        raise BadField("id", f"{brief(task.source_id, 60)} stands twice in the file")
+        raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
     seen.add(task.source_id)
 
 

@@ -57,7 +57,7 @@ class ExportOptions:
         if self.source not in SOURCES:
             raise UsageError(unknown("no source", self.source, SOURCES))
         if not self.goal:
-            raise UsageError(f"a goal is told by {' or '.join(GOALS)}: name one")
+            raise UsageError(f"a goal is given by {' or '.join(GOALS)}: name one")
         if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
             raise UsageError("nothing is seen without a view: name one of front, left, right, down")
         if self.runs and self.source != "render":

@@ -39,7 +39,7 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
-            # A release of somebody else's may call a route what leads out of the folder that a tar is unpacked in.
+            # A release of somebody else's may call a route what points outside the folder that a tar is unpacked in.
             if not is_plain(name := str(part.index.nav_id[k])):
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"

@@ -41,7 +41,7 @@ class Vocabulary:
         if length < 1:
             raise UsageError(f"a text has at least 1 token, not {length}")
         if len(set(words)) != len(words):
-            raise UsageError("a word stands twice in the vocabulary")
+            raise UsageError("duplicate word in the vocabulary")
         self.words = tuple(words)
         self.length = length
         self._number = {word: k for k, word in enumerate(self.words, start=UNKNOWN + 1)}

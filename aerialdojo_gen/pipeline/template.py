@@ -57,7 +57,7 @@ def init_config(path: str | Path, pipeline: str | Path | Pipeline | None = None,
     if path.suffix != ".toml":
         raise UsageError(f"{path}: a pipeline file is called NAME.toml")
     if path.exists() and not force:
-        raise UsageError(f"{path} is there already: --force overwrites it")
+        raise UsageError(f"{path} exists: --force overwrites it")
     if not isinstance(pipeline, Pipeline):
         pipeline = Pipeline() if pipeline is None else load_pipeline(pipeline)
     try:

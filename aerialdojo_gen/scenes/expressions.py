@@ -76,7 +76,7 @@ def evaluate_arrays(text: str, names: Mapping[str, Floats | float]) -> Floats:
     tree, used = _parse(text, arrays=True)
     unknown = sorted(used - names.keys())
     if unknown:
-        raise ShapeError(f"{text!r} speaks of the unknown name {unknown[0]!r}")
+        raise ShapeError(f"{text!r} uses the unknown name {unknown[0]!r}")
     with np.errstate(all="ignore"):
         value = np.asarray(_value(tree, names, _OF_ARRAYS), dtype=np.float64)
     if not np.isfinite(value).all():
@@ -89,7 +89,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
     tree, used = _parse(text)
     unknown = sorted(used - names.keys())
     if unknown:
-        raise ShapeError(f"{text!r} speaks of the unknown parameter {unknown[0]!r}")
+        raise ShapeError(f"{text!r} uses the unknown parameter {unknown[0]!r}")
     try:
         value = float(_value(tree, names, _FUNCTIONS))
     except (ArithmeticError, ValueError) as error:

@@ -68,7 +68,7 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
             return item, lease
         lease.close()
         if time.monotonic() > end:
-            raise OSError(errno.EBUSY, "it is swept again and again", str(area))
+            raise OSError(errno.EBUSY, "it is swept repeatedly", str(area))
 
 
 def sweep(root: Path) -> None:

@@ -48,7 +48,7 @@ def check_table(spec: TableSpec, table: pa.Table) -> pa.Table:
             raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.order)}")
         keys = table.select(list(spec.key))
         if keys.group_by(list(spec.key), use_threads=False).aggregate([]).num_rows != keys.num_rows:
-            raise StoreError(f"{spec.name}: a key ({', '.join(spec.key)}) stands twice")
+            raise StoreError(f"{spec.name}: duplicate key ({', '.join(spec.key)})")
     return table
 
 

@@ -104,7 +104,7 @@ def test_a_run_with_it_never_mixes_with_one_without(court: Path, tmp_path: Path)
     evaluate(court, Evaluation("r", "stop", hints=("heading",)), out=tmp_path, restart=True)
     with pytest.raises(UsageError, match=r"begun with tell = \['heading'\], not \[\]"):
         evaluate(court, Evaluation("r", "stop"), out=tmp_path)
-    with pytest.raises(UsageError, match="nothing to tell called 'headings': did you mean 'heading'"):
+    with pytest.raises(UsageError, match="no hint 'headings': did you mean 'heading'"):
         Evaluation("r", "stop", hints=("headings",))
 
 

@@ -57,7 +57,7 @@ class Sensors:
             if view not in VIEWS:
                 raise UsageError(unknown("no view", view, VIEWS))
         if len(set(self.views)) != len(self.views):
-            raise UsageError(f"a view stands twice in {', '.join(self.views)}")
+            raise UsageError(f"duplicate view in {', '.join(self.views)}")
         if self.light not in LIGHTS:
             raise UsageError(unknown("no light", self.light, LIGHTS))
         if self.max_depth_m <= 0.0:

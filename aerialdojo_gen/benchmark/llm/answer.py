@@ -139,5 +139,5 @@ def _reject_constant(name: str) -> Any:
 def _reject_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     value = dict(pairs)
     if len(value) != len(pairs):
-        raise InvalidAnswer("a key stands twice in it")
+        raise InvalidAnswer("it has a duplicate key")
     return value

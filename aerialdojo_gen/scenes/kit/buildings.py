@@ -25,7 +25,7 @@ def building(
 ) -> float:  # fmt: skip
     """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
     if not isinstance(outline, Polygon):
-        raise AssetError("outline: an area in one piece is wanted")
+        raise AssetError("outline: must be an area in one piece")
     z = min(site.ground_z(x, y) for x, y in outline.exterior.coords) if on is None else on
     height_m, form = storeys * storey_m, grammar_buildings.Roof(roof, roof_kind, roof_m, parapet_m, overhang_m)
     grammar_buildings.building(

@@ -39,7 +39,7 @@ class Body:
     def plan(self) -> Polygon:
         """Its outline, in one piece."""
         if not isinstance(self.outline, Polygon) or self.outline.area < _LEAST_M2:
-            raise AssetError(f"outline: an area in one piece of {_LEAST_M2:g} square metres or more is wanted")
+            raise AssetError(f"outline: must be an area in one piece, of {_LEAST_M2:g} square metres or more")
         return self.outline
 
 

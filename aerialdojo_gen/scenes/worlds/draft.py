@@ -114,7 +114,7 @@ class Draft:
             knob = self.kind.knobs[name]
             if not knob.low <= value <= knob.high or (knob.whole and value != int(value)):
                 form = "an integer" if knob.whole else "a number"
-                raise AssetError(f"--knob {name}={value:g}: {form} from {knob.low:g} to {knob.high:g} is wanted")
+                raise AssetError(f"--knob {name}={value:g}: must be {form} from {knob.low:g} to {knob.high:g}")
 
     def _one_of(self, held_out: Mapping[str, bool], key: str) -> str:
         return self.pick([name for name, held in held_out.items() if held == self.world.held_out], key)

@@ -91,7 +91,7 @@ def _recorded(task: TaskRecord, steps: list[int]) -> list[NDArray[np.uint8]] | N
 
 def _local_video(root: DataRoot, path: str) -> Path:
     if is_outside(root, path):
-        raise StoreError(f"recordings: path {path!r} leads out of {root}")
+        raise StoreError(f"recordings: path {path!r} points outside {root}")
     try:
         return root.local_copy(path)
     except FileNotFoundError:
