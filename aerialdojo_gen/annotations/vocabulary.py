@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.annotations.phrases import CategoryWords, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import valid_phrases
@@ -30,7 +30,7 @@ class Vocabulary:
         self._surface = Surface(scene)
         self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
-        by_category: dict[str, Words] = {}
+        by_category: dict[str, CategoryWords] = {}
         for i in scene.instances:
             if scene.imported and i.category not in NON_OBJECTS:
                 # Imported meshes have categories of their own, all of which may be targets.

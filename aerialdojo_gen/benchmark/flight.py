@@ -105,7 +105,7 @@ class Flight:
         hints: Sequence[str] = (),
         scenes_in_memory: int = SEVERAL,
     ) -> None:
-        self._keep = scenes_in_memory
+        self._scenes_in_memory = scenes_in_memory
         self._opened: set[str] = set()
         self._reader: Thread | None = None
         if scenes_in_memory > SEVERAL:
@@ -127,7 +127,7 @@ class Flight:
         mesh, sha256 = mesh_of(self._data, row["scene"])
         if self._reader is not None and self._reader.name == sha256:
             self._reader.join()
-        self.space = flight_space(mesh, sha256, body.radius_m, self._keep)
+        self.space = flight_space(mesh, sha256, body.radius_m, self._scenes_in_memory)
         self._opened.add(sha256)
         self.light = chosen_light(self.space.scene.light, self.sensors.light, 0, row["task_id"])
         self.episode = Episode(self.space, task.start, task.goal, budget)

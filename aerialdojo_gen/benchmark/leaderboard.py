@@ -64,7 +64,7 @@ class Row:
     agent: str
     episodes: int | None
     cells: Sequence[Cell]
-    paper: bool = False
+    is_paper: bool = False
 
 
 def write_leaderboard(folder: Path, page: Path) -> int:
@@ -87,7 +87,7 @@ def write_leaderboard(folder: Path, page: Path) -> int:
             heads=heads,
             groups=groups,
             starts={0, *accumulate(count for _, count in groups)},
-            tables={title: lines for title, lines in tables.items() if any(not line.paper for line in lines)},
+            tables={title: lines for title, lines in tables.items() if any(not line.is_paper for line in lines)},
             **page_parts(["report.css", "leaderboard.css"], "leaderboard.js"),
         )
     )
@@ -132,4 +132,4 @@ def _paper_row(result: PaperResult, heads: Sequence[Head]) -> Row:
         spread = result.spread.get(key)
         shown = f"± {text(head.metric, spread)}" if value is not None and spread is not None else ""
         cells.append(Cell(value, NONE if value is None else text(head.metric, value), shown))
-    return Row(result.model, "paper", None, cells, paper=True)
+    return Row(result.model, "paper", None, cells, is_paper=True)

@@ -48,7 +48,7 @@ def run_rows(request: ReportRequest) -> list[Row]:
 
 
 def _leading(run: Run, episodes: int) -> dict[str, str]:
-    return {"episodes": f"{episodes:,}", "hints": run.told or "none"}
+    return {"episodes": f"{episodes:,}", "hints": run.hints or "none"}
 
 
 def _headline_rows(request: ReportRequest) -> list[Row]:

@@ -226,8 +226,8 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
     try:
         return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]
     except FileNotFoundError:
-        told = root.at(row["mesh_path"])
-        raise StoreError(f"the mesh {told} is missing: run {command('build-scenes', scene=scene)}") from None
+        path = root.at(row["mesh_path"])
+        raise StoreError(f"the mesh {path} is missing: run {command('build-scenes', scene=scene)}") from None
 
 
 # The descriptions that a task may have: its own, or one of its target's drawn for an episode.

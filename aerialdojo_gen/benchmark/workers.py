@@ -31,9 +31,7 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
-            raise UsageError(
-                f"agent {evaluation.agent!r} has no attribute pace: leave --requests-per-minute out"
-            )
+            raise UsageError(f"agent {evaluation.agent!r} has no attribute pace: leave --requests-per-minute out")
         # Requests of all workers are spaced evenly.
         interval_s = 60.0 / evaluation.requests_per_minute
         agent.pace = lambda: time.sleep(link.turn(interval_s))

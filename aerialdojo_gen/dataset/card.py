@@ -51,7 +51,7 @@ def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
     return [
         row
         | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        | {"paper_km": m.paper.path_m / 1000 if m.paper else None}
+        | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None}
         for row, m in zip(rows, made, strict=True)
     ]
 
@@ -78,20 +78,20 @@ def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     for scene in scenes:
         for subset in ("train", "test"):
             tasks = store.read_scene(root, f"tasks/{subset}", scene)
-            told: list[dict[str, Any]] = (
+            examples: list[dict[str, Any]] = (
                 tasks.filter(pc.equal(tasks.column("modality"), "semantic")).slice(0, 1).to_pylist()
             )
-            if told:
-                return told[0]
+            if examples:
+                return examples[0]
     return None
 
 
 def _of_paper(made: Made) -> bool:
     """Whether a scene has the paper's numbers of everything."""
-    paper = made.paper
-    return paper is not None and (
-        (made.landmarks, made.objects) == (paper.landmarks, paper.objects)
-        and all(made.of(setting) == paper.tasks[setting] for setting in schemas.SETTINGS)
+    paper_scene = made.paper_scene
+    return paper_scene is not None and (
+        (made.landmarks, made.objects) == (paper_scene.landmarks, paper_scene.objects)
+        and all(made.of(setting) == paper_scene.tasks[setting] for setting in schemas.SETTINGS)
     )
 
 

@@ -30,6 +30,6 @@ def pictured_objects(where: Where, scene: str) -> list[dict[str, Any]]:
     if not shards(root, "references", scene):
         rows: list[dict[str, Any]] = read_scene(root, "release/objects", scene).to_pylist()
         return rows
-    told = described(read_scene(root, "objects", scene), read_scene(root, "descriptions", scene))
-    objects = {row["object_id"]: row for row in told.to_pylist()}
+    table = described(read_scene(root, "objects", scene), read_scene(root, "descriptions", scene))
+    objects = {row["object_id"]: row for row in table.to_pylist()}
     return [objects[row["object_id"]] | row for row in read_scene(root, "references", scene).to_pylist()]

@@ -20,7 +20,7 @@ from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 # What stands beside the tables; the dataset card is what the Hub shows of a data set.
-_BESIDE = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
+_COMPANIONS = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
 _AT_ONCE = 8
 _CHUNK = 1 << 20
 
@@ -95,7 +95,7 @@ def push_to_hub(
     hub = Hub(repo, "push-to-hub", writes=True)
     from huggingface_hub import CommitOperationAdd, CommitOperationDelete
 
-    own = [*_BESIDE, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
+    own = [*_COMPANIONS, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
     files = {name: root.path / FOLDER / name for name in own if (root.path / FOLDER / name).is_file()}
     if meshes:
         files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
@@ -173,30 +173,32 @@ def pull_release(
     with hub.explain_errors("read"):
         info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
     commit = str(info.sha)
-    wanted = {
+    requested = {
         s.rfilename: s for s in info.siblings if _is_ours(s.rfilename) and (meshes or not _is_mesh(s.rfilename))
     }
     left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
-    scenes = {scene for name in wanted if (scene := scene_of(name)) and not _is_mesh(name)}
+    scenes = {scene for name in requested if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     if not replace:
         _refuse_overwrite(
-            root, {name: sibling for name, sibling in wanted.items() if _is_outside_release(name)}, repo
+            root, {name: sibling for name, sibling in requested.items() if _is_outside_release(name)}, repo
         )
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
-    places = {_place(partial, name) for name in wanted}
+    places = {_place(partial, name) for name in requested}
     # What a call for another revision has left is no part of this one.
     for path in partial.rglob("part-*.parquet"):
         if path not in places:
             path.unlink()
-    _fetch(hub, commit, list(wanted.values()), partial, reporter)
-    size = sum(_place(partial, name).stat().st_size for name in wanted)
-    _check(open_root(partial), {name for name in wanted if _is_mesh(name)})
-    _move_into_place(root, partial, sorted(wanted))
-    return Moved(str(root.path / FOLDER), commit, len(scenes), len(wanted), size, sum(map(_is_mesh, wanted)), left)
+    _fetch(hub, commit, list(requested.values()), partial, reporter)
+    size = sum(_place(partial, name).stat().st_size for name in requested)
+    _check(open_root(partial), {name for name in requested if _is_mesh(name)})
+    _move_into_place(root, partial, sorted(requested))
+    return Moved(
+        str(root.path / FOLDER), commit, len(scenes), len(requested), size, sum(map(_is_mesh, requested)), left
+    )
 
 
 def scene_of(name: str) -> str:
@@ -209,7 +211,7 @@ def scene_of(name: str) -> str:
 
 
 def _is_ours(name: str) -> bool:
-    return name in _BESIDE or _is_policy(name) or bool(scene_of(name))
+    return name in _COMPANIONS or _is_policy(name) or bool(scene_of(name))
 
 
 def _is_mesh(name: str) -> bool:
@@ -246,10 +248,10 @@ def _weights(root: LocalRoot, name: str) -> Path:
     return path
 
 
-def _refuse_overwrite(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
+def _refuse_overwrite(root: LocalRoot, requested: Mapping[str, Any], repo: str) -> None:
     """Refuse to take the place of other meshes or weights: without a release they may be all that somebody has."""
-    others = [name for name in sorted(wanted) if (root.path / name).is_file()]
-    others = [name for name in others if not _matches_server(root.path / name, wanted[name])]
+    others = [name for name in sorted(requested) if (root.path / name).is_file()]
+    others = [name for name in others if not _matches_server(root.path / name, requested[name])]
     if others:
         more = f" and {len(others) - 1} more" if others[1:] else ""
         raise UsageError(
@@ -289,13 +291,13 @@ def _matches_server(path: Path, sibling: Any) -> bool:
     if sibling.size is not None and size != sibling.size:
         return False
     if sibling.lfs is not None:
-        told, digest = sibling.lfs.sha256, hashlib.sha256()
+        expected, digest = sibling.lfs.sha256, hashlib.sha256()
     else:
-        told, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
+        expected, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK):
             digest.update(chunk)
-    return told is not None and digest.hexdigest() == told
+    return expected is not None and digest.hexdigest() == expected
 
 
 def _place(folder: Path, name: str) -> Path:

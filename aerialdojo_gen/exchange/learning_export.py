@@ -81,7 +81,7 @@ def export_for_learning(
 ) -> ExportResult:
     """Write trajectories with what the body sees on them, as a data set for training."""
     writer = _writer(format_name, options)
-    told = reporter or Reporter(quiet=True)
+    progress = reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
     root = open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
@@ -89,9 +89,9 @@ def export_for_learning(
     with unfinished.held():
         left = [part for part in parts if not unfinished.has(part.number)]
         if unfinished.resumed:
-            told.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
+            progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
         jobs = [_Job(format_name, root.url, options, part, unfinished.folder) for part in left]
-        with told.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
+        with progress.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
             for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
                 if isinstance(outcome, AerialDojoError):
                     raise outcome
@@ -173,7 +173,7 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
         "format": format_name,
         "version": __version__,
         "code": code_of(f"aerialdojo_gen.exchange.{format_name}_writer").digest,
-        "wanted": _wanted(options),
+        "wanted": _requested(options),
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
@@ -181,7 +181,7 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
     }
 
 
-def _wanted(options: ExportOptions) -> Any:
+def _requested(options: ExportOptions) -> Any:
     return json.loads(json.dumps(dataclasses.asdict(options)))
 
 
@@ -200,7 +200,7 @@ def _marker(
         "frame": FRAME,
         "scenes": sorted({part.scene for part in parts}),
         "counts": counts,
-        "wanted": _wanted(options),
+        "wanted": _requested(options),
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
         "lost": LOST,
     }

@@ -44,11 +44,11 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            told = _to_json(labels, part, k, options)
+            rows = _to_json(labels, part, k, options)
             goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
             for begin, frames in sample_frames.frames(k):
                 for i in range(len(next(iter(frames.values())))):
-                    step = told[begin + i]
+                    step = rows[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
                     seen = {name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()}
                     for view, rgb in seen.get("rgb", {}).items():

@@ -60,11 +60,11 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
         raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")
     try:
         with _safetensors().safe_open(str(path), framework="pt") as file:
-            told = file.metadata() or {}
+            metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
-        if told.get("format") != _FORMAT:
-            raise ValueError(f"its format is {told.get('format')!r}, not {_FORMAT!r}")
-        given, state = loads_json(told["about"]), loads_json(told["state"])
+        if metadata.get("format") != _FORMAT:
+            raise ValueError(f"its format is {metadata.get('format')!r}, not {_FORMAT!r}")
+        given, state = loads_json(metadata["about"]), loads_json(metadata["state"])
         views, width, height, fov_deg, max_depth_m = given["sensors"]
         sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
         words = Vocabulary(given["words"], given["length"])

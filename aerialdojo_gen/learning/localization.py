@@ -18,7 +18,7 @@ _CELL_M, _STOREY_M, _SECTOR_RAD = 4.0, 2.0, math.radians(15.0)
 _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
 _PLACES, _HEADINGS = sum(n for _, n, _ in _AXES), round(2.0 * math.pi / _SECTOR_RAD)
 # Intervals to either side of the likeliest one whose mean is a place.
-_BESIDE = 2
+_NEIGHBOURS = 2
 # Sums over the steps so far: of each axis' weights, of weighted places, of own motion weighted as each axis is (ahead
 # and left for x and for y, up for z), of the start's heading; beside them those of the scenes' logits.
 _SUMS = 3 + 3 + 5 + 2
@@ -122,7 +122,7 @@ def places(logits: Any) -> tuple[Any, Any]:
     for one, (width, n, low) in zip(logits.split([n for _, n, _ in _AXES], dim=-1), _AXES, strict=True):
         number = torch.arange(n, device=logits.device)
         middle = low + (number + 0.5) * width
-        near = (number - one.argmax(dim=-1, keepdim=True)).abs() <= _BESIDE
+        near = (number - one.argmax(dim=-1, keepdim=True)).abs() <= _NEIGHBOURS
         place = (one.masked_fill(~near, -torch.inf).softmax(dim=-1) * middle).sum(dim=-1, keepdim=True)
         out.append(place)
         spread.append((one.softmax(dim=-1) * (middle - place).square()).sum(dim=-1, keepdim=True).sqrt())
@@ -139,7 +139,7 @@ def directions(logits: Any) -> Any:
     return mean * (2.0 - length.square()) / (1.05 - length.square())
 
 
-def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
+def offset_loss(estimate: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     """Loss of the goal offset, in units of 10 m, and mean cross-entropies of the intervals."""
     mask = batch["mask"]
     offset, pose = batch["offset"][mask] / UNIT_M, batch["pose"][mask]
@@ -147,9 +147,9 @@ def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
     away_m = torch.cat([_rotate_back(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
     scene = batch["scene"][:, None].expand(mask.shape)[mask]
-    own = pose_loss(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
-    at_goal = _interval_loss(guess.goal[mask], pose[:, :3] + away_m)
-    return functional.smooth_l1_loss(guess.offset[mask], offset) + own + at_goal
+    own = pose_loss(estimate.place[mask], estimate.heading[mask], estimate.scene[mask], pose, scene)
+    at_goal = _interval_loss(estimate.goal[mask], pose[:, :3] + away_m)
+    return functional.smooth_l1_loss(estimate.offset[mask], offset) + own + at_goal
 
 
 def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:

@@ -96,7 +96,7 @@ class PolicyOutput(NamedTuple):
 
     logits: Any  # (n, T, 16); of the actions
     blocked: Any  # (n, T, 16); logits of each action's touching a surface or leaving the flight volume
-    guess: LocalizationOutput  # Where the goal is thought to be, or was said to be
+    estimate: LocalizationOutput  # Where the goal is thought to be, or was said to be
 
     def actions(self, back: Any) -> Any:
         """Choose the likeliest free action, (n, T), never a turn that leads back; Stop within 2 m of the goal."""
@@ -108,7 +108,7 @@ class PolicyOutput(NamedTuple):
         # Where all of them lead back, any but Stop.
         onward = (moving - _NEVER * (turns | back)).argmax(dim=-1)
         chosen = torch.where(back.gather(-1, likeliest)[..., 0], onward, likeliest[..., 0])
-        near = torch.linalg.vector_norm(self.guess.offset, dim=-1) * UNIT_M <= ARRIVED_M
+        near = torch.linalg.vector_norm(self.estimate.offset, dim=-1) * UNIT_M <= ARRIVED_M
         return chosen.masked_fill(near, STOP)
 
 
@@ -166,12 +166,12 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         # As they lie in memory, channels last: on a CPU convolutions take half the time so.
         return self.eye(patches.permute(0, 3, 1, 2))
 
-    def encode_goal(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
+    def encode_goal(self, tokens: Any, images: Any, goal_by_image: Any) -> Any:
         """Encode goals from tokens (n, length) and pictures (n, H, W, 4) uint8; (n, features)."""
         said = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
         said = said.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
-        shown = self.encode_pictures(images) * told_by_image[:, None]
-        return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
+        shown = self.encode_pictures(images) * goal_by_image[:, None]
+        return self.goal(torch.cat([said, shown, goal_by_image[:, None].float()], dim=1))
 
     def forward(
         self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None
@@ -179,8 +179,8 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         """Policy outputs for steps (n, T) of episodes, odometry in the start's frame; also the memory (n, sums)."""
         memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
         seen = self.features(pictures, goal, mask)
-        guess, memory = self.whereabouts(seen, goal, odometry, memory)
-        return self.choose(seen, guess), memory
+        estimate, memory = self.whereabouts(seen, goal, odometry, memory)
+        return self.choose(seen, estimate), memory
 
     def features(self, pictures: Any, goal: Any, mask: Any) -> Any:
         """Encode what is seen at steps, (n, T, ...); of who sees nothing, the goal. Parameters are `forward`'s."""
@@ -192,21 +192,21 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         rows = mask.flatten().nonzero()[:, 0]
         return flat.index_copy(0, rows, encoded).reshape(n, steps, -1)
 
-    def choose(self, seen: Any, guess: LocalizationOutput) -> PolicyOutput:
+    def choose(self, seen: Any, estimate: LocalizationOutput) -> PolicyOutput:
         """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else."""
         # With the goal's words a choice learns routes of the training's scenes by heart, and beside a map that is
         # still poor it learns not to go by the map.
-        logits = self.choice(torch.cat([seen, bearing(guess).to(seen.dtype)], dim=2))
-        return PolicyOutput(logits, self.blocked(seen), guess)
+        logits = self.choice(torch.cat([seen, bearing(estimate).to(seen.dtype)], dim=2))
+        return PolicyOutput(logits, self.blocked(seen), estimate)
 
     def blank(self, n: int) -> Any:
         """Return the memory of n episodes that begin: (n, sums)."""
         return torch.zeros(n, self.whereabouts.sums)
 
 
-def bearing(guess: LocalizationOutput) -> Any:
+def bearing(estimate: LocalizationOutput) -> Any:
     """Where the goal is thought to be, as numbers: (n, T, 30); choices teach it nothing."""
-    away_m = guess.offset.detach() * UNIT_M
+    away_m = estimate.offset.detach() * UNIT_M
     flat = torch.linalg.vector_norm(away_m[..., :2], dim=-1, keepdim=True)
     towards = away_m[..., :2] / (flat + 0.5)
     return torch.cat([_waves(away_m), towards, torch.log1p(flat)], dim=-1)

@@ -137,8 +137,8 @@ class Policy(AgentBase):
         self._doubt: list[float] = []
         # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
         self._unsearched: list[tuple[Any, NDArray[np.float32]]] = []
-        wanted = word_targets([goal.target_name], about.named)[0] if about.named else None
-        self._search = None if wanted is None else Search(wanted, self.sensors)
+        target_words = word_targets([goal.target_name], about.named)[0] if about.named else None
+        self._search = None if target_words is None else Search(target_words, self.sensors)
 
     def act(self, observation: Observation) -> int:
         """Look, remember, choose."""
@@ -155,15 +155,15 @@ class Policy(AgentBase):
             step = torch.ones((1, 1), dtype=torch.bool, device=device)
             seen = self.network.features(pictures, self._goal, step)
             memory = self.network.blank(1).to(device) if self._memory is None else self._memory
-            guess, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
+            estimate, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
             if self._search is not None and pictures is not None:
-                self._doubt.append(float(guess.scene_nats[0, 0]))
+                self._doubt.append(float(estimate.scene_nats[0, 0]))
                 self._unsearched.append((pictures[0], self._reckoning.odometry))
                 if np.mean(self._doubt) > LOST_NATS:
                     self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
-                    guess = guess.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
-            thought = self.network.choose(seen, guess)
+                    estimate = estimate.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
+            thought = self.network.choose(seen, estimate)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
         self._previous = int(thought.actions(back)[0, 0])
         return self._previous

@@ -58,8 +58,8 @@ class _Candidate:
 class Search:
     """One episode's sightings, in the frame of its start: x ahead, y left, z up, metres."""
 
-    def __init__(self, wanted: NDArray[np.float32], sensors: Sensors) -> None:
-        self._wanted = wanted.astype(np.float64)
+    def __init__(self, target_words: NDArray[np.float32], sensors: Sensors) -> None:
+        self._target_words = target_words.astype(np.float64)
         self._rays = patch_rays(sensors)
         self._range_m = sensors.max_depth_m
         self._candidates: dict[tuple[int, int, int], _Candidate] = {}
@@ -73,7 +73,7 @@ class Search:
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
     ) -> None:
         """Add what is seen at a step: log chances (patches, words + 1), pictures (views, H, W, 4), odometry (4,)."""
-        if not self._wanted.any():
+        if not self._target_words.any():
             return
         away_m = self._rays * patch_depths_m(pictures, self._range_m)[:, None]
         distance_m = np.linalg.norm(away_m, axis=1)
@@ -81,9 +81,9 @@ class Search:
         if not rows.any():
             return
         away_m, distance_m = away_m[rows], distance_m[rows]
-        said = self._wanted[self._wanted > 0.0]
+        said = self._target_words[self._target_words > 0.0]
         # How much less likely these words are than if they were all that is seen there.
-        score = log_chances[rows, :-1] @ self._wanted - float(said @ np.log(said))
+        score = log_chances[rows, :-1] @ self._target_words - float(said @ np.log(said))
         before = away_m * (1.0 - _BEFORE_M / np.maximum(distance_m, _BEFORE_M))[:, None]
         weight = 1.0 / (1.0 + distance_m / _CLEAR_M) ** 2
         cells = np.floor(_from_start(away_m, odometry) / _THING_M).astype(int)

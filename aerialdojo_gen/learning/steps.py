@@ -147,7 +147,7 @@ class Pool:
             out[name][mask] = values[rows]
         image = j["image"][episodes]
         shown = (by_image | ~j["semantic"][episodes]) & (image >= 0)
-        out["told_by_image"] = shown
+        out["goal_by_image"] = shown
         out["scene"] = self._scene[episodes]
         out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
         out["images"] = np.zeros((len(episodes), *j["images"].shape[1:]), np.uint8)

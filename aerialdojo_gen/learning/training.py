@@ -372,9 +372,9 @@ def _describe(kept: Assessment) -> str:
     """Describe the accuracy on what was not trained on."""
     shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
-    told = f"; {' and '.join(known)} actions told" if known else ""
+    suffix = f"; {' and '.join(known)} actions told" if known else ""
     off = f"{kept.goal_off_at_start_m:.1f} m at the start, {kept.goal_off_m:.1f} m in all"
-    return f"{kept.accuracy:.1%}; goal off by {off}{told}"
+    return f"{kept.accuracy:.1%}; goal off by {off}{suffix}"
 
 
 def _tensorboard(folder: Path) -> Any:

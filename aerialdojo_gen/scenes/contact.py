@@ -35,7 +35,7 @@ _ELSEWHERE_M = 4.0  # what is so far off the ground stands on something else, or
 _LEVEL = frozenset({"building", "landmark"})
 
 
-def stand(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mesh | None]:
+def rest_on_ground(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mesh | None]:
     """Bring a thing into contact with the ground, and give it a plinth where nothing less does.
 
     Parameters

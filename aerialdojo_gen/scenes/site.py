@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
-from aerialdojo_gen.scenes.contact import CONTACT_M, stand
+from aerialdojo_gen.scenes.contact import CONTACT_M, rest_on_ground
 from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
@@ -326,7 +326,7 @@ class Site:
             under = self._terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
             if np.ptp(under) <= CONTACT_M / 2.0:
                 continue
-            self.instances[k], plinth = stand(thing, self.catalogue[thing.category].kind, heights)
+            self.instances[k], plinth = rest_on_ground(thing, self.catalogue[thing.category].kind, heights)
             if plinth is not None:
                 self.add(f"plinth_{thing.node}", "plinth", [(self.material("plinth", "concrete"), plinth)])
 

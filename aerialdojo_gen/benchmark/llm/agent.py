@@ -176,7 +176,7 @@ class LanguageModelAgent(AgentBase):
         except ServiceDown as error:
             raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
         except AgentUnavailable as error:
-            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
+            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try repair later')}"
             raise AerialDojoError(f"checked before the run, nothing flown: {error}{mend}") from None
         self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
         counted = "" if self.tells_tokens else ", tells no tokens"
@@ -249,8 +249,8 @@ class LanguageModelAgent(AgentBase):
                 answer = parse_answer(text, actions.names)
             except InvalidAnswer as error:
                 shown = text[:_KEPT_CHARACTERS].strip() or "(nothing)"
-                again = repair_text(str(error), actions)
-                messages += [Message("assistant", (shown,)), Message("user", (again,))]
+                repair = repair_text(str(error), actions)
+                messages += [Message("assistant", (shown,)), Message("user", (repair,))]
                 answer = parse_answer(self._ask(messages), actions.names)
         except InvalidAnswer:
             self._turns.append(Turn(observation.step, None))

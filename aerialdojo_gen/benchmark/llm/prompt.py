@@ -42,10 +42,10 @@ class Sight:
 def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
     """Write what holds for the whole episode (paper, Appendix A)."""
     rules = goal.rules
-    told = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
+    hint = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
     return f"""\
 You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
-the drone's cameras; there is no map, no GPS and no compass{told}. Find the target, fly up to it, and stop in front \
+the drone's cameras; there is no map, no GPS and no compass{hint}. Find the target, fly up to it, and stop in front \
 of it.
 
 BODY

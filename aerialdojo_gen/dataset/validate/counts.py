@@ -53,9 +53,9 @@ def count_scene(data: SceneData, complete: bool) -> SceneCounts:
 def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
     """Hold a scene's landmarks, objects and tasks by setting and subset to the paper's, where the paper has it."""
     outcome = Outcome("scene_counts", "counts")
-    paper = inventory().get(data.scene)
-    if paper is None or not data.pipeline.split.paper_counts:
-        outcome.skipped = "no scene of the paper" if paper is None else "the pipeline has no paper_counts"
+    paper_scene = inventory().get(data.scene)
+    if paper_scene is None or not data.pipeline.split.paper_counts:
+        outcome.skipped = "no scene of the paper" if paper_scene is None else "the pipeline has no paper_counts"
         return outcome
     if not counts.complete:
         outcome.skipped = "the scene cannot be read"
@@ -64,10 +64,10 @@ def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
 
     trains = train_quotas(data.scene, inventory(), splits())
     side = store.partition(data.scene)
-    expected = {"landmarks": paper.landmarks, "objects": paper.objects}
+    expected = {"landmarks": paper_scene.landmarks, "objects": paper_scene.objects}
     found = {"landmarks": len(data["landmarks"]), "objects": len(data["objects"])}
     for setting in SETTINGS:
-        for subset, n in (("train", trains[setting]), ("test", paper.tasks[setting] - trains[setting])):
+        for subset, n in (("train", trains[setting]), ("test", paper_scene.tasks[setting] - trains[setting])):
             expected[f"{subset} {setting} tasks"] = n
             found[f"{subset} {setting} tasks"] = counts.routes[f"{side}_{subset}", setting]
     for name, n in expected.items():

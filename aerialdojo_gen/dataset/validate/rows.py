@@ -206,8 +206,8 @@ class SceneData:
         """Return what one check has made for all others, made now where none has."""
         if name not in self.cache:
             self.cache[name] = make()
-        kept: T = self.cache[name]
-        return kept
+        value: T = self.cache[name]
+        return value
 
     def sampled_routes(self, *faults: str) -> Iterator[tuple[int, int]]:
         """Sampled routes without any of these faults: their places in `paths`, and their rows."""

@@ -42,7 +42,7 @@ def make_horizon(
 
 
 def _land_parts(land: Land, materials: MaterialLibrary) -> Iterable[Part]:
-    names = np.array([_known(name, materials) for name in land.material])
+    names = np.array([_resolve_material(name, materials) for name in land.material])
     for name in sorted(set(names.tolist())):
         used, faces = np.unique(land.faces[names == name], return_inverse=True)
         vertices = single(land.vertices[used])
@@ -54,12 +54,12 @@ def _scenery_parts(scene: str, scenery: Iterable[SceneryItem], materials: Materi
     for k, (bodies, at, turn) in enumerate(scenery):
         # Two layouts of each façade: what is far away is worth no more pictures.
         draw = rank(0, "horizon-facade", scene, k % 2)
-        named = [(materials.laid_out(_known(name, materials), draw), body) for name, body in bodies]
+        named = [(materials.laid_out(_resolve_material(name, materials), draw), body) for name, body in bodies]
         parts = [to_part(body, name, materials.tile_m(name)) for name, body in named]
         yield from placed(parts, tuple(at), float(np.degrees(turn)))
 
 
-def _known(spec: str, materials: MaterialLibrary) -> str:
+def _resolve_material(spec: str, materials: MaterialLibrary) -> str:
     """Give a material, or its colour alone where the catalogue has no such surface."""
     name, _, colour = spec.partition(":")
     return spec if spec.startswith("#") or name in materials.names else colour or _PLAIN

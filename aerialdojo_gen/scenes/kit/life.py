@@ -119,7 +119,7 @@ def _people(
             chosen = dressed[int(order[placed % len(order)])]
             if chosen.split("_")[0] in _AT_WORK and rng.random() < 0.35:
                 posture = _WORK
-            pose = first if k == 0 else _beside(first, posture, k)
+            pose = first if k == 0 else _group_pose(first, posture, k)
             if k and not _walkable(site, pose.x, pose.y, ground, _NEXT_M):
                 continue
             yaw = pose.yaw_deg + float(rng.uniform(-14.0, 14.0))
@@ -153,7 +153,7 @@ def _deck_spots(thing: Instance, rng: np.random.Generator) -> list[tuple[Pose, f
     return [(pose, float(heights[k])) for pose in poisson_disc(top.buffer(-_EDGE_M), _APART_M, rng, limit=200)]
 
 
-def _beside(first: Pose, posture: int, k: int) -> Pose:
+def _group_pose(first: Pose, posture: int, k: int) -> Pose:
     """Where another one of a group stands: in step beside those who walk or sit, else before them, turned to them."""
     turn = math.radians(first.yaw_deg)
     if posture in (_WALK, _SIT):

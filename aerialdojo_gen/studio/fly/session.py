@@ -225,9 +225,9 @@ def _spread(scenes: list[str], task_ids: list[str], seed: int) -> pa.Array:
 
 
 def _goal_state(goal: Goal) -> dict[str, Any]:
-    rules, told = goal.rules, ("target_name", "landmark", "direction", "description")
+    rules, names = goal.rules, ("target_name", "landmark", "direction", "description")
     return {
-        **{name: getattr(goal, name) for name in told},
+        **{name: getattr(goal, name) for name in names},
         "has_image": goal.image is not None,
         "image_distance_m": goal.image_distance_m,
         "heading": goal.heading and asdict(goal.heading),

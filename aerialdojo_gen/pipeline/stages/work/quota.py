@@ -56,7 +56,7 @@ def difficulty_level(plan_detour: Floats, visible_at_start: Floats) -> NDArray[n
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Accepted:
     """n candidates that the rules keep."""
 
     sampling_keys: Sequence[str]  # Keys for random draws
@@ -66,7 +66,7 @@ class Kept:
 
 
 def select_quota(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
+    kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> NDArray[np.bool_]:
     """Weighted sample without replacement (Gumbel's trick), (n,) bool.
 
@@ -80,14 +80,14 @@ def select_quota(
 
 
 def rank_candidates(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
+    kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> dict[str, NDArray[np.int64]]:
     """Rows of each setting's tasks in the order of selection by `select_quota`."""
     scores, tie_rank = _score(kept, counts, path_m, seed, preference)
     return {name: _best(scores, tie_rank, rows) for name, rows in _groups(kept, counts).items()}
 
 
-def _groups(kept: Kept, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
+def _groups(kept: Accepted, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
     return {name: np.flatnonzero(np.asarray(kept.settings) == name) for name in sorted(counts)}
 
 
@@ -97,7 +97,7 @@ def _best(scores: Floats, tie_rank: NDArray[np.int64], rows: NDArray[np.int64]) 
 
 
 def _score(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float
+    kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`; and the ranks (n,) that break ties."""
     length_m = kept.length_m
