@@ -122,7 +122,7 @@ class SceneClaims:
         return [j for j in self._groups[self.scene.instances[i].category, self.bearings[i]] if j != i]
 
     def distractors(self, i: int, claims: Sequence[Claim]) -> list[int]:
-        """Instances that claims of `i` fit as well: nothing but other claims tells them from it."""
+        """Instances that claims of `i` fit as well: only other claims distinguish them from it."""
         return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
 
     def of(self, i: int) -> tuple[Claim, ...]:

@@ -1,4 +1,4 @@
-"""Words and noun phrases of a scene's instances, and what is true of their looks."""
+"""Words and noun phrases of a scene's instances, and what is true of their appearance."""
 
 from __future__ import annotations
 

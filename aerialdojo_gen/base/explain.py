@@ -1,4 +1,4 @@
-"""What is wrong with a value from outside, by Pydantic's errors: a line a fault, with the key that was meant."""
+"""What is wrong with a value from outside, by Pydantic's errors: one line per fault, with the key that was meant."""
 
 from __future__ import annotations
 

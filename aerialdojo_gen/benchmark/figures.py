@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Okabe and Ito's colours, which colour-blind readers tell apart too; line styles carry what is left.
+# Okabe and Ito's colours, which colour-blind readers can distinguish; line styles carry what is left.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.linewidth": 0.8, "axes.edgecolor": "#444444",

@@ -1,4 +1,4 @@
-"""Episodes to be looked at again: what every run did on one task, on a map.
+"""Replays of episodes: what every run did on one task, on a map.
 
 The evaluator's eyes only: a replay shows the target and the reference route.
 """

@@ -192,7 +192,7 @@ def _print_outcome(outcome: Outcome, run: str, scores: str, data: str, reporter:
     if outcome.stopped or outcome.all_failed:
         raise AerialDojoError(last)
     if last:
-        # Not the reporter's: a failure is told under --quiet too.
+        # Not the reporter's: a failure is printed under --quiet too.
         print(last, file=sys.stderr)
 
 

@@ -1,4 +1,4 @@
-"""Commands that look at a release: statistics, one task, one scene in the browser."""
+"""Commands that inspect a release: statistics, one task, one scene in the browser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command that tells what an evaluation gave."""
+"""The command that reports an evaluation's results."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]
 
 
 def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
-    """Return the first task that is told in words, of the shortest setting there is."""
+    """Return the first semantic task of the shortest setting there is."""
     for scene in scenes:
         for subset in ("train", "test"):
             tasks = store.read_scene(root, f"tasks/{subset}", scene)
@@ -96,7 +96,7 @@ def _of_paper(made: Made) -> bool:
 
 
 def _difficulty(tasks: pd.DataFrame) -> dict[str, str]:
-    """Tables of difficulty and splits as Markdown, without their headings; none where the release does not tell."""
+    """Tables of difficulty and splits as Markdown, without their headings; none where the release lacks them."""
     made = dict(zip(("setting", "scene", "seen", "held_out"), difficulty_tables(tasks), strict=False))
     return {name: _rows(table) for name, table in made.items()} if "held_out" in made else {}
 

@@ -1,4 +1,4 @@
-"""Look into a release: one scene of it with its mesh, one task of it by its id."""
+"""Access to a release: a scene with its mesh, a task by its id."""
 
 from __future__ import annotations
 

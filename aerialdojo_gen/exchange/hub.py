@@ -75,7 +75,7 @@ def push_to_hub(
     policies : sequence of str
         Names of trainings whose last weights are sent too, such as ``imitation``.
     reporter : Reporter, optional
-        Is told what is done.
+        Reports what is done.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
 
 GOALS = ("text", "image")
-# What a task says in words where its goal is a picture alone: the description would tell what the picture shows.
+# What a task says in words where its goal is a picture alone: the description would say what the picture shows.
 IMAGE_TASK = "Fly to the object that the goal picture shows."
 _SENSORS = Sensors(("front",), width=128, height=128)
 # Pixels of all views that are held at a time.
@@ -75,7 +75,7 @@ class Part:
     settings: list[str]  # Of every trajectory
     splits: list[str]
     tasks: NDArray[np.int64]  # (n,) int64; number of every trajectory's text
-    texts: list[str]  # What tells its goal in words
+    texts: list[str]  # Its goal in words
     first_episode: int  # How many trajectories and steps all parts before it have
     first_frame: int
 

@@ -23,7 +23,7 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
-# Weight of the warning's mean loss: what is in the way is soon seen, and the same pictures are to tell places.
+# Weight of the warning's mean loss: what is in the way is soon seen, and the same pictures are to show places.
 _WARNING = 4.0
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
@@ -41,7 +41,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: loss and accuracy of choices told where the goal is, and what `Learner.assess` finds."""
+    """What came of an epoch: loss and accuracy of choices given the goal's place, and what `Learner.assess` finds."""
 
     phase: int
     number: int
@@ -64,7 +64,7 @@ class Assessment:
 
 @dataclass(frozen=True)
 class TrainingLog:
-    """Who is told how a training goes."""
+    """Receives a training's progress."""
 
     on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
     on_epoch: Callable[[Epoch], None]
@@ -254,8 +254,8 @@ class Learner:
         return out
 
     def _forward(self, batch: dict[str, Any], *, teacher_forced: bool) -> tuple[PolicyOutput, LocalizationOutput]:
-        """Guess where goals are, and choose by that guess, or by where they are where the choice is told."""
-        # A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them.
+        """Estimate where goals are; choose by that, or by the true offset if teacher-forced."""
+        # A choice is learned beside the true offset: beside estimates that are still wrong it learns not to go by them.
         network = self.network
         with self.autocast():
             goal = network.encode_goal(batch["tokens"], batch["images"], batch["goal_by_image"])
@@ -352,7 +352,7 @@ def _select_patches(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Choose patches to learn from: their numbers, and the chances of their words."""
     flat = shown.ravel()
-    # An object of whose name no word is known tells nothing.
+    # An object of whose name no word is known teaches nothing.
     named = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
     keep = np.flatnonzero(named | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
     return keep, chances[np.where(flat[keep] == NOTHING, len(chances) - 1, flat[keep])]

@@ -1,4 +1,4 @@
-"""Where the body and its goal are: guessed at every step from pictures and words, joined over steps by own motion."""
+"""Where the body and its goal are: estimated at every step from pictures and words, fused by own motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch.nn import functional
 
 # Networks reckon places in units of this many metres.
 UNIT_M = 10.0
-# Places are told as chances of intervals of each axis, headings as those of sectors.
+# Places are distributions over intervals of each axis, headings as those of sectors.
 # Intervals reach beyond every scene.
 _CELL_M, _STOREY_M, _SECTOR_RAD = 4.0, 2.0, math.radians(15.0)
 _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
@@ -23,7 +23,7 @@ _NEIGHBOURS = 2
 # and left for x and for y, up for z), of the start's heading; beside them those of the scenes' logits.
 _SUMS = 3 + 3 + 5 + 2
 _LEAST = 1e-3
-# A place is never told better than so, in units: what nearby steps have in common cannot be averaged away.
+# Least variance of a place, in units: what nearby steps have in common cannot be averaged away.
 _FLOOR = 0.05
 
 
@@ -47,12 +47,12 @@ class LocalizationOutput(NamedTuple):
         return self._replace(offset=offset_m / UNIT_M)
 
 
-class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
-    """Guess where the goal is.
+class Localization(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
+    """Estimates where the goal is.
 
-    Own motion is used for one thing alone: to carry guesses of earlier steps over to the present one. Of the pictures
-    the goal's guess knows no more than which scene they show. So the goal's place cannot be read off the actions that
-    a reference takes towards it, nor off what is seen where they lead, which tell it in training and never in flight
+    Own motion has one use: to carry estimates of earlier steps over to the present one. Of the pictures the goal's
+    estimate gets no more than which scene they show. So the goal's place cannot be read off the actions that a
+    reference takes towards it, nor off what is seen on the way, which reveal it in training and never in flight
     (causal confusion in imitation learning: de Haan, Jayaraman and Levine 2019).
     """
 
@@ -72,7 +72,7 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         return _SUMS + self.scenes
 
     def locate(self, seen: Any) -> tuple[Any, Any, Any, Any]:
-        """Guess by pictures alone where bodies are: logits of places, headings, scenes, and how far to trust them."""
+        """Localize bodies by pictures alone: logits of places, headings, scenes, and how far to trust them."""
         place, heading, scene, trust = self.body(seen).float().split([_PLACES, _HEADINGS, self.scenes, 1], dim=-1)
         return place, heading, scene, functional.softplus(trust) + _LEAST
 

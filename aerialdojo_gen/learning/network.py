@@ -27,11 +27,11 @@ def as_patches(pictures: Any) -> Any:
     return cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0)
 
 
-class PatchClassifier(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class PatchClassifier(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
     """Chances that the words of objects' names name what a patch of a picture shows.
 
     Objects of a kind look alike in every scene: what is learned here holds in scenes that were never seen. It shares
-    nothing with the network that tells places apart, which learns scenes by heart.
+    nothing with the network that localizes, which learns scenes by heart.
     """
 
     def __init__(self, words: int, channels: tuple[int, int, int]) -> None:
@@ -64,7 +64,7 @@ class PatchClassifier(nn.Module):  # type: ignore[misc]  # torch is looked at by
         return self.words(flat).view(n, rows * columns, -1)
 
 
-# Wave lengths of the sines that tell places apart, metres; beside them the place itself.
+# Wave lengths of the sines that encode places, metres; beside them the place itself.
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
 _BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3
@@ -112,7 +112,7 @@ class PolicyOutput(NamedTuple):
         return chosen.masked_fill(near, STOP)
 
 
-class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class Network(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
     """Actions from pictures, goal and own motion.
 
     What it remembers is its map: where pictures of earlier steps put the body. A memory of its own, a GRU beside the
@@ -146,7 +146,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.phrase = nn.Conv1d(shape.word_features, shape.features, 3, padding=1)
         # Whether the goal is a picture stands beside what it shows.
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))
-        # Who sees nothing guesses by what is said alone.
+        # Without pictures the estimate is by words alone.
         pictured = max(shape.views, 1) * shape.features
         self.whereabouts = Localization(pictured, shape.features, shape.hidden, shape.scenes)
         self.choice = nn.Sequential(

@@ -110,7 +110,7 @@ class Policy(AgentBase):
         return {"sha256": self._sha256}
 
     def used_options(self) -> dict[str, Any]:
-        """Return the options for the log, and what the weights tell of their training."""
+        """Return the options for the log, and what the weights record of their training."""
         return {
             "weights": self._weights, "sha256": self._sha256, "any_release": self._any_release,
             "device": self._device, "trained_on": list(self._about.scenes), "init": self._about.init,
@@ -141,7 +141,7 @@ class Policy(AgentBase):
         self._search = None if target_words is None else Search(target_words, self.sensors)
 
     def act(self, observation: Observation) -> int:
-        """Look, remember, choose."""
+        """Observe, update the memory, choose."""
         torch, device, sensors = self._torch, self._device, self.sensors
         if self._previous != N_ACTIONS:
             self._reckoning.add(self._previous, bool(observation.refused))

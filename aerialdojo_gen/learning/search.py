@@ -28,9 +28,9 @@ _THING_M, _FARTHEST_M = 2.5, 14.0
 _BEFORE_M = 1.5
 # A sighting's weight falls with its distance, to a quarter at this one, metres.
 _CLEAR_M = 8.0
-# Weight and score of what is thought of a thing before it is seen: one look alone is believed less than several.
+# Weight and score of what is thought of a thing before it is seen: one sighting alone is believed less than several.
 _PRIOR, _PRIOR_SCORE = 0.3, -4.0
-# What was seen from so near need not be looked at again, metres.
+# Inspected once seen from so near, metres.
 _LOOKED_AT_M = 4.5
 # Patches that are surely no object.
 _NOTHING = math.log(0.5)

@@ -1,4 +1,4 @@
-"""What a shard's footer says of it, as JSON with a checksum of its own: a damaged one is told from a true one.
+"""What a shard's footer says of it, as JSON with a checksum of its own: damage is detected.
 
 Parquet's page checksums cover the rows and not the footer, so that what stands there must vouch for itself.
 """

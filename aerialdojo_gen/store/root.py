@@ -57,7 +57,7 @@ class DataRoot(ABC):
 
     @abstractmethod
     def version(self, relative: str) -> str:
-        """Return what tells a file from any other of its name; FileNotFoundError where there is none.
+        """Return what distinguishes a file from any other of its name; FileNotFoundError where there is none.
 
         It says nothing by itself, and nothing on another root.
         """

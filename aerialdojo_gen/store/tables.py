@@ -1,4 +1,4 @@
-"""Tables in memory: made of rows, held to their schema, told apart by a digest of their content."""
+"""Tables in memory: made of rows, checked by their schema, identified by a digest of their content."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def column_digests(table: pa.Table) -> dict[str, str]:
         digest = hashlib.sha256(str(table.num_rows).encode())
         for piece in _pieces(table, name):
             digest.update(piece)
-        # Half of it tells damage as well, and a footer has one for each column, twice.
+        # Half of it detects damage as well, and a footer has one for each column, twice.
         digests[name] = digest.hexdigest()[:32]
     return digests
 

@@ -1,4 +1,4 @@
-"""Choose what a text says: few claims that tell an object from its distractors, and now and then one more."""
+"""Choose what a text says: few claims that distinguish an object from its distractors, and now and then one more."""
 
 from __future__ import annotations
 

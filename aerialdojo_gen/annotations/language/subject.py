@@ -22,7 +22,7 @@ _ORDER = ("size", "state", "pattern", "shape", "colour", "material")
 
 @dataclass(frozen=True)
 class Wording:
-    """A claim about an object's looks, and the ways to say it."""
+    """A claim about an object's appearance, and the ways to say it."""
 
     index: int  # Of the claim
     key: str  # The attribute's, or "part"
@@ -33,7 +33,7 @@ class Wording:
 
 
 def wordings_of(claims: Sequence[Claim], appearances: Mapping[str, Appearance], category: str) -> list[Wording]:
-    """Word the claims of the looks of a thing of a category."""
+    """Word the claims about the appearance of an instance of a category."""
     found = []
     for index, claim in enumerate(claims):
         if claim.kind == "part":

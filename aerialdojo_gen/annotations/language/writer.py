@@ -48,7 +48,7 @@ class Writer:
         self._openings: set[str] = set()
 
     def texts(self, i: int, claims: Sequence[Claim], shown: Collection[str] | None, n: int) -> list[Text]:
-        """Write up to `n` texts of instance `i`, none twice; fewer if its claims do not tell it from others.
+        """Write up to `n` texts of instance `i`, none twice; fewer if its claims do not distinguish it.
 
         `shown` are the parts that its pictures show, None if that is unknown.
         """

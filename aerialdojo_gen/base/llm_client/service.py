@@ -1,4 +1,4 @@
-"""Talk to a service over HTTP within bounds of size, time and retries; tell its failures apart, and never its key."""
+"""Talk to a service over HTTP within bounds of size, time and retries; classify failures, never write its key."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ class LanguageModelAgent(AgentBase):
 
     @property
     def priced(self) -> bool:
-        """Whether the cost of an episode will be known, if the service tells tokens."""
+        """Whether the cost of an episode will be known, if the service reports tokens."""
         return self.options.priced
 
     def _readable(self, reply: Reply) -> bool:

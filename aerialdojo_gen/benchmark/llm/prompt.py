@@ -1,4 +1,4 @@
-"""What a language model is told: the role, the body, the actions, the rules, and a report before every action.
+"""The prompts of a language model: the role, the body, the actions, the rules, and a report before every action.
 
 After the paper's Appendix A: front-facing RGB-D with its encoding, the action list with magnitudes, embodiment,
 termination, remaining budget, and one action as JSON.
@@ -19,7 +19,7 @@ _VIEW_DIRECTIONS = {"front": "ahead", "left": "to the left", "right": "to the ri
 
 @dataclass(frozen=True)
 class Turn:
-    """An earlier step, as it is told again."""
+    """An earlier step, as it is repeated in a prompt."""
 
     step: int  # Its number, from 0
     action: str | None  # Name of the action; None where the answer could not be read

@@ -147,7 +147,7 @@ def has_difficulty(tasks: pd.DataFrame) -> bool:
 
 
 def difficulty_tables(tasks: pd.DataFrame) -> list[Comparison]:
-    """Make all tables of difficulty and of splits; none of a release that does not tell them."""
+    """Make all tables of difficulty and of splits; none of a release that does not have them."""
     if not has_difficulty(tasks):
         return []
     splits = [novelty_table, held_out_table] if (tasks["target_split"] != "").any() else []

@@ -80,7 +80,7 @@ def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
 def whole_counts(
     release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline, every_scene: bool
 ) -> list[Outcome]:
-    """Check what only all scenes together can tell."""
+    """Check what needs all scenes together."""
     outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
         partial = "" if every_scene else "only some scenes were selected"

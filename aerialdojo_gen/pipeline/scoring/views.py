@@ -1,4 +1,4 @@
-"""Take the pictures that scorers look at."""
+"""Render the pictures that scorers judge."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LARGE = 0.005
 # What is nearer than the object's nearest part stands before it; a surface this level is a floor, seen from above.
 _NEARER, _FLOOR = 0.95, 0.8
 _IN_FRONT_M = 0.05
-# Of the pixels, one in so many rows and columns is asked first.
+# Of the pixels, one in so many rows and columns is tested first.
 _EVERY = 4
 
 
@@ -180,7 +180,7 @@ def part_shares(
     coarse = np.zeros_like(visible)
     if math.isfinite(enough):
         coarse[::_EVERY, ::_EVERY] = True
-    # A few pixels tell that a large part is shown; the others are asked for the rest alone.
+    # A few pixels prove that a large part is shown; the others are tested for the rest alone.
     for some in (coarse, ~coarse):
         left = [k for k in range(len(parts)) if counts[k] < enough * visible.size]
         pixels = np.flatnonzero(np.any([around[k] for k in left], axis=0) & some) if left else np.zeros(0, np.int64)

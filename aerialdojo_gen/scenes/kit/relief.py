@@ -46,7 +46,7 @@ def strew_things(
 def leaning_poles(site: Site, poles: list[tuple[Number, Number, Number, Number]], height_m: Number = 8.0) -> None:
     """Put up a line of poles that lean by degrees towards a direction (x, y, lean, yaw), with slack wires between.
 
-    They are structure: poles that stand askew are told apart by nobody.
+    They are structure: nobody can distinguish poles that stand askew.
     """
     wood: Parts = []
     heads: list[tuple[np.ndarray, np.ndarray]] = []

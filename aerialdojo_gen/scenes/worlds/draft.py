@@ -131,7 +131,7 @@ class Draft:
         return head
 
     def _sun(self, latitude_deg: tuple[float, float], weather: str) -> Entry:
-        """Draw when and where it is; both hemispheres and all hours, so that light tells no compass direction."""
+        """Draw when and where it is; both hemispheres and all hours, so that light reveals no compass direction."""
         rng = self.rng("light")
         low, high = (0.06, 0.14) if weather == "dusk" else (0.3, 0.92)  # Sine of the sun's elevation
         light: Entry = {}

@@ -31,7 +31,7 @@ from aerialdojo_gen.store.tables import from_rows
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
-# So many times what is pictured is looked at by ray casts from where its reference picture would be taken.
+# So many times what is pictured is ray cast from where its reference picture would be taken.
 _RAY_CAST_FACTOR = 4
 # More parts than that get no candidates of their own.
 _MAX_PARTS = 4

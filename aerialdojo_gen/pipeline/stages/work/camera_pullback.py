@@ -23,7 +23,7 @@ _CAMERA_M, _KEPT_M = 0.15, 0.3
 _HIDDEN = 2.0
 _TRIED = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 _MIN_STEP_M = 0.25
-# Of the picture, what a telling part keeps if it had it: 12 x 12 pixels of 320 x 320; and what it needs to be told.
+# Share of the picture that an identifying part keeps if it had it, 12 x 12 pixels of 320 x 320, and the least of it.
 _PART_SHARE, _MIN_PART_SHARE = 0.0014, 0.0007
 
 
@@ -89,7 +89,7 @@ def steps_back_m(
     some, distance_m, places, yaws, back = some[far], distance_m[far], places[far], yaws[far], back[far]
     best, chosen = np.full(len(some), -np.inf), np.zeros(len(some))
     # From the farthest on, so that of equals the farthest is taken, which leaves room around it; the anchor's own
-    # place is asked last, and taken only where it is the better one.
+    # place is tried last, and taken only where it is the better one.
     for share in (*_TRIED, 0.0):
         tried = np.floor(100.0 * share * distance_m) / 100.0
         # What sees all of the points cannot be bettered, and casts no more rays.

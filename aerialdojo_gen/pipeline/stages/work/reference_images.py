@@ -29,7 +29,7 @@ _POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
 LEAST_SHARE = 0.0005
 # A rasteriser's edges are within a pixel of those that rays see; what it leaves out altogether is larger than that.
 _NEAR_PX, _EVERY_PX = 2, 4
-# Of the pixels, one in so many rows and columns is asked which part it shows.
+# Of the pixels, one in so many rows and columns is tested for the part that it shows.
 _SOME_PX = 3
 
 
@@ -37,7 +37,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
     """Take the front view from every object's selected anchor, or from further back along its viewing axis.
 
     How far back an object fits the picture is the anchor's to say (`step_back_m` of the table ``anchors``); the
-    configuration says how far back it may be taken. A part that tells what the object is counts as shown where it has
+    configuration says how far back it may be taken. An identifying part counts as shown where it has
     `LEAST_SHARE` of the picture's pixels.
     """
     objects = job.read("objects").to_pylist()
