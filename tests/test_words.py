@@ -26,7 +26,13 @@ BANNED = (
     "Waiting", "Wanted", "adopt", "as_given", "calling", "clarity", "digest_ahead", "footers_known", "fronting",
     "furnish", "keep_infos", "leads_out", "luck", "mends", "near_enough", "read_ahead", "redrawn", "seen_share",
     "set_out", "shut_in", "squeeze", "step_back", "too_deep", "trouble", "unready", "wade", "wild", "_told",
-    "after_all", "astray", "desk",
+    "after_all", "astray", "desk", "ASKED_JPEG", "FoundTask", "Guesses", "LocationWords", "MIN_TRUE_LOOKS",
+    "MOST_GUESSES", "RelationWords", "SECONDS_A_GUESS", "TELLS_WEIGHT", "Tally", "_understood", "catalogue_looks",
+    "check_tell", "conduct_cells", "files_there", "foresee", "keep_fields", "keep_scene", "keep_traceback",
+    "map_things", "missing_tells", "names_again", "parse_looks", "parts_there", "put_back", "relation_words",
+    "relief_things", "rivals", "rung", "scenes_there", "seen_table", "settled_z", "tallies", "tally", "tally_of",
+    "telling_m", "tells_difficulty", "tells_of", "things_on", "told_by_image", "true_looks", "understand",
+    "valid_looks", "want_meshes", "worth_joining", "worth_tables",
 )  # fmt: skip
 
 

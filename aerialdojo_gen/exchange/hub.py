@@ -173,32 +173,28 @@ def pull_release(
     with hub.explain_errors("read"):
         info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
     commit = str(info.sha)
-    requested = {
+    chosen = {
         s.rfilename: s for s in info.siblings if _is_ours(s.rfilename) and (meshes or not _is_mesh(s.rfilename))
     }
     left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
-    scenes = {scene for name in requested if (scene := scene_of(name)) and not _is_mesh(name)}
+    scenes = {scene for name in chosen if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     if not replace:
-        _refuse_overwrite(
-            root, {name: sibling for name, sibling in requested.items() if _is_outside_release(name)}, repo
-        )
+        _check_replaced(root, {name: sibling for name, sibling in chosen.items() if _is_companion(name)}, repo)
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
-    places = {_place(partial, name) for name in requested}
+    places = {_place(partial, name) for name in chosen}
     # What a call for another revision has left is no part of this one.
     for path in partial.rglob("part-*.parquet"):
         if path not in places:
             path.unlink()
-    _fetch(hub, commit, list(requested.values()), partial, reporter)
-    size = sum(_place(partial, name).stat().st_size for name in requested)
-    _check(open_root(partial), {name for name in requested if _is_mesh(name)})
-    _move_into_place(root, partial, sorted(requested))
-    return Moved(
-        str(root.path / FOLDER), commit, len(scenes), len(requested), size, sum(map(_is_mesh, requested)), left
-    )
+    _fetch(hub, commit, list(chosen.values()), partial, reporter)
+    size = sum(_place(partial, name).stat().st_size for name in chosen)
+    _check(open_root(partial), {name for name in chosen if _is_mesh(name)})
+    _move_into_place(root, partial, sorted(chosen))
+    return Moved(str(root.path / FOLDER), commit, len(scenes), len(chosen), size, sum(map(_is_mesh, chosen)), left)
 
 
 def scene_of(name: str) -> str:
@@ -227,7 +223,7 @@ def _is_policy(name: str) -> bool:
     return is_plain(training) and name == _policy_file(training)
 
 
-def _is_outside_release(name: str) -> bool:
+def _is_companion(name: str) -> bool:
     """Whether a file lies beside the release in a data directory, and not in it."""
     return _is_mesh(name) or _is_policy(name)
 
@@ -248,10 +244,10 @@ def _weights(root: LocalRoot, name: str) -> Path:
     return path
 
 
-def _refuse_overwrite(root: LocalRoot, requested: Mapping[str, Any], repo: str) -> None:
+def _check_replaced(root: LocalRoot, chosen: Mapping[str, Any], repo: str) -> None:
     """Refuse to take the place of other meshes or weights: without a release they may be all that somebody has."""
-    others = [name for name in sorted(requested) if (root.path / name).is_file()]
-    others = [name for name in others if not _matches_server(root.path / name, requested[name])]
+    others = [name for name in sorted(chosen) if (root.path / name).is_file()]
+    others = [name for name in others if not _matches_server(root.path / name, chosen[name])]
     if others:
         more = f" and {len(others) - 1} more" if others[1:] else ""
         raise UsageError(
@@ -302,7 +298,7 @@ def _matches_server(path: Path, sibling: Any) -> bool:
 
 def _place(folder: Path, name: str) -> Path:
     """Return where a file of a data set lies in a data directory: meshes and weights beside the release."""
-    return folder / name if _is_outside_release(name) else folder / FOLDER / name
+    return folder / name if _is_companion(name) else folder / FOLDER / name
 
 
 def _check(root: DataRoot, meshes: Collection[str]) -> None:
@@ -318,12 +314,12 @@ def _check(root: DataRoot, meshes: Collection[str]) -> None:
 
 def _move_into_place(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
     """Give the fetched files their places: the release in one step, what lies beside it before."""
-    for name in filter(_is_outside_release, names):
+    for name in filter(_is_companion, names):
         with root.commit(name) as temporary:
             _place(partial, name).replace(temporary)
     with root.lock(), atomic_folder(root.path / FOLDER) as folder:
         for name in names:
-            if not _is_outside_release(name):
+            if not _is_companion(name):
                 make_folder((folder / name).parent)
                 _place(partial, name).replace(folder / name)
     shutil.rmtree(partial, ignore_errors=True)

@@ -255,7 +255,7 @@ class Learner:
 
     def _forward(self, batch: dict[str, Any], *, teacher_forced: bool) -> tuple[PolicyOutput, LocalizationOutput]:
         """Estimate where goals are; choose by that, or by the true offset if teacher-forced."""
-        # A choice is learned beside the true offset: beside estimates that are still wrong it learns not to go by them.
+        # A choice is learned beside the true offset: beside wrong estimates it learns not to go by them.
         network = self.network
         with self.autocast():
             goal = network.encode_goal(batch["tokens"], batch["images"], batch["goal_by_image"])

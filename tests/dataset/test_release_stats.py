@@ -105,7 +105,7 @@ def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
 
 
 def test_shares_and_lengths_are_those_of_the_appendix(papers):
-    shares = {row.name: (row.ours[0], row.paper_figures[0]) for row in tables(papers)[4].rows}
+    shares = {row.name: (row.ours[0], row.theirs[0]) for row in tables(papers)[4].rows}
     assert len(shares) == 12
     # The paper prints two digits; a release of its counts has its shares to half of the last one.
     for name, (ours, paper) in shares.items():
@@ -123,7 +123,7 @@ def test_types_and_anchors_are_those_of_table_2(papers):
     urban = dict(zip(columns, table.rows[0].ours, strict=True))
     assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
     some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
-    assert (some.rows[0].paper_figures[0], some.rows[1].paper_figures[0]) == (None, 6)
+    assert (some.rows[0].theirs[0], some.rows[1].theirs[0]) == (None, 6)
 
 
 def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
@@ -178,7 +178,7 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
 
 
 def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
-    for table in (*tables([replace(m, paper_figures=None) for m in papers]),):
+    for table in (*tables([replace(m, theirs=None) for m in papers]),):
         assert table.compared == 0
         assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
 

@@ -37,7 +37,7 @@ class Row:
 
     name: str
     ours: tuple[Figure, ...]
-    paper_figures: tuple[Figure, ...]
+    theirs: tuple[Figure, ...]
 
 
 @dataclass(frozen=True)
@@ -61,19 +61,19 @@ class Comparison:
         return sum(
             column.exact and theirs is not None
             for row in self.rows
-            for column, theirs in zip(self.columns, row.paper_figures, strict=True)
+            for column, theirs in zip(self.columns, row.theirs, strict=True)
         )
 
     def _differing(self, row: Row) -> list[int]:
         return [
             k
-            for k, (column, ours, theirs) in enumerate(zip(self.columns, row.ours, row.paper_figures, strict=True))
+            for k, (column, ours, theirs) in enumerate(zip(self.columns, row.ours, row.theirs, strict=True))
             if column.exact and theirs is not None and ours != theirs
         ]
 
     def _has_own_column(self, k: int) -> bool:
         """Whether the paper's figures of a column have a column of their own."""
-        return not self.columns[k].exact and any(row.paper_figures[k] is not None for row in self.rows)
+        return not self.columns[k].exact and any(row.theirs[k] is not None for row in self.rows)
 
     def _heads(self) -> list[str]:
         heads = [self.key]
@@ -83,7 +83,7 @@ class Comparison:
 
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
         differing, cells = self._differing(row), [row.name]
-        for k, (ours, theirs) in enumerate(zip(row.ours, row.paper_figures, strict=True)):
+        for k, (ours, theirs) in enumerate(zip(row.ours, row.theirs, strict=True)):
             show = self.columns[k].show
             if self._has_own_column(k):
                 cells += [show(ours), show(theirs)]
@@ -98,7 +98,7 @@ class Comparison:
             rows.append(self._cells(row))
             if differing := self._differing(row):
                 below = ["  in the paper"]
-                for k, theirs in enumerate(row.paper_figures):
+                for k, theirs in enumerate(row.theirs):
                     below += (
                         ["", ""]
                         if self._has_own_column(k)
@@ -129,11 +129,7 @@ class Comparison:
         names = [column.name for column in self.columns]
         rows = [
             {"name": row.name, "ours": dict(zip(names, row.ours, strict=True)), "paper": None}
-            | (
-                {}
-                if set(row.paper_figures) == {None}
-                else {"paper": dict(zip(names, row.paper_figures, strict=True))}
-            )
+            | ({} if set(row.theirs) == {None} else {"paper": dict(zip(names, row.theirs, strict=True))})
             for row in self.rows
         ]
         units = {column.name: column.unit for column in self.columns}
@@ -144,7 +140,7 @@ class Comparison:
         return [
             [self.title, row.name, column.name, column.unit, *("" if f is None else repr(f) for f in (ours, theirs))]
             for row in self.rows
-            for column, ours, theirs in zip(self.columns, row.ours, row.paper_figures, strict=True)
+            for column, ours, theirs in zip(self.columns, row.ours, row.theirs, strict=True)
         ]
 
 

@@ -113,14 +113,14 @@ def family_table(made: Sequence[Made]) -> Comparison:
     ]
     rows = []
     for name, group in [*(g for g in groups if g[1]), ("all", list(made))]:
-        ours, paper_figures = _figures(group), _paper_figures(group)
-        known = len(group) if paper_figures[0] is not None else None
+        ours, papers = _figures(group), _paper_figures(group)
+        known = len(group) if papers[0] is not None else None
         types, anchors = len({m.scene_type for m in group}), sum(m.anchors for m in group)
         # The paper counts these by family: of a part of a family's scenes it says nothing.
         named = [f for n, f in family_counts().items() if name in (n, "all")]
         whole = bool(named) and known == sum(int(f["scenes"]) for f in named)
         totals = [sum(int(f[column]) for f in named) if whole else None for column in ("types", "anchors")]
-        theirs = (totals[0], known, *paper_figures[:2], totals[1], *paper_figures[2:])
+        theirs = (totals[0], known, *papers[:2], totals[1], *papers[2:])
         rows.append(Row(name, (types, len(group), *ours[:2], anchors, *ours[2:]), theirs))
     columns = (Column("types"), Column("scenes"), *_COUNTS[:2], Column("anchors"), *_COUNTS[2:], _KM)
     title = "Families (the paper's Table 2)" if any(m.paper_scene for m in made) else "Families"
@@ -161,12 +161,8 @@ def mean_length_table(made: Sequence[Made]) -> Comparison:
         n = sum(m.instances for m in group) // 2
         if not n:
             continue
-        paper_figures, whole = _paper_figures(group), _whole(made)
-        theirs = (
-            1000.0 * paper_figures[6] / (paper_figures[5] / 2)
-            if whole and paper_figures[5] and paper_figures[6] is not None
-            else None
-        )
+        papers, whole = _paper_figures(group), _whole(made)
+        theirs = 1000.0 * papers[6] / (papers[5] / 2) if whole and papers[5] and papers[6] is not None else None
         rows.append(Row(name, (sum(m.path_m for m in group) / n,), (theirs,)))
     column = Column("m", "m", exact=False, digits=2)
     return Comparison("Mean length of the reference trajectories", "family", (column,), tuple(rows))
@@ -191,22 +187,20 @@ def split_table(made: Sequence[Made]) -> Comparison:
     for (partition, subset), cells in splits().items():
         group = [m for m in made if store.partition(m.scene).upper() == partition]
         ours = [2 * sum(m.of(s, subset) for m in group) for s in SETTINGS]
-        paper_figures = [2 * cells[s] for s in SETTINGS]
-        known = (*paper_figures, sum(paper_figures)) if whole else (None,) * 4
+        papers = [2 * cells[s] for s in SETTINGS]
+        known = (*papers, sum(papers)) if whole else (None,) * 4
         rows.append(Row(f"{partition} {subset}", (*ours, sum(ours)), known))
     ours_all = tuple(sum(column) for column in zip(*(row.ours for row in rows), strict=True))
     paper_all = (
-        tuple(sum(column) for column in zip(*(row.paper_figures for row in rows), strict=True))
-        if whole
-        else (None,) * 4
+        tuple(sum(column) for column in zip(*(row.theirs for row in rows), strict=True)) if whole else (None,) * 4
     )
     return Comparison("Splits", "split", _COUNTS[2:], (*rows, Row("all", ours_all, paper_all)))
 
 
 def total_table(made: Sequence[Made]) -> Comparison:
     """Table of the whole benchmark; the paper's figures are the sums of its Table 10."""
-    ours, paper_figures = _figures(made), _paper_figures(made)
-    known = paper_figures[0] is not None
+    ours, papers = _figures(made), _paper_figures(made)
+    known = papers[0] is not None
     rows = [
         Row(name, (n,), (n if known else None,))
         for name, n in (
@@ -215,16 +209,15 @@ def total_table(made: Sequence[Made]) -> Comparison:
             ("scenes", len(made)),
         )
     ]
-    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, paper_figures, strict=False)]
+    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, papers, strict=False)]
     rows.append(Row("object categories", (len(frozenset().union(*(m.categories for m in made))),), (None,)))
     names = ("instances, base", "instances, standard", "instances, long-horizon", "instances")
-    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], paper_figures[2:6], strict=True)]
-    tasks = [None if n is None else int(n) // 2 for n in (ours[5], paper_figures[5])]
+    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], papers[2:6], strict=True)]
+    tasks = [None if n is None else int(n) // 2 for n in (ours[5], papers[5])]
     rows.append(Row("navigation tasks", (tasks[0],), (tasks[1],)))
-    rows.append(Row("routes in all, km", (ours[6],), (paper_figures[6],)))
+    rows.append(Row("routes in all, km", (ours[6],), (papers[6],)))
     means = [
-        1000 * km / n if km is not None and n else None
-        for km, n in zip((ours[6], paper_figures[6]), tasks, strict=True)
+        1000 * km / n if km is not None and n else None for km, n in zip((ours[6], papers[6]), tasks, strict=True)
     ]
     rows.append(Row("mean route, m", (means[0],), (means[1],)))
     return Comparison("The benchmark as a whole", "", (Column("figure", exact=False),), tuple(rows))

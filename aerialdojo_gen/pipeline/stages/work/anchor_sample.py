@@ -78,12 +78,12 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
             bare += 1
             why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
-    tally = {reason: counts[reason] for reason in REASONS}
+    by_reason = {reason: counts[reason] for reason in REASONS}
     return Output(
         {"anchors": from_rows(ANCHORS, rows), "viewpoints": from_rows(VIEWPOINTS, viewpoints)},
-        rows_in=len(rows) + sum(tally.values()),
+        rows_in=len(rows) + sum(by_reason.values()),
         rows_out=len(rows),
-        counts=tally | {"no_anchor": bare},
+        counts=by_reason | {"no_anchor": bare},
     )
 
 

@@ -137,9 +137,9 @@ def _draw_categories(
         what: weight for what, weight in slots.of.items()
         if used[kind, what] < slots.most and (what not in slots.held_out or draft.world.held_out)
     }  # fmt: skip
-    dealt = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
-    used.update((kind, what) for what in dealt)
-    return dealt
+    drawn = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
+    used.update((kind, what) for what in drawn)
+    return drawn
 
 
 def _mirrored(draft: Draft, *points: Point) -> list[Point]:
