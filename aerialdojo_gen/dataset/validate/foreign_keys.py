@@ -244,7 +244,7 @@ def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     objects = data["objects"]
     paraphrases, firsts = objects.column("paraphrases").to_pylist(), objects.texts("description")
     # A release of an older version has one description an object.
-    texts = [
+    in_training = [
         {one["text"]: not one["held_out"] for one in texts or ()} or {first: True}
         for texts, first in zip(paraphrases, firsts, strict=True)
     ]
@@ -256,7 +256,7 @@ def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
         text = own[row] if own[row] is not None else said.get(name)
         if text is None or not fit[row]:
             continue
-        known = texts[target[row]]
+        known = in_training[target[row]]
         if text not in known and own[row] is not None:
             yield Finding(row, f"description = {text!r}", "one of the target's paraphrases")
         elif text in known and seen[row] is not None and seen[row] != known[text]:
