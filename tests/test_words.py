@@ -30,7 +30,7 @@ BANNED = (
     "MOST_GUESSES", "RelationWords", "SECONDS_A_GUESS", "TELLS_WEIGHT", "Tally", "_understood", "catalogue_looks",
     "check_tell", "conduct_cells", "files_there", "foresee", "keep_fields", "keep_scene", "keep_traceback",
     "map_things", "missing_tells", "names_again", "parse_looks", "parts_there", "put_back", "relation_words",
-    "relief_things", "rivals", "rung", "scenes_there", "seen_table", "settled_z", "tallies", "tally", "tally_of",
+    "relief_things", "rivals", "scenes_there", "seen_table", "settled_z", "tallies", "tally", "tally_of",
     "telling_m", "tells_difficulty", "tells_of", "things_on", "told_by_image", "true_looks", "understand",
     "valid_looks", "want_meshes", "worth_joining", "worth_tables",
 )  # fmt: skip
