@@ -30,7 +30,7 @@ _RATES = ("sr", "sr_view", "osr", "spl")
 _FURTHER = ("sr", "sr_view", "osr")
 _PAPER_TABLES = {"base": " (the form of the paper's Table 4)", "standard": " (the form of the paper's Table 5)"}
 # Reversals that a note lists.
-_MOST_REVERSALS = 6
+_MAX_REVERSALS = 6
 _MEANS = "Mean of the {0}families, each the mean of its scenes; ± is the standard deviation over scenes."
 
 
@@ -171,8 +171,8 @@ def _radius_notes(request: ReportRequest) -> list[str]:
                 if a < b - 1e-9 and a_far > b_far + 1e-9
             ]
             if turned:
-                more = f", and {len(turned) - _MOST_REVERSALS} more" if len(turned) > _MOST_REVERSALS else ""
-                said = f"{', '.join(turned[:_MOST_REVERSALS])}{more}."
+                more = f", and {len(turned) - _MAX_REVERSALS} more" if len(turned) > _MAX_REVERSALS else ""
+                said = f"{', '.join(turned[:_MAX_REVERSALS])}{more}."
                 notes.append(f"{section}, from {near:g} to {far:g} m: {said}")
     return notes
 

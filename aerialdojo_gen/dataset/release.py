@@ -24,7 +24,7 @@ from aerialdojo_gen.store.schemas import SUBSETS
 TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "viewpoints", "scenes")
 _SPLIT = ("tasks", "routes")
 # Each keeps its mesh once that is read, 10 to 100 MB.
-_MOST_SCENES = 4
+_MAX_SCENES = 4
 
 
 class Release:
@@ -49,7 +49,7 @@ class Release:
     def __init__(self, data: str | Path | DataRoot) -> None:
         self._data = open_root(data)
         self.scenes = scenes_in_release(self._data)
-        self._scene = lru_cache(maxsize=_MOST_SCENES)(lambda name: ReleasedScene(self._data, name))
+        self._scene = lru_cache(maxsize=_MAX_SCENES)(lambda name: ReleasedScene(self._data, name))
 
     def __repr__(self) -> str:
         return f"<release in {self._data}, {len(self.scenes)} scenes>"

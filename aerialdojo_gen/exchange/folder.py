@@ -111,7 +111,7 @@ class PartialExport:
         self.resumed = False
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
+    def locked(self) -> Iterator[None]:
         """Lock the folder against other writers."""
         make_folder(self.folder)
         with (self.folder / _LOCK).open("a") as lock:

@@ -86,7 +86,7 @@ def export_for_learning(
     root = open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     unfinished = PartialExport(out, _request(format_name, root, options, parts))
-    with unfinished.held():
+    with unfinished.locked():
         left = [part for part in parts if not unfinished.has(part.number)]
         if unfinished.resumed:
             progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError, first_line, no_package
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.learning.encoding import actions_fingerprint
@@ -87,4 +87,4 @@ def _safetensors() -> Any:
         importlib.import_module("safetensors.torch")
         return importlib.import_module("safetensors")
     except ImportError:
-        raise MissingPackage(lacks("a policy", "safetensors", "train")) from None
+        raise MissingPackage(no_package("a policy", "safetensors", "train")) from None

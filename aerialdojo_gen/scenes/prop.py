@@ -24,7 +24,7 @@ _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "
 _MIRRORS = ("x", "y", "xy")
 _MAX_PARTS = 1000
 _MAX_VALUE = 10_000.0
-_LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
+_MIN_SCALE, _MAX_SCALE = 0.1, 10.0
 
 
 @dataclass(frozen=True)
@@ -127,8 +127,8 @@ def parse_category(
         raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
     designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
     scale = body.get("scale", 1.0)
-    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _LEAST_SCALE <= scale <= _MOST_SCALE:
-        raise AssetError(f"{where}: scale must be a number from {_LEAST_SCALE:g} to {_MOST_SCALE:g}, got {scale!r}")
+    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _MIN_SCALE <= scale <= _MAX_SCALE:
+        raise AssetError(f"{where}: scale must be a number from {_MIN_SCALE:g} to {_MAX_SCALE:g}, got {scale!r}")
     known = [one.name for one in designs]
     for k, part in enumerate(parts):
         for one in designs_of(part):

@@ -248,10 +248,10 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), Export
 def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
     def parts(request):
         unfinished = PartialExport(tmp_path / "export", request)
-        with unfinished.held():
+        with unfinished.locked():
             before = sorted(path.name for path in (unfinished.folder / "parts").iterdir())
             unfinished.part(0).mkdir(exist_ok=True)
-            with pytest.raises(UsageError, match="another process is making this export"), unfinished.held():
+            with pytest.raises(UsageError, match="another process is making this export"), unfinished.locked():
                 pass
         return before
 

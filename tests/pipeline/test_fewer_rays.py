@@ -20,7 +20,7 @@ from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, 
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m, steps_back_m
-from aerialdojo_gen.pipeline.stages.work.reference_images import LEAST_SHARE, instance_map, instance_mask
+from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
 from aerialdojo_gen.rendering.backend import open_renderer
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
@@ -167,10 +167,10 @@ def test_shares_of_parts_are_those_of_all_pixels(found):
         face = caster.first_hit(pose[:3, 3], directions)[1] if visible.any() else np.zeros(0)
         whole = [float(np.isin(face, part).sum()) / visible.size for part in parts]
         assert part_shares(caster, thing, parts, camera, pose, visible) == whole
-        least = part_shares(caster, thing, parts, camera, pose, visible, LEAST_SHARE)
-        assert [share < LEAST_SHARE for share in least] == [share < LEAST_SHARE for share in whole]
-        assert all(a == b for a, b in zip(least, whole, strict=True) if b < LEAST_SHARE)
-        some.update("shown" if share >= LEAST_SHARE else "missing" for share in whole)
+        least = part_shares(caster, thing, parts, camera, pose, visible, MIN_SHARE)
+        assert [share < MIN_SHARE for share in least] == [share < MIN_SHARE for share in whole]
+        assert all(a == b for a, b in zip(least, whole, strict=True) if b < MIN_SHARE)
+        some.update("shown" if share >= MIN_SHARE else "missing" for share in whole)
     assert min(some["shown"], some["missing"]) > 3
 
 

@@ -15,7 +15,7 @@ from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.base.rng import pick
 from aerialdojo_gen.scenes.appearances import Appearance
 
-_MOST_PLACES = 3
+_MAX_PLACES = 3
 _SHORT_DETAIL = 10  # words of a detail that is said
 # How often an adjective of colour is said, and one of another kind.
 _COLOUR = {"terse": 0.75, "vague": 0.0, "normal": 0.85, "detailed": 1.0}
@@ -125,7 +125,7 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         plan.places.append(ranked[0])
     left = about.distractors(plan.indices)
     while left:
-        places = [k for k in ranked if len(plan.places) < _MOST_PLACES and not about.repeats(k, plan)]
+        places = [k for k in ranked if len(plan.places) < _MAX_PLACES and not about.repeats(k, plan)]
         rest = [k for k in (*places, *about.wordings) if k not in plan.indices]
         best = min(rest, key=lambda k: len(about.fitting(k, left)), default=None)
         if best is None or len(remaining := about.fitting(best, left)) == len(left):
@@ -133,7 +133,7 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         left = remaining
         _add(plan, about, best, rng)
     _drop_needless(plan, about)
-    if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MOST_PLACES:
+    if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MAX_PLACES:
         plan.places += [k for k in ranked if k not in plan.places and not about.repeats(k, plan)][:1]
     spare = [w for w in about.details if w.index not in plan.indices]
     if rng.random() < _MORE_DETAILS[level] and spare and not plan.details:

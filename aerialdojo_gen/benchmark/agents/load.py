@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import (
     MissingPackage,
     UsageError,
     first_line,
-    lacks,
+    no_package,
 )
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import loads_json
@@ -61,7 +61,7 @@ def agent_class(name: str) -> Callable[..., Any]:
         module = importlib.import_module(module_name)
     except ImportError as error:
         if name in _EXTRAS:
-            raise MissingPackage(lacks(f"agent {name!r}", error.name, _EXTRAS[name])) from None
+            raise MissingPackage(no_package(f"agent {name!r}", error.name, _EXTRAS[name])) from None
         raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
     except AerialDojoError:
         raise

@@ -48,7 +48,7 @@ def _remedy(error: UsageError, model: str, key_variable: str) -> str:
 # An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
 _KEPT_CHARACTERS = 4_000
 # More tokens than any request has: what a service counts beyond this it has not counted.
-_MOST_TOKENS = 1 << 40
+_MAX_TOKENS = 1 << 40
 # What a service answers that does not know structured outputs, or tool calls.
 _UNSUPPORTED = ("bad request", "not found", "malformed answer", "server error")
 # What may be over a moment later, and how long the check before a run waits for that, seconds.
@@ -78,7 +78,7 @@ class Reply:
 
 def token_count(value: Any) -> int | None:
     """Return a service's count of tokens; None where it is no count."""
-    return value if isinstance(value, int) and 0 <= value < _MOST_TOKENS and not isinstance(value, bool) else None
+    return value if isinstance(value, int) and 0 <= value < _MAX_TOKENS and not isinstance(value, bool) else None
 
 
 class LanguageModelAgent(AgentBase):

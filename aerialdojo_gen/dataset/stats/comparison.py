@@ -71,21 +71,21 @@ class Comparison:
             if column.exact and theirs is not None and ours != theirs
         ]
 
-    def _has_own_column(self, k: int) -> bool:
+    def _split(self, k: int) -> bool:
         """Whether the paper's figures of a column have a column of their own."""
         return not self.columns[k].exact and any(row.theirs[k] is not None for row in self.rows)
 
     def _heads(self) -> list[str]:
         heads = [self.key]
         for k, column in enumerate(self.columns):
-            heads += [column.name, _PAPERS] if self._has_own_column(k) else [column.name]
+            heads += [column.name, _PAPERS] if self._split(k) else [column.name]
         return heads
 
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
         differing, cells = self._differing(row), [row.name]
         for k, (ours, theirs) in enumerate(zip(row.ours, row.theirs, strict=True)):
             show = self.columns[k].show
-            if self._has_own_column(k):
+            if self._split(k):
                 cells += [show(ours), show(theirs)]
             else:
                 cells.append(show(ours) + (f" (paper: {show(theirs)})" if bracket and k in differing else ""))
@@ -99,11 +99,7 @@ class Comparison:
             if differing := self._differing(row):
                 below = ["  in the paper"]
                 for k, theirs in enumerate(row.theirs):
-                    below += (
-                        ["", ""]
-                        if self._has_own_column(k)
-                        else [self.columns[k].show(theirs) if k in differing else ""]
-                    )
+                    below += ["", ""] if self._split(k) else [self.columns[k].show(theirs) if k in differing else ""]
                 rows.append(below)
         stub, *heads = self._heads()
         columns = [text_table.Column(head, joined=head == _PAPERS) for head in heads]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.foreign_keys import sound
+from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
@@ -163,7 +163,7 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     objects = data["objects"]
     item = objects.find("object_id", rows.column("object_id"))
     annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
-    fit = np.flatnonzero(sound(data, "objects", item) & ~annotated)
+    fit = np.flatnonzero(comparable(data, "objects", item) & ~annotated)
     centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
     off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))

@@ -157,14 +157,14 @@ def list_lengths(routes: Rows) -> NDArray[np.int64]:
 def paths_of(routes: Rows) -> Paths:
     """Lay out the poses of a scene's routes."""
     lengths = list_lengths(routes)
-    sound = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
-    table = routes.table.filter(pa.array(sound)) if not sound.all() else routes.table
+    comparable = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
+    table = routes.table.filter(pa.array(comparable)) if not comparable.all() else routes.table
     flat = {}
     for name in LISTS:
         values = pc.list_flatten(table.column(name))
         flat[name] = values.to_numpy(zero_copy_only=False) if len(values) else np.empty(0)
-    rows = np.flatnonzero(sound).astype(np.int64)
-    first = np.concatenate([[0], np.cumsum(lengths[sound, 0])]).astype(np.int64)
+    rows = np.flatnonzero(comparable).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(lengths[comparable, 0])]).astype(np.int64)
     xyz = np.column_stack([flat[name] for name in LISTS[:3]]).astype(np.float64)
     action = np.nan_to_num(flat["action"], nan=-1).astype(np.int64)
     return Paths(rows, first, xyz, flat["yaw_rad"].astype(np.float64), action)

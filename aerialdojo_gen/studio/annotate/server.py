@@ -44,7 +44,7 @@ from aerialdojo_gen.studio.web.serving import (
 COOKIE = "aerialdojo-annotate"
 # Wrong tokens per address: this many at once, then one per interval.
 MAX_FAILED_LOGINS, SECONDS_PER_FAILED_LOGIN = 10, 6.0
-_MOST_ADDRESSES = 4096
+_MAX_ADDRESSES = 4096
 
 
 class TokenGate:
@@ -104,7 +104,7 @@ class TokenGate:
         failed = self._failed_logins.pop(address, None) or _FailedLogins()
         failed.add(given, time.monotonic())
         self._failed_logins[address] = failed
-        while len(self._failed_logins) > _MOST_ADDRESSES:
+        while len(self._failed_logins) > _MAX_ADDRESSES:
             self._failed_logins.popitem(last=False)
 
 
@@ -135,7 +135,7 @@ async def _respond(send: Send, status: int, text: str, headers: Sequence[tuple[b
 
 
 STATIC = Path(__file__).resolve().parent / "static"
-MOST_BYTES = 8 << 20
+MAX_BYTES = 8 << 20
 
 _Metres = Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-1e5, le=1e5)]
 _Triple = tuple[_Metres, _Metres, _Metres]
@@ -226,7 +226,7 @@ def serve_session(
 
 def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
     """Make the tool's web application."""
-    app = local_app(str(STATIC / "index.html"), f"annotate {session.scene.name}", MOST_BYTES, any_host=any_host)
+    app = local_app(str(STATIC / "index.html"), f"annotate {session.scene.name}", MAX_BYTES, any_host=any_host)
 
     @app.exception_handler(ConflictError)
     def conflict(request: Request, error: Exception) -> JSONResponse:

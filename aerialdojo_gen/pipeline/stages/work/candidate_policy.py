@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Least margin of kept routes: `filter` rejects a few more by rules that only it can check.
-_LEAST_SPARE = 0.02
+_MIN_SPARE = 0.02
 # Tolerance of the summed length, relative to the paper's.
 _ON_PATH = 2e-3
 # Width of the logistic error of predicted detours (283,000 routes of 42 scenes): of routes with a predicted detour of
@@ -211,7 +211,7 @@ class PaperQuota:
         """Whether the paper's counts and total length can be selected from these."""
         setting = np.asarray(kept.settings)
         for name, n in self._paper_scene.tasks.items():
-            if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_LEAST_SPARE * n)):
+            if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_MIN_SPARE * n)):
                 return False
         # A few tasks cannot match the total length exactly: allow half a route.
         half_a_route = self._paper_scene.path_m / (2 * max(sum(self._paper_scene.tasks.values()), 1))
