@@ -178,7 +178,7 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
 
 
 def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
-    for table in (*tables([replace(m, theirs=None) for m in papers]),):
+    for table in (*tables([replace(m, paper_scene=None) for m in papers]),):
         assert table.compared == 0
         assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
 
