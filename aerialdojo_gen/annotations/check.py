@@ -131,7 +131,7 @@ class _Checker:
             yield self._fault((*path, "anchor", "position_m"), "outside the scene's bounds")
 
     def _texts(self) -> Iterator[Fault]:
-        """Check directions, texts and what tells objects apart; only if all landmarks are valid."""
+        """Check directions, texts and that objects can be distinguished; only if all landmarks are valid."""
         source, scene, geometry = self._source, self._scene, self._geometry
         landmarks = sorted(source.landmarks.values(), key=lambda entry: entry.id)
         nodes = [landmark.node for landmark in landmarks]

@@ -125,7 +125,7 @@ class SceneClaims:
         return [j for j in self._groups[self.scene.instances[i].category, self.bearings[i]] if j != i]
 
     def distractors(self, i: int, claims: Sequence[Claim]) -> list[int]:
-        """Instances that claims of `i` fit as well: nothing but other claims tells them from it."""
+        """Instances that claims of `i` fit as well: only other claims distinguish them from it."""
         return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
 
     def of(self, i: int) -> tuple[Claim, ...]:
@@ -137,7 +137,7 @@ class SceneClaims:
     def _find(self, i: int) -> list[Claim]:
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
-        found += [Claim("part", say) for say in self.vocabulary.looks(instance)]
+        found += [Claim("part", say) for say in self.vocabulary.unrepeated_phrases(instance)]
         found += self._place(i)
         found += self._relations(i)
         bearing = self.bearings[i]
@@ -300,9 +300,9 @@ class SceneClaims:
     def _part_holds(self, claim: Claim, j: int, slack: float) -> bool:
         instance = self.scene.instances[j]
         if slack <= 1.0:
-            return claim.key in self.vocabulary.true_looks(instance)
-        looks = (look for look in self.vocabulary.catalogue_looks(instance) if look.phrase == claim.key)
-        return any(self.vocabulary.is_valid(look, instance) for look in looks)
+            return claim.key in self.vocabulary.true_phrases(instance)
+        appearances = (one for one in self.vocabulary.appearances_of(instance) if one.phrase == claim.key)
+        return any(self.vocabulary.is_valid(one, instance) for one in appearances)
 
     def _place_holds(self, claim: Claim, j: int, slack: float) -> bool:
         place = claim.key.lower()

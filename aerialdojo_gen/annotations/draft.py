@@ -1,6 +1,6 @@
 """Draft annotation files for a person to review.
 
-Objects are chosen category by category in turn, as far as their claims tell them from their distractors; the stage
+Objects are chosen category by category in turn, as far as claims exclude their distractors; the stage
 `describe` writes their texts. Every draft passes the checks of `annotate-import`.
 """
 

@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.relations import SceneGeometry
-from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
@@ -74,10 +74,10 @@ class Surface:
             self._last = instance, under, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
         return self._last[1:]
 
-    def shows(self, look: Look, instance: Instance) -> bool:
+    def shows(self, appearance: Appearance, instance: Instance) -> bool:
         """Whether at least half of each part that a phrase mentions, and of each counted copy, is visible."""
-        pieces = [faces for name in look.count for faces in instance.copies_of(name)]
-        pieces += [faces for name in look.parts if len(faces := instance.faces_of(name))]
+        pieces = [faces for name in appearance.count for faces in instance.copies_of(name)]
+        pieces += [faces for name in appearance.parts if len(faces := instance.faces_of(name))]
         return all(self.hidden(instance, faces) <= _MAX_HIDDEN for faces in pieces)
 
 

@@ -143,12 +143,12 @@ class Matcher:
     def read(self, text: str, i: int) -> Matched:
         """Match a name or a description of an instance."""
         reading = _Reading(self, i)
-        text, looks = self._looks(text, i)
+        text, appearances = self._replace_phrases(text, i)
         tokens, at = _tokens(text), 0
         while at < len(tokens):
             length, kind, meaning = self._match(tokens, at)
             if tokens[at].startswith(_MARK):
-                reading.look(*looks[int(tokens[at].removeprefix(_MARK))])
+                reading.add_phrase(*appearances[int(tokens[at].removeprefix(_MARK))])
             if kind == "thing" and self._match(tokens, at + length)[1] == "thing":
                 kind = "part of a name"  # a spruce log pile is no spruce
             reading.take(tokens[at : at + length], kind, meaning)
@@ -156,12 +156,12 @@ class Matcher:
         reading.end_clause()
         return reading.matched
 
-    def _looks(self, text: str, i: int) -> tuple[str, list[tuple[str, str]]]:
+    def _replace_phrases(self, text: str, i: int) -> tuple[str, list[tuple[str, str]]]:
         """Replace the catalogue's phrases about the instance's category by marks; phrases and words by mark."""
         imported, vocabulary = self._claims.scene.imported, self._claims.vocabulary
         marked: list[tuple[str, str]] = []
-        for look in () if imported else vocabulary.catalogue_looks(self._instances[i]):
-            for wording in look.wordings:
+        for appearance in () if imported else vocabulary.appearances_of(self._instances[i]):
+            for wording in appearance.wordings:
                 if not _written(wording) <= _written(text):
                     continue
                 pattern = r"[\W_]+".join(map(re.escape, re.findall(r"[^\W_]+", wording.lower())))
@@ -169,7 +169,7 @@ class Matcher:
                 left = re.sub(
                     rf"(?<!without )(?<!no )(?<![^\W_]){pattern}(?![^\W_])", mark, text, flags=re.IGNORECASE
                 )
-                marked += [(look.phrase, wording)] if left != text else []
+                marked += [(appearance.phrase, wording)] if left != text else []
                 text = left
         return text, marked
 
@@ -237,7 +237,7 @@ class _Reading:
             self._words += words
         self._adjacent = kind == "value" or (self._adjacent and first in ("and", ","))
 
-    def look(self, phrase: str, words: str) -> None:
+    def add_phrase(self, phrase: str, words: str) -> None:
         """Take one of the catalogue's phrases: after a relation it is said of the other thing."""
         if not self._relation:
             self.matched.claims[Claim("part", phrase)] = words
@@ -254,16 +254,16 @@ class _Reading:
         elif not self._subject:
             self._subject = name
             self.matched.called = name if self._matcher.contradicts(self._i, name) else ""
-            self._settle(named=self._adjacent)
+            self._resolve_pending(named=self._adjacent)
         self._values = []
 
     def end_clause(self) -> None:
         """End what a relation or a verb governs."""
         # After "beside a bench with ..." the values belong to the bench, not to the subject.
         if not self._relation:
-            self._settle(named=False)
+            self._resolve_pending(named=False)
         self._values, self._relation, self._words, self._things = [], "", [], []
 
-    def _settle(self, named: bool) -> None:
+    def _resolve_pending(self, named: bool) -> None:
         for claim, words in self._matcher.values(self._i, self._values, named):
             self.matched.claims.setdefault(claim, words)

@@ -62,7 +62,7 @@ def plural(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Words:
+class CategoryWords:
     """Words that drafts use for a category."""
 
     name: str  # Common name
@@ -96,12 +96,12 @@ def _tables() -> tuple[dict[str, dict[str, Any]], dict[str, Any], frozenset[str]
     return tables, values, colours
 
 
-def words_of(category: str, name: str | None, kind: str, target: bool = True) -> Words:
+def words_of(category: str, name: str | None, kind: str, target: bool = True) -> CategoryWords:
     """Look up the words for a category."""
     entry = _tables()[0].get(category, {})
     verbs = entry.get("verbs", [_VERBS.get(kind, ("stands", "standing"))])
     in_catalogue = name is not None
-    return Words(
+    return CategoryWords(
         name=name or spoken(category),
         nouns=tuple(entry.get("nouns", ())),
         plural_heads=tuple(entry.get("plural_head", ())),
@@ -133,7 +133,7 @@ class Noun:
         return " ".join([*self.adjectives, self.name]) if self.adjectives or not self.after else self.bare
 
 
-def noun_of(instance: Instance, words: Words) -> Noun:
+def noun_of(instance: Instance, words: CategoryWords) -> Noun:
     """Make the noun phrase from an instance's attributes."""
     name = instance.attributes.get("called") or words.name
     before: list[str] = []
@@ -202,8 +202,8 @@ def _with_article(text: str) -> str:
 def _join(parts: list[str]) -> str:
     text = ""
     for part in parts:
-        again = part.startswith("with ") and "with " in text
-        text += " and " + part.removeprefix("with ") if again else (" " if text else "") + part
+        repeated = part.startswith("with ") and "with " in text
+        text += " and " + part.removeprefix("with ") if repeated else (" " if text else "") + part
     return text
 
 

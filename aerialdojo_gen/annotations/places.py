@@ -32,7 +32,7 @@ from aerialdojo_gen.base.safe_parse import read_toml
 Conditions = Mapping[str, Any]
 
 # Conditions on things, by pattern.
-THINGS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside", "at", "near", "over"})
+INSTANCE_RELATIONS = frozenset({"on", "roof", "under", "inside", "hull", "touching", "beside", "at", "near", "over"})
 # Beyond the centre of things, by compass direction.
 SIDES = frozenset({"north_of", "south_of", "east_of", "west_of"})
 _FOLDER = Path(__file__).parent / "places"
@@ -100,7 +100,7 @@ def _texts(value: Any) -> bool:
 # Keys that are no conditions.
 _WORDS = frozenset({"say", "also"})
 _FORMS: Mapping[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(THINGS | SIDES | {"surface", "by", "say"}, _text),
+    **dict.fromkeys(INSTANCE_RELATIONS | SIDES | {"surface", "by", "say"}, _text),
     "also": _texts,
     "floor": lambda v: isinstance(v, list) and len(v) == 2 and isinstance(v[0], int) and _text(v[1]),
     "between": lambda v: isinstance(v, list) and len(v) == 2 and all(map(_text, v)),

@@ -1,4 +1,4 @@
-"""Words and noun phrases of a scene's instances, and what is true of their looks."""
+"""Words and noun phrases of a scene's instances, and what is true of their appearance."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
-from aerialdojo_gen.annotations.phrases import Words, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.annotations.phrases import CategoryWords, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.claims import Body
 from aerialdojo_gen.scenes.context import context_of
-from aerialdojo_gen.scenes.looks import Look
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 # Categories of imported meshes that are never objects.
@@ -26,13 +26,13 @@ class Vocabulary:
         self.scene = scene
         self.names = {category: catalogue[category].name for category in catalogue}
         self.kinds = {category: catalogue[category].kind for category in catalogue}
-        self._looks = {category: catalogue[category].looks for category in catalogue}
+        self._appearances = {category: catalogue[category].looks for category in catalogue}
         self._surface = Surface(scene)
         self._bodies: dict[Instance, Body] = {}
         self._valid: dict[tuple[Instance, str], bool] = {}
         self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
-        by_category: dict[str, Words] = {}
+        by_category: dict[str, CategoryWords] = {}
         for i in scene.instances:
             if scene.imported and i.category not in NON_OBJECTS:
                 # Imported meshes have categories of their own, all of which may be targets.
@@ -63,26 +63,26 @@ class Vocabulary:
             return instance
         return replace(instance, attributes={k: v for k, v in instance.attributes.items() if k != "colour"})
 
-    def catalogue_looks(self, instance: Instance) -> tuple[Look, ...]:
+    def appearances_of(self, instance: Instance) -> tuple[Appearance, ...]:
         """Phrases that the catalogue has for an instance's category."""
-        return self._looks.get(instance.category, ())
+        return self._appearances.get(instance.category, ())
 
-    def is_valid(self, look: Look, instance: Instance) -> bool:
+    def is_valid(self, appearance: Appearance, instance: Instance) -> bool:
         """Whether a phrase of the catalogue is true of an instance, visible or not; measured once."""
-        key = instance, look.phrase
+        key = instance, appearance.phrase
         if key not in self._valid:
             if instance.anatomy is not None and instance not in self._bodies:
                 self._bodies[instance] = Body(instance, self.scene.materials)
-            self._valid[key] = instance in self._bodies and not self._bodies[instance].false_claims(look)
+            self._valid[key] = instance in self._bodies and not self._bodies[instance].false_claims(appearance)
         return self._valid[key]
 
-    def true_looks(self, instance: Instance) -> tuple[str, ...]:
+    def true_phrases(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, and visible; measured once."""
         if instance not in self._true:
-            true = [look for look in self.catalogue_looks(instance) if self.is_valid(look, instance)]
-            self._true[instance] = tuple(look.phrase for look in true if self._surface.shows(look, instance))
+            true = [one for one in self.appearances_of(instance) if self.is_valid(one, instance)]
+            self._true[instance] = tuple(one.phrase for one in true if self._surface.shows(one, instance))
         return self._true[instance]
 
-    def looks(self, instance: Instance) -> tuple[str, ...]:
+    def unrepeated_phrases(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
-        return tuple(say for say in self.true_looks(instance) if not repeats(say, instance))
+        return tuple(say for say in self.true_phrases(instance) if not repeats(say, instance))

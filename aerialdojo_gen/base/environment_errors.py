@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from aerialdojo_gen.base.errors import DISK_ERRORS, AerialDojoError, ConfigError, UsageError
 
 # Python with the libraries of a command has about 20 open, every worker process some more.
-_LEAST_FILES = 64
+_MIN_FILES = 64
 # Address space of the largest process of a command on two small scenes: VmPeak on two cores, rounded up. Below it
 # native libraries crash or hang while they start. With large scenes a command takes more, in arrays of ours, whose
 # MemoryError is one line. Stages, which may run those before them, evaluate and export take up to 2,900.
@@ -68,8 +68,8 @@ def check_limits(arguments: Sequence[str]) -> None:
     if soft != resource.RLIM_INFINITY and soft < target:
         resource.setrlimit(resource.RLIMIT_NOFILE, (target, hard))
         soft = target
-    if soft != resource.RLIM_INFINITY and soft < _LEAST_FILES:
-        raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_LEAST_FILES} are needed")
+    if soft != resource.RLIM_INFINITY and soft < _MIN_FILES:
+        raise AerialDojoError(f"too few file descriptors: ulimit -n is {soft}, at least {_MIN_FILES} are needed")
 
 
 def memory_mb(command: str) -> int:

@@ -37,7 +37,7 @@ class ConfigError(UsageError):
 
 
 class MissingPackage(AerialDojoError):  # noqa: N818 - it says what is missing
-    """A package of an extra is not installed; `lacks` words the message."""
+    """A package of an extra is not installed; `no_package` words the message."""
 
 
 class AssetError(AerialDojoError):
@@ -88,7 +88,7 @@ class BeyondBounds(Malformed):
     """A text is TOML or JSON, but larger, deeper or with other numbers or characters than anything here can use."""
 
 
-def lacks(who: str, package: str | None, extra: str) -> str:
+def no_package(who: str, package: str | None, extra: str) -> str:
     """Word that what needs a package, in the user's terms, lacks it, and which extra to install."""
     return f"{who} lacks the package {package or extra}: pip install 'aerialdojo-gen[{extra}]'"
 

@@ -1,4 +1,4 @@
-"""What is wrong with a value from outside, by Pydantic's errors: a line a fault, with the key that was meant."""
+"""What is wrong with a value from outside, by Pydantic's errors: one line per fault, with the key that was meant."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerialdojo_gen.base.errors import brief
 from aerialdojo_gen.base.names import unknown
 
 # What people read; a file may have thousands of faults.
-_MOST_FAULTS = 20
+_MAX_FAULTS = 20
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[ModelFault
 def explain(error: ValidationError, model: type[BaseModel]) -> list[str]:
     """Turn a validation error into one line a fault."""
     faults = faults_of(error, model)
-    lines = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MOST_FAULTS]]
-    return [*lines, f"and {len(faults) - _MOST_FAULTS} more faults"] if len(faults) > _MOST_FAULTS else lines
+    lines = [brief(f"{_table(fault.path[: _owner(fault.path)])}{fault.line}") for fault in faults[:_MAX_FAULTS]]
+    return [*lines, f"and {len(faults) - _MAX_FAULTS} more faults"] if len(faults) > _MAX_FAULTS else lines
 
 
 def _owner(path: Sequence[str | int]) -> int:

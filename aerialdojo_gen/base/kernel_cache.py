@@ -52,11 +52,11 @@ class Kernels:
         self._folder.mkdir(parents=True, exist_ok=True)
 
     def get_source_stamp(self) -> str:
-        """Return what tells versions of the source apart; the folder's name does it already."""
+        """Return what distinguishes versions of the source; the folder's name does it already."""
         return self._folder.name
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name apart."""
+        """Return what distinguishes functions of one name."""
         return str(self._line)
 
 

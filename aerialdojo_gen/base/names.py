@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from aerialdojo_gen.base.errors import UsageError, brief
 
 # What a line has room for.
-_MOST_LISTED = 20
+_MAX_LISTED = 20
 
 
 def closest(name: str, known: Iterable[str], most: int = 1, *, cutoff: float = 0.6) -> list[str]:
@@ -41,8 +41,8 @@ def unknown(what: str, name: str, known: Iterable[str], *, besides: Sequence[str
 def _listed(names: Sequence[str]) -> str:
     if not names:
         return "there is none"
-    more = len(names) - _MOST_LISTED
-    shown = ", ".join(names[:_MOST_LISTED]) + (f" and {more:,} more" if more > 0 else "")
+    more = len(names) - _MAX_LISTED
+    shown = ", ".join(names[:_MAX_LISTED]) + (f" and {more:,} more" if more > 0 else "")
     return f"there {'is' if len(names) == 1 else 'are'} {shown}"
 
 

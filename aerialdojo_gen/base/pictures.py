@@ -26,7 +26,7 @@ SMALLEST_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 9)
 # OpenCV's own, for what is read once.
 PLAIN_PNG: tuple[int, ...] = ()
 
-SCORED_JPEG, ASKED_JPEG = 88, 90
+SCORED_JPEG, PROMPT_JPEG = 88, 90
 GALLERY_JPEG, PAGE_JPEG, MAP_JPEG, REPLAY_JPEG = 82, 95, 82, 75
 
 _JPEG_START = b"\xff\xd8"
@@ -114,7 +114,7 @@ class Picture:
 def colour_picture(rgb: NDArray[np.uint8], size_px: int) -> Picture:
     """Encode (H, W, 3) uint8 sRGB as JPEG, scaled down to a longest side of `size_px`."""
     scaled = _at_most(rgb, size_px, cv2.INTER_AREA)
-    return _picture(encode_jpeg(scaled, ASKED_JPEG))
+    return _picture(encode_jpeg(scaled, PROMPT_JPEG))
 
 
 def depth_picture(depth_m: NDArray[np.float32], max_depth_m: float, size_px: int) -> Picture:

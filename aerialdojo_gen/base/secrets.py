@@ -17,7 +17,7 @@ _SECRET_WORDS = frozenset((
 _FOLDERS = ("PWD", "OLDPWD")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 # Shorter values of environment variables are words like "true", which stand anywhere.
-_LEAST_CHARACTERS = 8
+_MIN_CHARACTERS = 8
 _PATTERNS = (
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]{8,}"), rf"\1 {REDACTED}"),
     (re.compile(r"\b(?:(?:sk|pk|xai|gsk|hf|gh[pousr])[-_]|AIza)(?=[\w-]*\d)[\w-]{16,}"), REDACTED),
@@ -42,7 +42,7 @@ class Secrets:
         found = {value for name, value in os.environ.items() if is_secret_name(name) and name not in _FOLDERS}
         found |= set(_under_secret_names(options or {})) | set(values)
         # The longest first: one may be the beginning of another.
-        known = sorted({v for v in found if len(v.strip()) >= _LEAST_CHARACTERS}, key=len, reverse=True)
+        known = sorted({v for v in found if len(v.strip()) >= _MIN_CHARACTERS}, key=len, reverse=True)
         self._known = known
 
     def text(self, text: str) -> str:

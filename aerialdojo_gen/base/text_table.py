@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 _WIDTH = 80
 _NARROWEST = 40
 # A column of words is not made narrower than this, if it is that wide at all.
-_LEAST_WORDS = 24
+_MIN_WORDS = 24
 
 BEST, SECOND = "best", "second"
 
@@ -74,7 +74,7 @@ def facts(pairs: Sequence[tuple[str, str]], width: int | None = None) -> list[st
     over = max((len(name) for name, _ in pairs), default=0) + 2
     lines = []
     for name, text in pairs:
-        first, *rest = wrapped(text, None if width is None else max(width - over, _LEAST_WORDS))
+        first, *rest = wrapped(text, None if width is None else max(width - over, _MIN_WORDS))
         lines += [f"{name.ljust(over)}{first}", *(" " * over + line for line in rest)]
     return lines
 
@@ -91,7 +91,7 @@ class _Body:
             for k, column in enumerate(table.columns)
         ]
         self.least = [
-            min(full, max(_LEAST_WORDS, len(column.head))) if column.words and width is not None else full
+            min(full, max(_MIN_WORDS, len(column.head))) if column.words and width is not None else full
             for column, full in zip(table.columns, self.full, strict=True)
         ]
 

@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark import tasks
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.observations import GoalText, mosaic, observed_goal, render_views
-from aerialdojo_gen.benchmark.tasks import Selection, Task, TaskSampler, check_tell, image_shape, read_tasks, select
+from aerialdojo_gen.benchmark.tasks import Selection, Task, TaskSampler, check_hints, image_shape, read_tasks, select
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.scenes.context import SEVERAL
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -132,10 +132,10 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self.render_mode = render_mode
         self._data = open_root(data)
         self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height, light=light)
-        self._tell = check_tell(_names(tell))
+        self._hints = check_hints(_names(tell))
         self._paraphrase = tasks.check_paraphrase(paraphrase)
         self._flight = Flight(
-            self._data, self._sensors, success_radius_m, embodiment, renderer, self._tell, scenes_in_memory
+            self._data, self._sensors, success_radius_m, embodiment, renderer, self._hints, scenes_in_memory
         )
         self._begun = self._closed = False
         self._rows = select(
@@ -216,7 +216,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         self._flight.begin(task)
         self._begun = True
         if self._prefetch and not options and (coming := self._draw.coming) is not None:
-            self._flight.look_ahead(coming)
+            self._flight.prefetch_scene(coming)
         return self._observe(), {"reason": ""}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -319,7 +319,7 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
         if self._image_shape is not None:
             goal["image"] = spaces.Box(0, 255, self._image_shape, np.uint8)
             goal["image_distance_m"] = spaces.Box(0.0, 1000.0, (1,), np.float32)
-        if "heading" in self._tell:
+        if "heading" in self._hints:
             goal |= {"heading": spaces.Discrete(len(DIRECTIONS)), "heading_deg": spaces.Box(0, 359, (1,), np.int32)}
         s = self._sensors
         budget = int(pc.max(self._rows["action_budget"]).as_py())

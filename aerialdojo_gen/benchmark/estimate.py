@@ -104,12 +104,12 @@ def _measure_steps(
 ) -> tuple[float, float, float, float, int]:
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
-    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
-    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, tell=tell)
+    body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
+    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, hints=hints)
     # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]
-    requests = looks = 0
+    requests = renders = 0
     for task in read_tasks(root, few):
         episode = flight.begin(task)
         agent.reset(flight.goal)
@@ -117,9 +117,9 @@ def _measure_steps(
             began = time.perf_counter()
             observation = flight.observe()
             # The first image of a scene includes the time to open it.
-            if looks:
+            if renders:
                 sums[3] += time.perf_counter() - began
-            looks += 1
+            renders += 1
             if not asks:
                 sums[0] += agent.estimate_tokens(observation)
                 continue
@@ -136,9 +136,9 @@ def _measure_steps(
             sums[0] += used.input_tokens or 0
             sums[1] += used.output_tokens or 0
             sums[2] += used.request_s or 0.0
-    render_s = sums[3] / max(1, looks - 1)
+    render_s = sums[3] / max(1, renders - 1)
     if not asks:
-        return sums[0] / looks, _ASSUMED_OUT, _ASSUMED_S, render_s, 0
+        return sums[0] / renders, _ASSUMED_OUT, _ASSUMED_S, render_s, 0
     return sums[0] / requests, sums[1] / requests, sums[2] / requests, render_s, requests
 
 

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.agents.load import BUILT_IN, add_working_directory
-from aerialdojo_gen.benchmark.tasks import Selection, check_tell
+from aerialdojo_gen.benchmark.tasks import Selection, check_hints
 from aerialdojo_gen.benchmark.worker import Failed, Finished, RetryPolicy
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.store.files import file_digest
@@ -34,12 +34,12 @@ class Evaluation:
     retry_policy: RetryPolicy = field(default_factory=RetryPolicy)  # Retries and tolerance of agent errors
     requests_per_minute: float | None = None  # Of an agent that uses a service, over all workers
     used: Mapping[str, Any] | None = None  # The options that the agent reports, for the log
-    tell: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
     withheld: bool = False  # Fly also where the release has no routes: for a submission, scored elsewhere
 
     def __post_init__(self) -> None:
         """Check the names of hints."""
-        check_tell(self.tell)
+        check_hints(self.hints)
 
     @property
     def label(self) -> str:
@@ -49,7 +49,7 @@ class Evaluation:
     def identity(self) -> dict[str, str]:
         """Columns of `episodes` that identify the run, its agent and its hints."""
         options = json.dumps(self._logged(self.options if self.used is None else self.used), sort_keys=True)
-        hints = ",".join(check_tell(self.tell))
+        hints = ",".join(check_hints(self.hints))
         return {"run_id": self.run, "agent": self.agent, "agent_options": options, "told": hints}
 
     def settings(self) -> dict[str, Any]:
@@ -60,7 +60,7 @@ class Evaluation:
             **asdict(self.selection),
             "sensors": asdict(self.sensors) if self.sensors else None,
             "renderer": self.renderer,
-            "tell": check_tell(self.tell),
+            "tell": check_hints(self.hints),
             "embodiment": self.embodiment.model_dump(),
         }
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-# Okabe and Ito's colours, which colour-blind readers tell apart too; line styles carry what is left.
+# Okabe and Ito's colours, which colour-blind readers can distinguish; line styles carry what is left.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans", "font.size": 9, "axes.linewidth": 0.8, "axes.edgecolor": "#444444",
@@ -105,9 +105,9 @@ def axis_end(largest: float, most: float = math.inf) -> float:
     return min(most, next(power * end for end in _ENDS if power * end >= largest * (1.0 - 1e-9)))
 
 
-def metric_radars(runs: Sequence[Run], profile: Profile, paper: bool = False) -> Figure:
+def metric_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = False) -> Figure:
     """Draw a chart a metric, an axis a family; `paper` takes the paper's axes."""
-    values, ends = _values(runs, profile, paper)
+    values, ends = _values(runs, profile, paper_axes)
     angles = np.linspace(0.0, 2.0 * math.pi, len(_FAMILIES), endpoint=False)
 
     def draw(figure: Figure) -> None:
@@ -128,9 +128,9 @@ def metric_radars(runs: Sequence[Run], profile: Profile, paper: bool = False) ->
     return draw_figure(draw, (7.6, 5.4))
 
 
-def family_radars(runs: Sequence[Run], profile: Profile, paper: bool = False) -> Figure:
+def family_radars(runs: Sequence[Run], profile: Profile, paper_axes: bool = False) -> Figure:
     """Draw a chart a family, an axis a metric; an axis ends at the same value in all of them, or at the paper's."""
-    values, ends = _values(runs, profile, paper)
+    values, ends = _values(runs, profile, paper_axes)
     angles = np.linspace(0.0, 2.0 * math.pi, len(PAPER_METRICS), endpoint=False)
     tips = [
         f"{_LABELS[m]}\n{'0' if m in _INWARDS else f'{end:g}'} {_UNITS[m]}"
@@ -160,7 +160,7 @@ def _note(runs: Sequence[Run]) -> str | None:
     return "without the oracle" if len(contenders(runs)) < len(runs) else None
 
 
-def _values(runs: Sequence[Run], profile: Profile, paper: bool) -> tuple[list[Any], list[float]]:
+def _values(runs: Sequence[Run], profile: Profile, paper_axes: bool) -> tuple[list[Any], list[float]]:
     """Score the families: for every run (4, 5) float64, per cent and metres; and where the axes end."""
     found = []
     for _, run in contenders(runs):
@@ -170,7 +170,7 @@ def _values(runs: Sequence[Run], profile: Profile, paper: bool) -> tuple[list[An
             for family in _FAMILIES
         ]
         found.append(np.array(rows) * [1.0 if m == "dts_m" else 100.0 for m in PAPER_METRICS])
-    if paper:
+    if paper_axes:
         return found, [PAPER_ENDS[metric] for metric in PAPER_METRICS]
     largest = np.nanmax(np.stack(found), axis=(0, 1))
     most = [math.inf if metric == "dts_m" else 100.0 for metric in PAPER_METRICS]

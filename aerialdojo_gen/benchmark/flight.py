@@ -24,7 +24,7 @@ from aerialdojo_gen.base.constants import SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.observations import render_views
-from aerialdojo_gen.benchmark.tasks import NO_TARGET, Task, check_tell, goal_of, mesh_of
+from aerialdojo_gen.benchmark.tasks import NO_TARGET, Task, check_hints, goal_of, mesh_of
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.planning.flight_space import FlightSpace, Point, flight_space, prefetch_flight_space
 from aerialdojo_gen.rendering.casters import in_sight
@@ -102,10 +102,10 @@ class Flight:
         success_radius_m: float = SUCCESS_RADIUS_M,
         embodiment: Embodiment | None = None,
         renderer: str = "auto",
-        tell: Sequence[str] = (),
+        hints: Sequence[str] = (),
         scenes_in_memory: int = SEVERAL,
     ) -> None:
-        self._keep = scenes_in_memory
+        self._scenes_in_memory = scenes_in_memory
         self._opened: set[str] = set()
         self._reader: Thread | None = None
         if scenes_in_memory > SEVERAL:
@@ -113,7 +113,7 @@ class Flight:
         self._data = open_root(data)
         self._body = embodiment or Embodiment()
         self.renderer = renderer
-        self._tell = check_tell(tell)
+        self._hints = check_hints(hints)
         self.sensors = sensors
         self.success_radius_m = success_radius_m
 
@@ -123,17 +123,17 @@ class Flight:
         body, budget = self._body, row["action_budget"]
         rules = Rules(budget, self.success_radius_m, body.radius_m, body.wheelbase_m, self.sensors)
         self.task = task
-        self.goal = goal_of(self._data, task, rules, self._tell)
+        self.goal = goal_of(self._data, task, rules, self._hints)
         mesh, sha256 = mesh_of(self._data, row["scene"])
         if self._reader is not None and self._reader.name == sha256:
             self._reader.join()
-        self.space = flight_space(mesh, sha256, body.radius_m, self._keep)
+        self.space = flight_space(mesh, sha256, body.radius_m, self._scenes_in_memory)
         self._opened.add(sha256)
         self.light = chosen_light(self.space.scene.light, self.sensors.light, 0, row["task_id"])
         self.episode = Episode(self.space, task.start, task.goal, budget)
         return self.episode
 
-    def look_ahead(self, scene: str) -> None:
+    def prefetch_scene(self, scene: str) -> None:
         """Read a scene in a thread while flying in another; does nothing while one is being read."""
         mesh, sha256 = mesh_of(self._data, scene)
         if self._reader is not None and self._reader.is_alive():

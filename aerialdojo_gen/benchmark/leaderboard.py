@@ -57,14 +57,14 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Line:
+class Row:
     """A row: a scored run, or one of the paper's."""
 
     label: str
     agent: str
     episodes: int | None
     cells: Sequence[Cell]
-    paper: bool = False
+    is_paper: bool = False
 
 
 def write_leaderboard(folder: Path, page: Path) -> int:
@@ -87,7 +87,7 @@ def write_leaderboard(folder: Path, page: Path) -> int:
             heads=heads,
             groups=groups,
             starts={0, *accumulate(count for _, count in groups)},
-            tables={title: lines for title, lines in tables.items() if any(not line.paper for line in lines)},
+            tables={title: lines for title, lines in tables.items() if any(not line.is_paper for line in lines)},
             **page_parts(["report.css", "leaderboard.css"], "leaderboard.js"),
         )
     )
@@ -102,7 +102,7 @@ def _has(head: Head, row: ScoreRow, adapted: bool) -> bool:
     return at == (head.partition, head.radius_m) and _cell(head, row, adapted).value is not None
 
 
-def _lines(cards: Sequence[ScoreCard], setting: str, heads: Sequence[Head]) -> list[Line]:
+def _lines(cards: Sequence[ScoreCard], setting: str, heads: Sequence[Head]) -> list[Row]:
     """Make the rows of a setting, the highest success rate first."""
     lines = []
     for card in cards:
@@ -110,8 +110,8 @@ def _lines(cards: Sequence[ScoreCard], setting: str, heads: Sequence[Head]) -> l
         if rows:
             cells = [_cell(head, rows.get((head.partition, head.radius_m)), card.adapted) for head in heads]
             label = f"{card.name} + {card.told}" if card.told else card.name
-            lines.append(Line(label, card.agent, rows["all", _NEAR_M].episodes, cells))
-    lines += [_paper_line(result, heads) for result in results() if result.setting == setting]
+            lines.append(Row(label, card.agent, rows["all", _NEAR_M].episodes, cells))
+    lines += [_paper_row(result, heads) for result in results() if result.setting == setting]
     return sorted(lines, key=lambda line: -(line.cells[0].value or 0.0))
 
 
@@ -124,7 +124,7 @@ def _cell(head: Head, row: ScoreRow | None, adapted: bool) -> Cell:
     return Cell(value, text(head.metric, value), ends)
 
 
-def _paper_line(result: PaperResult, heads: Sequence[Head]) -> Line:
+def _paper_row(result: PaperResult, heads: Sequence[Head]) -> Row:
     cells = []
     for head in heads:
         key = head.metric, head.radius_m
@@ -132,4 +132,4 @@ def _paper_line(result: PaperResult, heads: Sequence[Head]) -> Line:
         spread = result.spread.get(key)
         shown = f"± {text(head.metric, spread)}" if value is not None and spread is not None else ""
         cells.append(Cell(value, NONE if value is None else text(head.metric, value), shown))
-    return Line(result.model, "paper", None, cells, paper=True)
+    return Row(result.model, "paper", None, cells, is_paper=True)

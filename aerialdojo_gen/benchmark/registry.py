@@ -30,7 +30,7 @@ _RATES = ("sr", "sr_view", "osr", "spl")
 _FURTHER = ("sr", "sr_view", "osr")
 _PAPER_TABLES = {"base": " (the form of the paper's Table 4)", "standard": " (the form of the paper's Table 5)"}
 # Reversals that a note lists.
-_MOST_REVERSALS = 6
+_MAX_REVERSALS = 6
 _MEANS = "Mean of the {0}families, each the mean of its scenes; ± is the standard deviation over scenes."
 
 
@@ -48,7 +48,7 @@ def run_rows(request: ReportRequest) -> list[Row]:
 
 
 def _leading(run: Run, episodes: int) -> dict[str, str]:
-    return {"episodes": f"{episodes:,}", "hints": run.told or "none"}
+    return {"episodes": f"{episodes:,}", "hints": run.hints or "none"}
 
 
 def _headline_rows(request: ReportRequest) -> list[Row]:
@@ -171,8 +171,8 @@ def _radius_notes(request: ReportRequest) -> list[str]:
                 if a < b - 1e-9 and a_far > b_far + 1e-9
             ]
             if turned:
-                more = f", and {len(turned) - _MOST_REVERSALS} more" if len(turned) > _MOST_REVERSALS else ""
-                said = f"{', '.join(turned[:_MOST_REVERSALS])}{more}."
+                more = f", and {len(turned) - _MAX_REVERSALS} more" if len(turned) > _MAX_REVERSALS else ""
+                said = f"{', '.join(turned[:_MAX_REVERSALS])}{more}."
                 notes.append(f"{section}, from {near:g} to {far:g} m: {said}")
     return notes
 
@@ -333,7 +333,7 @@ _TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list
         "How episodes went", {
             "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
             "service": ("requests", "tokens in", "tokens out", "USD"),
-        }, run_rows, tables.conduct_cells,
+        }, run_rows, tables.outcome_cells,
     ),
     "type": TableSpec("By scene type", _type_rows, _by_run, "scene type"),
     "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),

@@ -1,4 +1,4 @@
-"""Episodes to be looked at again: what every run did on one task, on a map.
+"""Replays of episodes: what every run did on one task, on a map.
 
 The evaluator's eyes only: a replay shows the target and the reference route.
 """
@@ -31,7 +31,7 @@ _MAP_PX = 640
 _MARGIN_M = 6.0
 _FRAME = Sensors(("front",), rgb=True, depth=False, width=240, height=240)
 # An episode may have 300 steps: a picture of each would make the page heavy, and hardly say more.
-_MOST_FRAMES = 40
+_MAX_FRAMES = 40
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any,
     if frames:
         # The last pose may lie in what was hit: a camera there sees the inside of it.
         last = len(lists["said"]) - (2 if episode["collision"] else 1)
-        for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MOST_FRAMES, last + 1))}):
+        for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MAX_FRAMES, last + 1))}):
             position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
             views, *_ = render_views(scene.model, _FRAME, position, lists["yaw_rad"][k])
             pictures[k] = data_url(encode_jpeg(views["front"], REPLAY_JPEG))

@@ -35,10 +35,10 @@ def write_report(out: Path, request: ReportRequest, replays: Sequence[Replay]) -
     named = named_tables(request, ["all"])
     tables = [table for made in named.values() for table in made]
     drawn_runs, _ = _of_the_radar(request.runs)
-    paper = request.sample is not None
+    paper_axes = request.sample is not None
     drawn = {
-        "families": metric_radars(drawn_runs, request.profiles[0], paper),
-        "radar": family_radars(drawn_runs, request.profiles[0], paper),
+        "families": metric_radars(drawn_runs, request.profiles[0], paper_axes),
+        "radar": family_radars(drawn_runs, request.profiles[0], paper_axes),
         "radius": radius_curve(request.runs, request.profiles[0]),
     }
     figures = {(name, kind): encode_figure(f, kind) for name, f in drawn.items() for kind in ("png", "svg")}

@@ -76,7 +76,7 @@ class Run:
     failed: int = 0  # Episodes that failed for external reasons, not in the table
     log: DataRoot | None = None  # The root that `evaluate` wrote to, where its steps are
     group: str = ""  # Heading of its section in tables; empty for none
-    told: str = ""  # Hints given to the agent; empty for none
+    hints: str = ""  # Hints given to the agent; empty for none
 
     def where(self, mask: Bools | NDArray[np.int64]) -> Run:
         """Return the run with the episodes that a mask selects, or with those at some indices in their order."""
@@ -109,13 +109,13 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
         if not table.num_rows:
             failed = read(name, "failures").num_rows
             said = f", and {failed:,} that failed: fly them again with" if failed else ": run"
-            again = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
+            rerun_command = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
             of = "" if sample is None else " of the paper's sample"
-            raise StoreError(f"run {name!r} has no finished episode{of}{said} {again}")
+            raise StoreError(f"run {name!r} has no finished episode{of}{said} {rerun_command}")
     agents = [table["agent"][0].as_py() for table in tables.values()]
-    told = [table["told"][0].as_py() or "" for table in tables.values()]
+    hints = [table["told"][0].as_py() or "" for table in tables.values()]
     # With hints it is another contender.
-    called = [f"{agent} + {more}" if more else agent for agent, more in zip(agents, told, strict=True)]
+    called = [f"{agent} + {more}" if more else agent for agent, more in zip(agents, hints, strict=True)]
     return [
         Run(
             name,
@@ -126,9 +126,9 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
             mark_adapted(episodes_of(table), table["agent_options"][0].as_py()),
             read(name, "failures").num_rows,
             root,
-            told=more,
+            hints=more,
         )
-        for (name, table), agent, more, call in zip(tables.items(), agents, told, called, strict=True)
+        for (name, table), agent, more, call in zip(tables.items(), agents, hints, called, strict=True)
     ]
 
 

@@ -47,7 +47,7 @@ def _rows(request: ReportRequest) -> Iterator[list[Any]]:
                 where = [(n, v) for n, v in (("setting", setting), ("modality", modality)) if v != "all"]
                 head = [run.name, run.agent, profile.name, profile.radius_m, setting, modality]
                 for row in _scores(request, Cut(k, profile, tuple(where))):
-                    yield [*head, *(None if isinstance(v, float) and math.isnan(v) else v for v in row), run.told]
+                    yield [*head, *(None if isinstance(v, float) and math.isnan(v) else v for v in row), run.hints]
     for result in request.paper_results:
         for profile in request.profiles:
             keys = [(metric, profile.radius_m) for metric in METRICS]

@@ -126,7 +126,7 @@ class Submission(Strict):
 
 @dataclass(frozen=True)
 class Logged:
-    """A run's log, as a submission tells it."""
+    """A run's log, as a submission contains it."""
 
     table: pa.Table  # Its episodes, sorted by scene and task
     flown: Flown
@@ -134,7 +134,7 @@ class Logged:
 
 
 def logged(log: DataRoot, run: str) -> Logged:
-    """Read what a submission tells of a run's log."""
+    """Read a run's log from a submission."""
     table = read_run(log, run)
     steps = read_run(log, run, "steps", ["task_id", "action", "x_m", "y_m", "z_m", "yaw_rad"])
     lengths = table["n_actions"].to_numpy()
@@ -244,7 +244,7 @@ def check_tasks(wanted: Sequence[str], there: Sequence[str], what: str, mend: st
 
 
 def embodiment_of(body: Embodiment) -> dict[str, float]:
-    """Return a body as submissions tell it."""
+    """Return a body in a submission's form."""
     return {name: float(value) for name, value in body.model_dump().items()}
 
 

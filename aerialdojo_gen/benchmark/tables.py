@@ -313,7 +313,7 @@ def visit_cells(run: Run, profile: Profile) -> tuple[str, ...]:
     return (*(f"{count:,}" for count in counts), *shares)
 
 
-def conduct_cells(run: Run, _: Profile) -> tuple[str, ...]:
+def outcome_cells(run: Run, _: Profile) -> tuple[str, ...]:
     """Say how episodes ended, and what a language-model service used."""
     ends = run.table["termination"].to_pylist()
     cells = [f"{100 * (ends.count(how) / len(ends)):.1f}" for how in TERMINATIONS]

@@ -172,22 +172,22 @@ def reference_actions(
     return found
 
 
-def check_tell(tell: Sequence[str]) -> tuple[str, ...]:
+def check_hints(hints: Sequence[str]) -> tuple[str, ...]:
     """Return the names of hints in their fixed order; UsageError for an unknown one."""
-    for name in tell:
+    for name in hints:
         if name not in HINTS:
-            raise UsageError(unknown("nothing to tell called", name, HINTS))
-    return tuple(name for name in HINTS if name in tell)
+            raise UsageError(unknown("no hint", name, HINTS))
+    return tuple(name for name in HINTS if name in hints)
 
 
-def goal_of(root: DataRoot, task: Task, rules: Rules, tell: Sequence[str] = ()) -> Goal:
-    """Make an agent's goal; `tell` names the hints."""
+def goal_of(root: DataRoot, task: Task, rules: Rules, hints: Sequence[str] = ()) -> Goal:
+    """Make an agent's goal; `hints` names the hints."""
     row = task.row
     image_id = row["reference_image_id"]
     image = None if image_id is None else reference_image(root, row["scene"], image_id)
     words = (row["modality"], row["target_name"], row["landmark"], row["direction"], row["description"])
     distance_m = None if image is None else row["image_distance_m"]
-    heading = Heading(*compass_heading(row["start_yaw_rad"])) if "heading" in tell else None
+    heading = Heading(*compass_heading(row["start_yaw_rad"])) if "heading" in hints else None
     return Goal(*words, image, rules, heading, distance_m)
 
 
@@ -226,8 +226,8 @@ def mesh_of(root: DataRoot, scene: str) -> tuple[Path, str]:
     try:
         return mesh_copy(root, row["mesh_path"]), row["mesh_sha256"]
     except FileNotFoundError:
-        told = root.at(row["mesh_path"])
-        raise StoreError(f"the mesh {told} is missing: run {command('build-scenes', scene=scene)}") from None
+        path = root.at(row["mesh_path"])
+        raise StoreError(f"the mesh {path} is missing: run {command('build-scenes', scene=scene)}") from None
 
 
 # The descriptions that a task may have: its own, or one of its target's drawn for an episode.

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.errors import AerialDojoError, RenderError
 from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.benchmark.agents import Agent, AgentUnavailable, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Goal, Observation
-from aerialdojo_gen.benchmark.agents.load import error_location, keep_traceback
+from aerialdojo_gen.benchmark.agents.load import add_traceback, error_location
 from aerialdojo_gen.benchmark.agents.simple import OracleAgent, SubmittedAgent
 from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.journal import Journal
@@ -91,7 +91,7 @@ class GuardedAgent:
             raise
         except (Exception, SystemExit) as error:
             # SystemExit too: an agent must not end the run without a message.
-            raise keep_traceback(self._wrong(f"{error_location(error)} (in {what}); {_TOLERATED}"), error) from error
+            raise add_traceback(self._wrong(f"{error_location(error)} (in {what}); {_TOLERATED}"), error) from error
 
     def _wrong(self, what: str) -> AgentError:
         line = " ".join(f"agent {self._name} failed at task {self.task}: {what}".split())
@@ -279,7 +279,7 @@ class Worker:
         thinking += time.perf_counter() - before
         columns: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         while episode.termination is None:
-            observation = self._look()
+            observation = self._observe()
             before = time.perf_counter()
             action = guarded.act(observation)
             answer = guarded.answer()
@@ -296,7 +296,7 @@ class Worker:
             "timing": self._key(task) | seconds,
         }
 
-    def _look(self) -> Observation:
+    def _observe(self) -> Observation:
         try:
             return self._flight.observe()
         except Exception as error:

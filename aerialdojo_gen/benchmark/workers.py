@@ -31,7 +31,7 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
     agent: Any = load_agent(evaluation.agent, **evaluation.options)
     if evaluation.requests_per_minute is not None:
         if not hasattr(agent, "pace"):
-            raise UsageError(f"agent {evaluation.agent!r} has no pace to be set: leave --requests-per-minute out")
+            raise UsageError(f"agent {evaluation.agent!r} has no attribute pace: leave --requests-per-minute out")
         # Requests of all workers are spaced evenly.
         interval_s = 60.0 / evaluation.requests_per_minute
         agent.pace = lambda: time.sleep(link.turn(interval_s))
@@ -40,8 +40,8 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
         suits(release_fingerprint(data))
     wanted: Any = getattr(agent, "sensors", None)
     sensors = evaluation.sensors or (wanted if isinstance(wanted, Sensors) else Sensors())
-    body, renderer, tell = evaluation.embodiment, evaluation.renderer, evaluation.tell
-    flight = Flight(data, sensors, embodiment=body, renderer=renderer, tell=tell)
+    body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
+    flight = Flight(data, sensors, embodiment=body, renderer=renderer, hints=hints)
     secrets = Secrets(evaluation.options)
     try:
         yield Worker(agent, flight, data, evaluation.identity(), evaluation.retry_policy, secrets)

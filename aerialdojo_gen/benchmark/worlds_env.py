@@ -19,7 +19,7 @@ from aerialdojo_gen.benchmark.worlds import WorldMaker
 
 _LONGEST_TEXT = 1000
 _CHARACTERS = "".join(sorted({*string.printable, *"“”‘’éèüöäñç–"}))
-_MOST_ACTIONS = TaskConfig().long_horizon.action_budget
+_MAX_ACTIONS = TaskConfig().long_horizon.action_budget
 
 
 class WorldsEnv(gymnasium.Env[dict[str, Any], np.int64]):
@@ -153,7 +153,7 @@ def _for_all_worlds(space: spaces.Dict) -> spaces.Dict:
     text = GoalText(_LONGEST_TEXT, min_length=0, charset=_CHARACTERS)
     goal_space = space["goal"]
     assert isinstance(goal_space, spaces.Dict)
-    actions = spaces.Box(0, _MOST_ACTIONS, (1,), np.int32)
+    actions = spaces.Box(0, _MAX_ACTIONS, (1,), np.int32)
     goal = {name: text if isinstance(own, spaces.Text) else own for name, own in goal_space.items()}
     return spaces.Dict({**space, "step": actions, "remaining_actions": actions, "goal": spaces.Dict(goal)})
 

@@ -54,11 +54,11 @@ def _scenes(ctx: typer.Context) -> list[str]:
 
 
 def _released(data: Path) -> list[str]:
-    from aerialdojo_gen.dataset.contents import scenes_there
+    from aerialdojo_gen.dataset.contents import existing_scenes
     from aerialdojo_gen.store.root import open_root
 
     root: DataRoot = open_root(data)
-    return list(scenes_there(root)) if data.is_dir() else []
+    return list(existing_scenes(root)) if data.is_dir() else []
 
 
 def _files(incomplete: str) -> Iterator[str]:

@@ -122,7 +122,7 @@ def evaluate(
     width: Width = None,
     height: Height = None,
     renderer: options.RendererName = "auto",
-    tell: options.Tell = None,
+    tell: options.Hints = None,
     out: options.Out = None,
     submission: options.SubmissionFile = None,
     attempts: Attempts = 5,
@@ -156,7 +156,7 @@ def evaluate(
         evaluation = Evaluation(
             run or (preset or name).replace(".", "-").replace(":", "-"), name, given, chosen,
             _sensors(name, given, view, width, height), config.embodiment, renderer,
-            RetryPolicy(attempts, tolerate=tolerate), requests_per_minute, tell=tuple(tell or ()),
+            RetryPolicy(attempts, tolerate=tolerate), requests_per_minute, hints=tuple(tell or ()),
             withheld=submission is not None,
         )  # fmt: skip
     if protocol and (less := sample_shortfall(data)):
@@ -174,7 +174,7 @@ def evaluate(
             limits=Limits(max_cost, max_tokens, failures_in_row), reporter=reporter,
         )  # fmt: skip
     scores = command("report", evaluation.run, log=out, protocol=protocol)
-    _tell(outcome, evaluation.run, scores, data, reporter)
+    _print_outcome(outcome, evaluation.run, scores, data, reporter)
     if submission is not None:
         from aerialdojo_gen.benchmark.submission import write_submission
 
@@ -184,7 +184,7 @@ def evaluate(
         reporter.line(f"{submission}: {outcome.finished:,} episodes, {size:,} bytes{withheld}")
 
 
-def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
+def _print_outcome(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter) -> None:
     """Say what a run gave, the command for its scores, and how to fly again what failed."""
     scored = outcome.finished and outcome.successes is not None
     reporter.line(f"evaluate {run}: {outcome}{f'; for all scores: {scores}' if scored else ''}")
@@ -192,7 +192,7 @@ def _tell(outcome: Outcome, run: str, scores: str, data: str, reporter: Reporter
     if outcome.stopped or outcome.all_failed:
         raise AerialDojoError(last)
     if last:
-        # Not the reporter's: a failure is told under --quiet too.
+        # Not the reporter's: a failure is printed under --quiet too.
         print(last, file=sys.stderr)
 
 
@@ -271,7 +271,7 @@ def fly(
     limit: options.TaskLimit = None,
     seed: options.SelectionSeed = 0,
     renderer: options.RendererName = "auto",
-    tell: options.Tell = None,
+    tell: options.Hints = None,
     out: options.Out = None,
     submission: options.SubmissionFile = None,
     restart: Annotated[bool, typer.Option("--restart", help="Delete the run's earlier flights.")] = False,
@@ -291,7 +291,7 @@ def fly(
     chosen = selection(merge_scenes(scenes, scene), split, setting, modality, protocol, limit, seed)
     evaluation = Evaluation(
         run or f"human-{name}", agent_name(name), selection=chosen, embodiment=config.embodiment, renderer=renderer,
-        tell=tuple(tell or ()),
+        hints=tuple(tell or ()),
     )  # fmt: skip
     say = partial(print, flush=True)
     serve_session(data, evaluation, out=out, restart=restart, port=port, browser=browser, say=say)

@@ -139,8 +139,8 @@ def export(
     from aerialdojo_gen.store.root import LocalRoot, open_root
 
     training = {
-        "split": split, "setting": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
-        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "run": run,
+        "splits": split, "settings": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
+        "source": source, "renderer": renderer, "jpeg_quality": jpeg_quality, "runs": run,
         "depth": False if no_depth else None,
         "size": (width or height or 128, height or width or 128) if width or height else None,
     }  # fmt: skip
@@ -159,7 +159,7 @@ def export(
         raise UsageError("an export is a folder of this machine: name it with --out")
     target = out or Path(root.at(f"exports/{form}"))
     if form in FOR_TRAINING:
-        _for_training(form, root, target, {**given, "scene": chosen or ()}, force, workers, estimate, as_json, quiet)
+        _for_training(form, root, target, {**given, "scenes": chosen or ()}, force, workers, estimate, as_json, quiet)
         return
     reporter = Reporter(quiet=quiet or as_json)
     if form in SHAPES:
@@ -177,8 +177,11 @@ def export(
     _print_export(target, counts, {}, as_json, quiet)
 
 
-# Options by the parameters of `export_options`, where a dash before the name does not do.
-_WRITTEN = {"views": "--view", "size": "--width", "depth": "--no-depth", "jpeg_quality": "--jpeg-quality"}
+# Options by what they set, where two dashes before the name do not do.
+_WRITTEN = {
+    "splits": "--split", "settings": "--setting", "runs": "--run", "views": "--view", "size": "--width",
+    "depth": "--no-depth", "jpeg_quality": "--jpeg-quality",
+}  # fmt: skip
 
 
 def _check_fits(form: str, formats: Sequence[str], given: dict[str, object]) -> None:
@@ -207,10 +210,15 @@ def _for_training(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning, export_options
+    from aerialdojo_gen.benchmark.agents.goal import Sensors
+    from aerialdojo_gen.exchange.learning_export import estimate_for_learning, export_for_learning
+    from aerialdojo_gen.exchange.samples import ExportOptions
     from aerialdojo_gen.pipeline.progress import Reporter
 
-    request = export_options(**chosen)
+    width, height = chosen.pop("size", (128, 128))
+    sensors = Sensors(tuple(chosen.pop("views", ("front",))), True, chosen.pop("depth", True), width, height)
+    lists = {name: tuple(value) for name, value in chosen.items() if isinstance(value, list)}
+    request = ExportOptions(sensors=sensors, **{**chosen, **lists})
     if estimate:
         estimated = estimate_for_learning(form, root, request, workers)
         if as_json:

@@ -62,7 +62,7 @@ TaskLimit = Annotated[
     ),
 ]
 SelectionSeed = Annotated[int, typer.Option("--seed", min=0, help="Seed for the selection of tasks by --limit.")]
-Tell = Annotated[
+Hints = Annotated[
     list[str] | None,
     typer.Option("--tell", help="Give agents more than the goal: heading, the direction they face at the start."),
 ]

@@ -127,7 +127,7 @@ def vary(
 def _seeds(text: str) -> range:
     first, _, end = text.partition(":")
     if not (first.isdecimal() and (end or first).isdecimal()):
-        raise typer.BadParameter(f"--seeds {text[:60]!r}: FIRST:END is wanted, two whole numbers: 1000:1010")
+        raise typer.BadParameter(f"--seeds {text[:60]!r}: expected FIRST:END, two whole numbers, such as 1000:1010")
     return range(int(first), int(end) if end else int(first) + 1)
 
 
@@ -136,7 +136,7 @@ def _knob(text: str) -> tuple[str, float]:
     try:
         return name, float(value)
     except ValueError:
-        raise typer.BadParameter(f"--knob {text[:60]!r}: NAME=VALUE is wanted, a number: storeys=3") from None
+        raise typer.BadParameter(f"--knob {text[:60]!r}: expected NAME=NUMBER, such as storeys=3") from None
 
 
 def _box(text: str) -> tuple[float, float, float, float]:

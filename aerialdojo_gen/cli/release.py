@@ -1,4 +1,4 @@
-"""Commands that look at a release: statistics, one task, one scene in the browser."""
+"""Commands that inspect a release: statistics, one task, one scene in the browser."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def stats(
     as_json: options.Json = False,
 ) -> None:  # fmt: skip
     """Compare the release with the paper's tables; without a release, show what filter kept."""
-    from aerialdojo_gen.dataset.contents import files_there, no_release, scenes_in_release, scenes_there
+    from aerialdojo_gen.dataset.contents import existing_files, existing_scenes, no_release, scenes_in_release
     from aerialdojo_gen.dataset.provenance import RECORD
     from aerialdojo_gen.store.memo import memo, memo_key
     from aerialdojo_gen.store.root import open_root
 
     root, scene = open_root(data), merge_scenes(scenes, scene)
-    released = scenes_there(root)
+    released = existing_scenes(root)
     if pool and (markdown or csv or figures):
         raise UsageError("--pool is printed only: leave --markdown, --csv and --figures out")
     if pool or not released:
@@ -70,7 +70,7 @@ def stats(
         return "\n\n".join("\n".join(table.terminal(width)) for table in compared)
 
     # The same release gives the same tables, and make dataset prints them each time.
-    print(memo(memo_key(root, [*files_there(root), RECORD], "stats", names, as_json or width), show))
+    print(memo(memo_key(root, [*existing_files(root), RECORD], "stats", names, as_json or width), show))
     if markdown or csv:
         from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
         from aerialdojo_gen.store.atomic import atomic_file
@@ -95,13 +95,13 @@ def _compared(root: DataRoot, scenes: list[str] | None) -> list[Comparison | Lis
     from aerialdojo_gen.dataset.contents import check_release
     from aerialdojo_gen.dataset.provenance import made_of_scenes
     from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
+    from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
     from aerialdojo_gen.dataset.stats.tables import benchmark_table, tables
 
     made = made_of_scenes(root, check_release(root, scenes))
     names = [m.scene for m in made]
     tasks = read_tasks(root, names)
-    measured = [*worth_tables(read_goals(root, names), tasks), *difficulty_tables(tasks)]
+    measured = [*goal_tables(read_goals(root, names), tasks), *difficulty_tables(tasks)]
     return [*tables(made), *measured, benchmark_table(made)]
 
 

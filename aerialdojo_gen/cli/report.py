@@ -1,4 +1,4 @@
-"""The command that tells what an evaluation gave."""
+"""The command that reports an evaluation's results."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ Radius = Annotated[
         help="Success radii in metres for the radius table: --radius 1 3 5 10.  (default: 3 5)",
     ),
 ]
-Beside = Annotated[
+PaperResults = Annotated[
     Literal["paper"] | None,
     typer.Option("--beside", help="paper: add the paper's own results, from its simulator."),
 ]
@@ -76,7 +76,7 @@ Group = Annotated[
     typer.Option("--group", help="Group runs under a heading, repeatable: --group open=qwen,phi --group closed=gpt."),
 ]
 Intervals = Annotated[bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")]
-Floors = Annotated[
+AddBaselines = Annotated[
     bool,
     typer.Option("--floors/--no-floors", help="Add the baselines stop, constant, random if they did the same tasks."),
 ]
@@ -100,11 +100,11 @@ def report(
     table: Tables = None,
     radius: Radius = None,
     protocol: options.Protocol = None,
-    beside: Beside = None,
+    paper_results: PaperResults = None,
     paired: Paired = False,
     group: Group = None,
     intervals: Intervals = True,
-    floors: Floors = True,
+    add_baselines: AddBaselines = True,
     style: Style = "terminal",
     as_json: options.Json = False,
     by_scene: ByScene = False,
@@ -135,9 +135,9 @@ def report(
         release_scenes(root)  # a folder without either is the wrong one
     sample = read_sample(root) if protocol else None
     named = load_runs(written, runs or (), sample)
-    loaded = group_runs(with_baselines(written, named) if floors else named, groups)
+    loaded = group_runs(with_baselines(written, named) if add_baselines else named, groups)
     request = ReportRequest(
-        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if beside else (), sample
+        root, loaded, rules, tuple(radius or DEFAULT_RADII_M), intervals, results() if paper_results else (), sample
     )
     if style in ("csv", "json"):
         extra_rules = [at_radius(rules[0], r) for r in radius or () if r not in {rule.radius_m for rule in rules}]

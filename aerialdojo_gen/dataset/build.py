@@ -212,7 +212,7 @@ def _finish_release(
     config: Pipeline, data: DataRoot, scenes: list[str], released: list[str], whole: bool, reporter: Reporter
 ) -> None:
     """Bring what stands beside the tables of a release up to date with them."""
-    from aerialdojo_gen.dataset.contents import CARD, CROISSANT, files_there, prune_release
+    from aerialdojo_gen.dataset.contents import CARD, CROISSANT, existing_files, prune_release
     from aerialdojo_gen.dataset.protocol import SAMPLE, write_sample
     from aerialdojo_gen.dataset.provenance import RECORD, record_makers
     from aerialdojo_gen.store.memo import cache_text, is_cached, memo_key
@@ -224,7 +224,7 @@ def _finish_release(
     record_makers(data, config, released)
 
     def as_it_is() -> str:
-        return memo_key(data, [*files_there(data), RECORD, SAMPLE, CARD, CROISSANT], "documents")
+        return memo_key(data, [*existing_files(data), RECORD, SAMPLE, CARD, CROISSANT], "documents")
 
     if not is_cached(as_it_is()):
         from aerialdojo_gen.dataset.card import write_card

@@ -20,7 +20,7 @@ from aerialdojo_gen.dataset.croissant import CITE_AS
 from aerialdojo_gen.dataset.provenance import made_of_scenes, makers
 from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-from aerialdojo_gen.dataset.stats.measures import difficulty_tables, worth_tables
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
 from aerialdojo_gen.dataset.stats.tables import Made
 from aerialdojo_gen.dataset.stats.variety import read_variety, variety_table
 from aerialdojo_gen.store import schemas
@@ -51,7 +51,7 @@ def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
     return [
         row
         | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        | {"paper_km": m.paper.path_m / 1000 if m.paper else None}
+        | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None}
         for row, m in zip(rows, made, strict=True)
     ]
 
@@ -74,29 +74,29 @@ def _by_setting(made: list[Made], splits: list[str]) -> dict[str, dict[str, int]
 
 
 def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
-    """Return the first task that is told in words, of the shortest setting there is."""
+    """Return the first semantic task of the shortest setting there is."""
     for scene in scenes:
         for subset in ("train", "test"):
             tasks = store.read_scene(root, f"tasks/{subset}", scene)
-            told: list[dict[str, Any]] = (
+            examples: list[dict[str, Any]] = (
                 tasks.filter(pc.equal(tasks.column("modality"), "semantic")).slice(0, 1).to_pylist()
             )
-            if told:
-                return told[0]
+            if examples:
+                return examples[0]
     return None
 
 
 def _of_paper(made: Made) -> bool:
     """Whether a scene has the paper's numbers of everything."""
-    paper = made.paper
-    return paper is not None and (
-        (made.landmarks, made.objects) == (paper.landmarks, paper.objects)
-        and all(made.of(setting) == paper.tasks[setting] for setting in schemas.SETTINGS)
+    paper_scene = made.paper_scene
+    return paper_scene is not None and (
+        (made.landmarks, made.objects) == (paper_scene.landmarks, paper_scene.objects)
+        and all(made.of(setting) == paper_scene.tasks[setting] for setting in schemas.SETTINGS)
     )
 
 
 def _difficulty(tasks: pd.DataFrame) -> dict[str, str]:
-    """Tables of difficulty and splits as Markdown, without their headings; none where the release does not tell."""
+    """Tables of difficulty and splits as Markdown, without their headings; none where the release lacks them."""
     made = dict(zip(("setting", "scene", "seen", "held_out"), difficulty_tables(tasks), strict=False))
     return {name: _rows(table) for name, table in made.items()} if "held_out" in made else {}
 
@@ -149,7 +149,7 @@ def render_card(data: Where) -> str:
         made_by=sorted({maker.name for maker in known.values()} - {""}),
         prefers_harder=any(maker.prefer_harder for maker in known.values()),
         tables_of=_difficulty(tasks),
-        worth={table.title: _rows(table) for table in worth_tables(read_goals(root, names), tasks)},
+        worth={table.title: _rows(table) for table in goal_tables(read_goals(root, names), tasks)},
         variety=_rows(variety_table(measured)) if (measured := read_variety(root, names)) else "",
         least_detour=float(np.min(tasks["plan_detour"].to_numpy())) if len(tasks) else None,
         most_visible=float(np.max(tasks["target_visible_at_start"].to_numpy())) if len(tasks) else None,

@@ -60,7 +60,7 @@ def part_name(name: str, scene: str, folder: str = FOLDER) -> str:
     return f"{folder}/{shard_name(name, scene).partition('/')[2]}".lstrip("/")
 
 
-def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
+def existing_parts(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
     """List what a release holds: the scenes, by name, that each of `SHARDS` has a part of."""
     root = open_root(where)
     found: dict[str, list[str]] = {}
@@ -71,23 +71,23 @@ def parts_there(where: Where, folder: str = FOLDER) -> dict[str, list[str]]:
     return found
 
 
-def files_there(where: Where) -> list[str]:
+def existing_files(where: Where) -> list[str]:
     """List what `TABLES` of a release are made of: names of files, relative to the data root."""
-    return [part_name(name, scene) for name, scenes in parts_there(where).items() for scene in scenes]
+    return [part_name(name, scene) for name, scenes in existing_parts(where).items() for scene in scenes]
 
 
-def scenes_there(where: Where, folder: str = FOLDER) -> list[str]:
+def existing_scenes(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes that any table of a release has a part of, by name; none if there is no release.
 
     A scene that lacks a part is listed too, so that reading it raises an error.
     """
-    return sorted(set().union(*parts_there(where, folder).values()))
+    return sorted(set().union(*existing_parts(where, folder).values()))
 
 
 def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
     """Remove the parts of all other scenes from the release; returns the names of those removed."""
     root = open_root(where)
-    gone = [scene for scene in scenes_there(root) if scene not in scenes]
+    gone = [scene for scene in existing_scenes(root) if scene not in scenes]
     for scene in gone:
         for name in SHARDS:
             root.delete(part_name(name, scene))
@@ -97,7 +97,7 @@ def prune_release(where: Where, scenes: Sequence[str]) -> list[str]:
 def release_scenes(where: Where, folder: str = FOLDER) -> list[str]:
     """List the scenes of a release, by name; one that lacks a part is listed too."""
     root = open_root(where)
-    scenes = scenes_there(root, folder)
+    scenes = existing_scenes(root, folder)
     if not scenes:
         raise no_release(root, folder)
     return scenes
@@ -113,18 +113,18 @@ def no_release(where: Where, folder: str = FOLDER) -> StoreError:
     root = open_root(where)
     place = root.url if folder in ("", FOLDER) else root.at(folder)
     return StoreError(
-        f"there is no release in {place}: {_lack(root, folder)}; "
-        f"name its folder with --data, or make one with {_making()}"
+        f"there is no release in {place}: {_missing_part(root, folder)}; "
+        f"name its folder with --data, or make one with {_make_command()}"
     )
 
 
-def _making() -> str:
+def _make_command() -> str:
     """Return the command that makes the dataset; a wheel has no Makefile."""
     here = (Path(__file__).resolve().parents[2] / "Makefile").is_file()
     return "make dataset" if here else f"{current_context().program} run aerialdojo-200k"
 
 
-def _lack(root: DataRoot, folder: str) -> str:
+def _missing_part(root: DataRoot, folder: str) -> str:
     if isinstance(root, LocalRoot):
         at = root.path if folder == FOLDER else root.path / folder
         if not at.exists():
@@ -144,7 +144,7 @@ def _lack(root: DataRoot, folder: str) -> str:
 def check_release(where: Where, scenes: list[str] | None = None) -> list[str]:
     """Check from the footers that the release's parts are there, whole and of one run."""
     root = open_root(where)
-    there = parts_there(root)
+    there = existing_parts(root)
     known = sorted(set().union(*there.values())) if scenes is None else scenes
     if not known:
         raise no_release(root)

@@ -19,7 +19,7 @@ _MOVES = [tuple(row) for row in DISPLACEMENTS.tolist()]
 _TURNS = TURNS.tolist()
 
 # Least SPL of a reference that is flown exactly; the Approach is not flown.
-LEAST_SPL = 0.99
+MIN_SPL = 0.99
 
 
 class Episode:
@@ -130,7 +130,7 @@ def fly(space: FlightSpace, reference: Reference) -> Episode:
     return episode
 
 
-def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
+def spl_fault(episode: Episode, length_m: float, radius_m: float) -> str:
     """Say why a flown reference is no success (SR, OSR, CR, SPL); empty where it is one. Lengths in metres."""
     if episode.termination == "collision":
         x, y, z = episode.position
@@ -144,4 +144,4 @@ def shortcoming(episode: Episode, length_m: float, radius_m: float) -> str:
         return f"a Stop {episode.distance_m:.3f} m from the goal"
     # A length of 0 asks for none.
     spl = length_m / max(length_m, episode.path_length_m) if length_m else 1.0
-    return "" if spl >= LEAST_SPL else f"{episode.path_length_m:.3f} m flown, {length_m:.3f} m told: SPL {spl:.3f}"
+    return "" if spl >= MIN_SPL else f"{episode.path_length_m:.3f} m flown, {length_m:.3f} m told: SPL {spl:.3f}"

@@ -1,4 +1,4 @@
-"""Look into a release: one scene of it with its mesh, one task of it by its id."""
+"""Access to a release: a scene with its mesh, a task by its id."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class ReleasedScene:
 
 
 @dataclass(frozen=True)
-class FoundTask:
+class TaskRecord:
     """What an id stands for."""
 
     scene: ReleasedScene
@@ -151,7 +151,7 @@ class FoundTask:
         }  # fmt: skip
 
 
-def find_task(data: Where, task_id: str) -> FoundTask:
+def find_task(data: Where, task_id: str) -> TaskRecord:
     """Find a task by its ``task_id`` or ``nav_id``; UsageError, which names the nearest, if there is none."""
     root = open_root(data)
     known = release_scenes(root)
@@ -176,4 +176,4 @@ def find_task(data: Where, task_id: str) -> FoundTask:
             f"release/tasks has no instance of {nav_id}, which release/routes has: "
             f"run {command('split', scene=scene.name)}"
         )
-    return FoundTask(scene, nav_id, scene.route(nav_id), instances)
+    return TaskRecord(scene, nav_id, scene.route(nav_id), instances)

@@ -19,7 +19,7 @@ from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import read_json
-from aerialdojo_gen.dataset.contents import FOLDER, release_scenes, scenes_there
+from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes, release_scenes
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.layout import partition
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -146,4 +146,4 @@ def _well_formed(own: object) -> bool:
 def sample_shortfall(data: Where) -> str:
     """Say in one line what the paper's sample has that a release does not; empty if it has all of it."""
     root: DataRoot = open_root(data)
-    return read_sample(root).shortfall(scenes_there(root))
+    return read_sample(root).shortfall(existing_scenes(root))

@@ -12,7 +12,7 @@ from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import FOLDER, scenes_there
+from aerialdojo_gen.dataset.contents import FOLDER, existing_scenes
 from aerialdojo_gen.dataset.stats.tables import Made, in_paper_order, made_of
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
@@ -21,7 +21,7 @@ _RECORD = "pipeline.json"
 RECORD = f"{FOLDER}/{_RECORD}"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 # What does not change the release: folders of this machine, which scenes and stages are asked for, recordings.
-_BESIDE = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "annotations"}
+_IRRELEVANT = {"name", "scenes", "stages", "render", "scene_assets", "recipes", "annotations"}
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Maker:
 
 def maker_of(pipeline: Pipeline) -> Maker:
     """Return a release's record of a pipeline."""
-    settings = pipeline.model_dump(mode="json", exclude=_BESIDE)
+    settings = pipeline.model_dump(mode="json", exclude=_IRRELEVANT)
     settings["anchor_sample"].pop("clip")  # where the model's files lie
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
     return Maker(pipeline.name, digest, pipeline.split.paper_counts, pipeline.split.prefer_harder)
@@ -73,7 +73,7 @@ def makers(data: Where) -> dict[str, Maker]:
             known |= dict.fromkeys(entry["scenes"], maker)
     except (ValueError, KeyError, TypeError):
         known = {}  # damaged: as if nothing were known, which is the cautious side
-    return {scene: known.get(scene, Maker()) for scene in scenes_there(root)}
+    return {scene: known.get(scene, Maker()) for scene in existing_scenes(root)}
 
 
 def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
@@ -81,7 +81,7 @@ def made_of_scenes(data: Where, scenes: Sequence[str]) -> list[Made]:
     root = open_root(data)
     follow = {scene for scene, maker in makers(root).items() if maker.paper_counts}
     found = (made_of(root, scene) for scene in scenes)
-    return in_paper_order([made if made.scene in follow else replace(made, paper=None) for made in found])
+    return in_paper_order([made if made.scene in follow else replace(made, paper_scene=None) for made in found])
 
 
 def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.contents import scenes_in_release
-from aerialdojo_gen.dataset.lookup import SIDES, FoundTask, ReleasedScene, find_task, read_side
+from aerialdojo_gen.dataset.lookup import SIDES, ReleasedScene, TaskRecord, find_task, read_side
 from aerialdojo_gen.rendering.reader import Recording, read_recording
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store import shards as store
@@ -24,7 +24,7 @@ from aerialdojo_gen.store.schemas import SUBSETS
 TABLES = ("tasks", "routes", "objects", "landmarks", "anchors", "viewpoints", "scenes")
 _SPLIT = ("tasks", "routes")
 # Each keeps its mesh once that is read, 10 to 100 MB.
-_MOST_SCENES = 4
+_MAX_SCENES = 4
 
 
 class Release:
@@ -49,7 +49,7 @@ class Release:
     def __init__(self, data: str | Path | DataRoot) -> None:
         self._data = open_root(data)
         self.scenes = scenes_in_release(self._data)
-        self._scene = lru_cache(maxsize=_MOST_SCENES)(lambda name: ReleasedScene(self._data, name))
+        self._scene = lru_cache(maxsize=_MAX_SCENES)(lambda name: ReleasedScene(self._data, name))
 
     def __repr__(self) -> str:
         return f"<release in {self._data}, {len(self.scenes)} scenes>"
@@ -138,7 +138,7 @@ class Release:
         """Read the anchors."""
         return self.table("anchors", scene=scene)
 
-    def task(self, task_id: str) -> FoundTask:
+    def task(self, task_id: str) -> TaskRecord:
         """Find a task by its ``task_id`` or ``nav_id``; UsageError if there is none, with the nearest."""
         return find_task(self._data, task_id)
 

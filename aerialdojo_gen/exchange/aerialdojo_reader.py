@@ -68,7 +68,7 @@ class Reader:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", episode):
             raise BadField("episode_id", f"{shown(episode)} cannot name a file")
         if (context.label, episode) in self._met:
-            raise BadField("episode_id", f"{episode} stands twice in the file")
+            raise BadField("episode_id", f"{episode} appears twice in the file")
         scene = record.text("map_name", empty=False)
         try:
             family, scene_type, by_name = parse_name(scene)
@@ -168,7 +168,7 @@ class Reader:
             name = own
         if name is None or name in self._nav_ids:
             if name is not None:
-                context.notes["task_id stands twice in the scene: named by partition and episode"] += 1
+                context.notes["task_id appears twice in the scene: named by partition and episode"] += 1
             name = f"{task.scene}-{digest(*(partition.path.parts if partition else [context.label]), task.source_id)}"
         self._nav_ids.add(name)
         return met | {"nav_id": name}

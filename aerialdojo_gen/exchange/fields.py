@@ -170,7 +170,7 @@ def rows_of(rows: Sequence[Any], width: int, where: Callable[[int], str]) -> Flo
         if len(row) != width:
             raise BadField(where(i), f"expected {width} numbers, found {len(row)}")
         _numbers(row, where(i))
-    raise AssertionError("every row is well, and yet not all of them")
+    raise AssertionError("rows are valid one by one, but not together")
 
 
 def positions_of(rows: Sequence[Any], where: Callable[[int], str]) -> Floats:

@@ -41,9 +41,9 @@ def check_target(target: Path, marker: str, *, force: bool) -> None:
     except OSError as error:
         raise disk_error(error, target) from None
     if taken and not ours:
-        raise UsageError(f"{target} is there already and holds no {marker}: name another folder")
+        raise UsageError(f"{target} exists and holds no {marker}: name another folder")
     if taken and not force:
-        raise UsageError(f"{target} is there already: --force replaces it")
+        raise UsageError(f"{target} exists: --force replaces it")
 
 
 @contextlib.contextmanager
@@ -55,9 +55,9 @@ def whole_folder_below(root: DataRoot, relative: str, marker: str, *, force: boo
         return
     if root.exists(relative):
         if not root.exists(f"{relative}/{marker}"):
-            raise UsageError(f"{root.at(relative)} is there already and holds no {marker}: name another folder")
+            raise UsageError(f"{root.at(relative)} exists and holds no {marker}: name another folder")
         if not force:
-            raise UsageError(f"{root.at(relative)} is there already: --force replaces it")
+            raise UsageError(f"{root.at(relative)} exists: --force replaces it")
     with root.commit_folder(relative) as temporary:
         yield temporary
 
@@ -78,7 +78,7 @@ def inside(root: Path, relative: str) -> Path:
     except (OSError, RuntimeError) as error:
         raise ValueError(f"{relative!r} cannot be followed ({error})") from None
     if ".." in name.parts or not resolved.is_relative_to(root.resolve()):
-        raise ValueError(f"{relative!r} leads out of {root}")
+        raise ValueError(f"{relative!r} points outside {root}")
     return path
 
 
@@ -111,7 +111,7 @@ class PartialExport:
         self.resumed = False
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
+    def locked(self) -> Iterator[None]:
         """Lock the folder against other writers."""
         make_folder(self.folder)
         with (self.folder / _LOCK).open("a") as lock:

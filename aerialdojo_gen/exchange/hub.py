@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, part_name, scenes_there
+from aerialdojo_gen.dataset.contents import FOLDER, SHARDS, check_release, existing_scenes, part_name
 from aerialdojo_gen.exchange.hub_client import Hub, check_revision
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
@@ -20,7 +20,7 @@ from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 # What stands beside the tables; the dataset card is what the Hub shows of a data set.
-_BESIDE = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
+_COMPANIONS = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
 _AT_ONCE = 8
 _CHUNK = 1 << 20
 
@@ -75,7 +75,7 @@ def push_to_hub(
     policies : sequence of str
         Names of trainings whose last weights are sent too, such as ``imitation``.
     reporter : Reporter, optional
-        Is told what is done.
+        Reports what is done.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def push_to_hub(
     hub = Hub(repo, "push-to-hub", writes=True)
     from huggingface_hub import CommitOperationAdd, CommitOperationDelete
 
-    own = [*_BESIDE, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
+    own = [*_COMPANIONS, *(part_name(key, scene, "") for key in SHARDS for scene in scenes)]
     files = {name: root.path / FOLDER / name for name in own if (root.path / FOLDER / name).is_file()}
     if meshes:
         files |= {f"meshes/{scene}.glb": _mesh(root, scene) for scene in scenes}
@@ -166,35 +166,35 @@ def pull_release(
     check_revision(revision)
     if root.path.exists() and not root.path.is_dir():
         raise StoreError(f"{root.path} is no folder: name another with --data")
-    if scenes_there(root) and not replace:
+    if existing_scenes(root) and not replace:
         raise UsageError(f"there is a release in {root.url}: name another folder with --data, or add --replace")
     reporter = reporter or Reporter(quiet=True)
     hub = Hub(repo, "pull")
     with hub.explain_errors("read"):
         info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
     commit = str(info.sha)
-    wanted = {
+    chosen = {
         s.rfilename: s for s in info.siblings if _is_ours(s.rfilename) and (meshes or not _is_mesh(s.rfilename))
     }
     left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
-    scenes = {scene for name in wanted if (scene := scene_of(name)) and not _is_mesh(name)}
+    scenes = {scene for name in chosen if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
     if not replace:
-        _keep_own(root, {name: sibling for name, sibling in wanted.items() if _is_beside(name)}, repo)
+        _check_replaced(root, {name: sibling for name, sibling in chosen.items() if _is_companion(name)}, repo)
     # Laid out as a data directory, so that what is asked of one can be asked of it.
     partial = root.path / f".pull-{repo.replace('/', '--')}"
     make_folder(partial / FOLDER)
-    places = {_place(partial, name) for name in wanted}
+    places = {_place(partial, name) for name in chosen}
     # What a call for another revision has left is no part of this one.
     for path in partial.rglob("part-*.parquet"):
         if path not in places:
             path.unlink()
-    _fetch(hub, commit, list(wanted.values()), partial, reporter)
-    size = sum(_place(partial, name).stat().st_size for name in wanted)
-    _check(open_root(partial), {name for name in wanted if _is_mesh(name)})
-    _settle(root, partial, sorted(wanted))
-    return Moved(str(root.path / FOLDER), commit, len(scenes), len(wanted), size, sum(map(_is_mesh, wanted)), left)
+    _fetch(hub, commit, list(chosen.values()), partial, reporter)
+    size = sum(_place(partial, name).stat().st_size for name in chosen)
+    _check(open_root(partial), {name for name in chosen if _is_mesh(name)})
+    _move_into_place(root, partial, sorted(chosen))
+    return Moved(str(root.path / FOLDER), commit, len(scenes), len(chosen), size, sum(map(_is_mesh, chosen)), left)
 
 
 def scene_of(name: str) -> str:
@@ -207,7 +207,7 @@ def scene_of(name: str) -> str:
 
 
 def _is_ours(name: str) -> bool:
-    return name in _BESIDE or _is_policy(name) or bool(scene_of(name))
+    return name in _COMPANIONS or _is_policy(name) or bool(scene_of(name))
 
 
 def _is_mesh(name: str) -> bool:
@@ -223,7 +223,7 @@ def _is_policy(name: str) -> bool:
     return is_plain(training) and name == _policy_file(training)
 
 
-def _is_beside(name: str) -> bool:
+def _is_companion(name: str) -> bool:
     """Whether a file lies beside the release in a data directory, and not in it."""
     return _is_mesh(name) or _is_policy(name)
 
@@ -244,10 +244,10 @@ def _weights(root: LocalRoot, name: str) -> Path:
     return path
 
 
-def _keep_own(root: LocalRoot, wanted: Mapping[str, Any], repo: str) -> None:
+def _check_replaced(root: LocalRoot, chosen: Mapping[str, Any], repo: str) -> None:
     """Refuse to take the place of other meshes or weights: without a release they may be all that somebody has."""
-    others = [name for name in sorted(wanted) if (root.path / name).is_file()]
-    others = [name for name in others if not _is_as_told(root.path / name, wanted[name])]
+    others = [name for name in sorted(chosen) if (root.path / name).is_file()]
+    others = [name for name in others if not _matches_server(root.path / name, chosen[name])]
     if others:
         more = f" and {len(others) - 1} more" if others[1:] else ""
         raise UsageError(
@@ -261,13 +261,15 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
 
     def one(sibling: Any) -> None:
         path = _place(folder, sibling.rfilename)
-        if path.is_file() and _is_as_told(path, sibling):
+        if path.is_file() and _matches_server(path, sibling):
             return
         below = path.parents[len(PurePosixPath(sibling.rfilename).parts) - 1]
         hub.api.hf_hub_download(hub.repo, sibling.rfilename, repo_type="dataset", revision=commit, local_dir=below)
-        if not _is_as_told(path, sibling):
+        if not _matches_server(path, sibling):
             path.unlink(missing_ok=True)
-            raise StoreError(f"{sibling.rfilename} of {hub.repo} came damaged: the same command fetches it again")
+            raise StoreError(
+                f"{sibling.rfilename} of {hub.repo} was damaged in transfer: the same command fetches it again"
+            )
 
     with reporter.bar("pull", len(files), "files") as bar, hub.explain_errors("read"):
         pool = ThreadPoolExecutor(_AT_ONCE)
@@ -279,24 +281,24 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
             pool.shutdown(cancel_futures=True)
 
 
-def _is_as_told(path: Path, sibling: Any) -> bool:
+def _matches_server(path: Path, sibling: Any) -> bool:
     """Whether a file has the size and the digest that the server has: SHA-256 of a large one, else git's own."""
     size = path.stat().st_size
     if sibling.size is not None and size != sibling.size:
         return False
     if sibling.lfs is not None:
-        told, digest = sibling.lfs.sha256, hashlib.sha256()
+        expected, digest = sibling.lfs.sha256, hashlib.sha256()
     else:
-        told, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
+        expected, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK):
             digest.update(chunk)
-    return told is not None and digest.hexdigest() == told
+    return expected is not None and digest.hexdigest() == expected
 
 
 def _place(folder: Path, name: str) -> Path:
     """Return where a file of a data set lies in a data directory: meshes and weights beside the release."""
-    return folder / name if _is_beside(name) else folder / FOLDER / name
+    return folder / name if _is_companion(name) else folder / FOLDER / name
 
 
 def _check(root: DataRoot, meshes: Collection[str]) -> None:
@@ -310,14 +312,14 @@ def _check(root: DataRoot, meshes: Collection[str]) -> None:
             raise StoreError(f"{root.at(name)} is not the mesh that the release was made from: pull --no-meshes")
 
 
-def _settle(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
+def _move_into_place(root: LocalRoot, partial: Path, names: Sequence[str]) -> None:
     """Give the fetched files their places: the release in one step, what lies beside it before."""
-    for name in filter(_is_beside, names):
+    for name in filter(_is_companion, names):
         with root.commit(name) as temporary:
             _place(partial, name).replace(temporary)
     with root.lock(), atomic_folder(root.path / FOLDER) as folder:
         for name in names:
-            if not _is_beside(name):
+            if not _is_companion(name):
                 make_folder((folder / name).parent)
                 _place(partial, name).replace(folder / name)
     shutil.rmtree(partial, ignore_errors=True)

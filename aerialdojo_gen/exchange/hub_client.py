@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
-from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, brief, first_line, no_package
 from aerialdojo_gen.base.secrets import Secrets
 
 TOKEN, ENDPOINT, USUAL = "HF_TOKEN", "HF_ENDPOINT", "https://huggingface.co"
@@ -45,7 +45,7 @@ class Hub:
             import huggingface_hub
             from huggingface_hub.utils import disable_progress_bars  # type: ignore[attr-defined]
         except ImportError:
-            raise MissingPackage(lacks(verb, "huggingface_hub", "hub")) from None
+            raise MissingPackage(no_package(verb, "huggingface_hub", "hub")) from None
         disable_progress_bars()
         self.api: Any = huggingface_hub.HfApi(endpoint=self.endpoint, token=self.token, library_name="aerialdojo-gen")
 

@@ -25,7 +25,7 @@ from aerialdojo_gen.exchange.task import Context, Task, digest, route_row, task_
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.store.root import Where, open_root
 
-_MOST_NAMED = 1000
+_MAX_NAMED = 1000
 _FAR_M = 3.0
 
 
@@ -51,14 +51,14 @@ class Report:
         line = f"{label}: row {row}: {error.field}: {error.why}"
         self.n_bad += 1
         self.bad_fields[error.field.split("[")[0]] += 1
-        if len(self.bad) < _MOST_NAMED:
+        if len(self.bad) < _MAX_NAMED:
             self.bad.append(line)
         return line
 
     def left(self, names: Iterable[str]) -> None:
         """Count the fields of a record that found no place."""
         for name in names:
-            known = name in self.unmapped or len(self.unmapped) < _MOST_NAMED
+            known = name in self.unmapped or len(self.unmapped) < _MAX_NAMED
             self.unmapped[name if known else "(others)"] += 1
 
     def replayed(self, error_m: float | None) -> None:
@@ -330,7 +330,7 @@ def _check(task: Task, seen: set[str]) -> None:
     except StoreError as error:
         raise BadField("scene", str(error)) from None
     if task.source_id in seen:
-        raise BadField("id", f"{brief(task.source_id, 60)} stands twice in the file")
+        raise BadField("id", f"{brief(task.source_id, 60)} appears twice in the file")
     seen.add(task.source_id)
 
 

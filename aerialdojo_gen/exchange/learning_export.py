@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -14,9 +13,7 @@ from typing import Any
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import renderer_name
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
+from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
 from aerialdojo_gen.exchange.folder import PartialExport, check_target, part_folder, whole_folder, write_json
@@ -72,36 +69,6 @@ class Estimate:
         )
 
 
-def export_options(
-    *,
-    split: Sequence[str] = (),
-    setting: Sequence[str] = (),
-    scene: Sequence[str] = (),
-    limit: int = 0,
-    seed: int = 0,
-    views: Sequence[str] = ("front",),
-    size: int | tuple[int, int] = 128,
-    rgb: bool = True,
-    depth: bool = True,
-    goal: Sequence[str] = ("text",),
-    source: str = "render",
-    renderer: str = "auto",
-    jpeg_quality: int = 0,
-    run: Sequence[str] = (),
-) -> ExportOptions:
-    """Say what is to be exported; parameters as for `aerialdojo_gen.learning.Trajectories` and `ExportOptions`."""
-    if limit < 0:
-        raise UsageError(f"a limit is 0, for all, or more, not {limit}")
-    width, height = (size, size) if isinstance(size, int) else size
-    sensors = Sensors(tuple(views), rgb, depth, width, height)
-    name = "" if source == "recordings" else renderer_name(renderer)
-    splits = Selection(tuple(split)).splits  # ``train``, ``test`` and ``all`` written out
-    return ExportOptions(
-        splits, tuple(setting), tuple(scene), limit, seed, sensors, tuple(goal), source, name,
-        jpeg_quality, tuple(run),
-    )  # fmt: skip
-
-
 def export_for_learning(
     format_name: str,
     data: Where,
@@ -114,17 +81,17 @@ def export_for_learning(
 ) -> ExportResult:
     """Write trajectories with what the body sees on them, as a data set for training."""
     writer = _writer(format_name, options)
-    told = reporter or Reporter(quiet=True)
+    progress = reporter or Reporter(quiet=True)
     check_target(out, MARKER, force=force)
     root = open_root(data)
     parts = plan_parts(root, options, writer.frames_a_part(options))
     unfinished = PartialExport(out, _request(format_name, root, options, parts))
-    with unfinished.held():
+    with unfinished.locked():
         left = [part for part in parts if not unfinished.has(part.number)]
         if unfinished.resumed:
-            told.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
+            progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
         jobs = [_Job(format_name, root.url, options, part, unfinished.folder) for part in left]
-        with told.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
+        with progress.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
             for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
                 if isinstance(outcome, AerialDojoError):
                     raise outcome
@@ -206,7 +173,7 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
         "format": format_name,
         "version": __version__,
         "code": code_of(f"aerialdojo_gen.exchange.{format_name}_writer").digest,
-        "wanted": _wanted(options),
+        "wanted": _requested(options),
         "trajectories": [part.index.digest for part in parts],
         "meshes": {} if options.source == "recordings" else {name: mesh_of(root, name)[1] for name in scenes},
         "goals": {name: root.digest(part_name("release/objects", name)) for name in scenes} if shown else {},
@@ -214,7 +181,7 @@ def _request(format_name: str, root: DataRoot, options: ExportOptions, parts: li
     }
 
 
-def _wanted(options: ExportOptions) -> Any:
+def _requested(options: ExportOptions) -> Any:
     return json.loads(json.dumps(dataclasses.asdict(options)))
 
 
@@ -233,7 +200,7 @@ def _marker(
         "frame": FRAME,
         "scenes": sorted({part.scene for part in parts}),
         "counts": counts,
-        "wanted": _wanted(options),
+        "wanted": _requested(options),
         "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
         "lost": LOST,
     }

@@ -102,7 +102,7 @@ def frame_schema() -> pa.Schema:
 def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
     s = options.sensors
     depth = kind == "depth"
-    told: dict[str, Any] = {
+    info: dict[str, Any] = {
         "video.height": s.height,
         "video.width": s.width,
         "video.codec": "hevc" if depth else "h264",
@@ -116,7 +116,7 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
         "has_audio": False,
     }
     if depth:
-        told |= {
+        info |= {
             "video.depth_min": DEPTH_MIN_M,
             "video.depth_max": s.max_depth_m,
             "video.shift": DEPTH_SHIFT_M,
@@ -124,7 +124,7 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
             "depth_unit": "m",
         }
     shape = [s.height, s.width, 1 if depth else 3]
-    return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": told}
+    return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": info}
 
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.benchmark.observations import renderer_name
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image, select
 from aerialdojo_gen.learning.index import Index, read_index
 from aerialdojo_gen.learning.pictures import Frames, RecordedFrames, RenderedFrames, Source
@@ -21,8 +22,9 @@ from aerialdojo_gen.rendering.sample import choose_trajectories
 from aerialdojo_gen.store.root import DataRoot
 
 GOALS = ("text", "image")
-# What a task says in words where its goal is a picture alone: the description would tell what the picture shows.
+# What a task says in words where its goal is a picture alone: the description would say what the picture shows.
 IMAGE_TASK = "Fly to the object that the goal picture shows."
+_SENSORS = Sensors(("front",), width=128, height=128)
 # Pixels of all views that are held at a time.
 _PIXELS = 1 << 22
 
@@ -31,27 +33,31 @@ _PIXELS = 1 << 22
 class ExportOptions:
     """What is exported."""
 
-    splits: tuple[str, ...]  # As in `aerialdojo_gen.benchmark.tasks.Selection`
-    settings: tuple[str, ...]
-    scenes: tuple[str, ...]
-    limit: int  # Trajectories of each scene and each setting, drawn as `render` draws them; 0 for all
-    seed: int  # Of that draw
-    sensors: Sensors  # Views, size, and whether there is depth
-    goal: tuple[str, ...]  # Of `GOALS`
-    source: str  # As for `aerialdojo_gen.learning.trajectories.Trajectories`
-    renderer: str  # Name of what draws; not ``"auto"``, which may be another one in another process
+    splits: tuple[str, ...] = ()  # As in `aerialdojo_gen.benchmark.tasks.Selection`
+    settings: tuple[str, ...] = ()
+    scenes: tuple[str, ...] = ()
+    limit: int = 0  # Trajectories of each scene and each setting, drawn as `render` draws them; 0 for all
+    seed: int = 0  # Of that draw
+    sensors: Sensors = _SENSORS
+    goal: tuple[str, ...] = ("text",)  # Of `GOALS`
+    source: str = "render"  # As for `aerialdojo_gen.learning.trajectories.Trajectories`
+    renderer: str = "auto"  # Resolved here: it may be another one in another process; empty for recordings
     jpeg_quality: int = 0  # Of the pictures in shards, 1 to 100; 0 for PNG
     runs: tuple[str, ...] = ()  # Whose successful flights are exported in place of the references
 
     def __post_init__(self) -> None:
-        """Refuse what there is not."""
+        """Refuse what there is not; write out the splits and the renderer's name."""
+        if self.limit < 0:
+            raise UsageError(f"a limit is 0, for all, or more, not {self.limit}")
+        object.__setattr__(self, "renderer", "" if self.source == "recordings" else renderer_name(self.renderer))
+        object.__setattr__(self, "splits", Selection(self.splits).splits)
         for name in self.goal:
             if name not in GOALS:
                 raise UsageError(unknown("no goal", name, GOALS))
         if self.source not in SOURCES:
             raise UsageError(unknown("no source", self.source, SOURCES))
         if not self.goal:
-            raise UsageError(f"a goal is told by {' or '.join(GOALS)}: name one")
+            raise UsageError(f"a goal is given by {' or '.join(GOALS)}: name one")
         if not self.sensors.views or not (self.sensors.rgb or self.sensors.depth):
             raise UsageError("nothing is seen without a view: name one of front, left, right, down")
         if self.runs and self.source != "render":
@@ -69,7 +75,7 @@ class Part:
     settings: list[str]  # Of every trajectory
     splits: list[str]
     tasks: NDArray[np.int64]  # (n,) int64; number of every trajectory's text
-    texts: list[str]  # What tells its goal in words
+    texts: list[str]  # Its goal in words
     first_episode: int  # How many trajectories and steps all parts before it have
     first_frame: int
 

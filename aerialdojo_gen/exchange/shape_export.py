@@ -24,7 +24,7 @@ from aerialdojo_gen.store.layout import is_plain
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 # About a gigabyte.
-MOST_POINTS = 50_000_000
+MAX_POINTS = 50_000_000
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 POINT = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("instance", "<i4")]
@@ -35,9 +35,9 @@ _PLY = {"<f4": "float", "|u1": "uchar", "<i4": "int"}
 def sample_surface(scene: Scene, points_per_m2: float) -> NDArray[np.void]:
     """Draw `POINT`s (world metres, sRGB) from all surfaces but the backdrop, each instance by a stream of its own."""
     expected = points_per_m2 * float(_areas(*soup(scene.instances)).sum()) if scene.instances else 0.0
-    if expected > MOST_POINTS:
+    if expected > MAX_POINTS:
         raise UsageError(
-            f"{scene.name}: {expected:,.0f} points are more than {MOST_POINTS:,}: choose a smaller --points-per-m2"
+            f"{scene.name}: {expected:,.0f} points are more than {MAX_POINTS:,}: choose a smaller --points-per-m2"
         )
     parts = [_sample(scene, k, points_per_m2) for k in range(len(scene.instances))]
     return np.concatenate([np.empty(0, POINT), *parts])
@@ -105,9 +105,9 @@ def _colours(
 MARKER = "export.json"
 SHAPES = ("pointcloud", "occupancy")
 POINTS_PER_M2, VOXEL_M = 20.0, 0.5
-_LEAST_VOXEL_M, _LARGEST_VOXEL_M = 0.05, 5.0
+_MIN_VOXEL_M, _LARGEST_VOXEL_M = 0.05, 5.0
 # A cell takes up to some 25 bytes while they are computed.
-_MOST_CELLS = 100_000_000
+_MAX_CELLS = 100_000_000
 
 
 def export_shapes(
@@ -126,8 +126,8 @@ def export_shapes(
         raise UsageError(unknown("no format", format_name, SHAPES))
     if not points_per_m2 > 0.0 or not np.isfinite(points_per_m2):
         raise UsageError(f"--points-per-m2 is above 0, not {points_per_m2:g}")
-    if not _LEAST_VOXEL_M <= voxel_m <= _LARGEST_VOXEL_M:
-        raise UsageError(f"--voxel-m is {_LEAST_VOXEL_M:g} to {_LARGEST_VOXEL_M:g} metres, not {voxel_m:g}")
+    if not _MIN_VOXEL_M <= voxel_m <= _LARGEST_VOXEL_M:
+        raise UsageError(f"--voxel-m is {_MIN_VOXEL_M:g} to {_LARGEST_VOXEL_M:g} metres, not {voxel_m:g}")
     root = open_root(data)
     chosen = choose_scenes(scenes, _scenes_with_mesh(root))
     counts: Counter[str] = Counter(scenes=len(chosen))
@@ -184,8 +184,8 @@ def _write_points(scene: Scene, stem: Path, points_per_m2: float) -> dict[str, i
 
 def _write_occupancy(scene: Scene, stem: Path, voxel_m: float) -> dict[str, int]:
     cells = int(np.prod(np.ceil((scene.bounds[1] - scene.bounds[0]) / voxel_m)))
-    if cells > _MOST_CELLS:
-        raise UsageError(f"{scene.name}: {cells:,} voxels are more than {_MOST_CELLS:,}: choose a larger --voxel-m")
+    if cells > _MAX_CELLS:
+        raise UsageError(f"{scene.name}: {cells:,} voxels are more than {_MAX_CELLS:,}: choose a larger --voxel-m")
     grid = Occupancy.of(scene, voxel_m)
     np.savez_compressed(
         stem.with_name(f"{stem.name}.npz"),

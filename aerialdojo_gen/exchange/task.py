@@ -49,7 +49,7 @@ class Task:
     scene: str  # Name of the scene
     start: Floats  # (4,) float64; start pose, world frame
     goal: Floats | None  # (3,) float64 or None; where success is measured from, world frame
-    instances: list[Instance]  # How its goal is told
+    instances: list[Instance]  # How its goal is described
     nav_id: str | None = None  # None: made of the file's name and the id
     object_key: object = None
     object_m: Floats | None = None  # (3,) float64 or None; where the object is, world frame
@@ -60,14 +60,14 @@ class Task:
 
 @dataclass
 class Context:
-    """What a reader is told beside the record."""
+    """What a reader gets beside the record."""
 
     file: Path  # The file
     label: str  # Its name as tables have it
     frame: Frame  # The file's frame
     angles: str  # Unit of angles where the format has both: radians, degrees or mixed
     pictures: Path | None  # Folder below which pictures lie; None: leave them aside
-    notes: Counter[str]  # What is to be told about the file, and of how many records
+    notes: Counter[str]  # Remarks about the file, and of how many records
 
     def start_pose(self, position: Floats, yaw_rad: float) -> Floats:
         """Make a world pose, (4,) float64, of a position and a yaw of the file's frame."""

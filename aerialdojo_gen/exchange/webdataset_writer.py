@@ -39,16 +39,16 @@ def write_part(root: DataRoot, part: Part, options: ExportOptions, folder: Path)
     # The oldest form of the three has neither times of a finer kind nor names of users: the same bytes everywhere.
     with tarfile.open(folder / _FILE, "w", format=tarfile.USTAR_FORMAT) as tar:
         for k in range(len(part.index)):
-            # A release of somebody else's may call a route what leads out of the folder that a tar is unpacked in.
+            # A release of somebody else's may call a route what points outside the folder that a tar is unpacked in.
             if not is_plain(name := str(part.index.nav_id[k])):
                 raise StoreError(
                     f"routes of {part.scene} in {root}: nav_id {brief(repr(name), 60)} cannot name a file"
                 )
-            told = _to_json(labels, part, k, options)
+            rows = _to_json(labels, part, k, options)
             goal = _picture(sample_frames.goal(k), options) if "image" in options.goal else None
             for begin, frames in sample_frames.frames(k):
                 for i in range(len(next(iter(frames.values())))):
-                    step = told[begin + i]
+                    step = rows[begin + i]
                     key = f"{step['nav_id']}-{step['step']:04d}"
                     seen = {name: dict(zip(options.sensors.views, of[i], strict=True)) for name, of in frames.items()}
                     for view, rgb in seen.get("rgb", {}).items():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import AssetError, lacks
+from aerialdojo_gen.base.errors import AssetError, no_package
 from aerialdojo_gen.imports.pictures import TEXTURE_PX, SourceMaterial, decode_surfaces
 from aerialdojo_gen.imports.raw import GREY, RawNode, empty_corners, merge_nodes
 
@@ -21,7 +21,7 @@ def read_assimp(path: Path, resolve: Callable[[str], bytes], texture_px: int = T
         assimp: Any = importlib.import_module("assimp_py")
     except ImportError:
         who = path.suffix[1:].upper()
-        raise AssetError(f"{lacks(who, 'assimp_py', 'formats')}, or export the mesh as GLB") from None
+        raise AssetError(f"{no_package(who, 'assimp_py', 'formats')}, or export the mesh as GLB") from None
     try:
         scene = assimp.import_file(str(path), assimp.Process_Triangulate | assimp.Process_SortByPType)
     except (RuntimeError, ValueError, OSError) as error:

@@ -66,7 +66,7 @@ def add_tiles(
         # Build all tiles before writing any, so that a failure leaves nothing behind.
         tiles = list(make_tiles(name, source, edge_m, options))
         if not tiles:
-            raise AssetError(f"--tiles {edge_m:g}: no tile of the mesh holds more than scraps")
+            raise AssetError(f"--tiles {edge_m:g}: every tile of the mesh is nearly empty")
     check_free([tile.name for tile in tiles], project, force)
     source_digest, out = _file_digest(mesh), []
     for tile in tiles:

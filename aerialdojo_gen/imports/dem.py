@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, no_package
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
 from aerialdojo_gen.scenes.height_table import read_ascii_grid
 
@@ -92,7 +92,7 @@ def _geotiff(path: Path) -> Dem:
         rasterio = importlib.import_module("rasterio")
         warp = importlib.import_module("rasterio.warp")
     except ImportError:
-        raise MissingPackage(lacks(f"{path}, a GeoTIFF,", "rasterio", "maps")) from None
+        raise MissingPackage(no_package(f"{path}, a GeoTIFF,", "rasterio", "maps")) from None
     try:
         # GTiff driver only: other drivers follow references to files and URLs.
         with rasterio.open(path, driver="GTiff") as file:

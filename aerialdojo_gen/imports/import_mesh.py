@@ -353,9 +353,9 @@ def _make_instances(
         # A thing without a name has its form for a category, and no number of its own.
         stem = category if name.category or category not in FORMS else UNKNOWN
         k = counts[stem] = counts.get(stem, -1) + 1
-        look = {"size": word, **name.attributes, "colour": colour}
-        look = {key: value for key, value in look.items() if value}
-        out.append(Instance(f"{stem}_{k:04d}", category, "", look, parts))
+        attributes = {"size": word, **name.attributes, "colour": colour}
+        attributes = {key: value for key, value in attributes.items() if value}
+        out.append(Instance(f"{stem}_{k:04d}", category, "", attributes, parts))
     return out
 
 

@@ -28,7 +28,7 @@ _SHOWN = 12
 
 
 @dataclass(frozen=True)
-class Guess:
+class FileAxes:
     """Axis and units that a file's shape suggests."""
 
     up: str  # The axis along which more surface is level
@@ -36,7 +36,7 @@ class Guess:
     units: tuple[tuple[float, str], ...]  # tuple of (float, str)
 
 
-def guess(nodes: Sequence[RawNode]) -> Guess:
+def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
     """Guess the up axis and the unit of a mesh."""
     level = np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -64,45 +64,45 @@ def guess(nodes: Sequence[RawNode]) -> Guess:
         for scale, unit in _UNITS
         if _WIDE_M[0] <= wide * scale <= _WIDE_M[1] and _HIGH_M[0] <= tall * scale <= _HIGH_M[1]
     )
-    return Guess(up, sure, fit or _UNITS[:1])
+    return FileAxes(up, sure, fit or _UNITS[:1])
 
 
-def _guess_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming) -> Guess:
+def _infer_within_domes(nodes: Sequence[RawNode], scale: float | None, naming: Naming) -> FileAxes:
     """Guess without sky domes, whose shape hides axis and scale."""
-    guessed = guess(nodes)
-    for up in (guessed.up, "z" if guessed.up == "y" else "y"):
-        taken = scale or guessed.units[0][0]
+    inferred = infer_axes(nodes)
+    for up in (inferred.up, "z" if inferred.up == "y" else "y"):
+        taken = scale or inferred.units[0][0]
         source = SourceMesh.of(nodes, MeshOptions(up, taken, naming=naming))
         if source.domes:
             # Convert back to the file's axes and unit.
             v = [b.vertices / taken for b in source.bodies]
             own = [x if up == "z" else np.column_stack([x[:, 0], x[:, 2], -x[:, 1]]) for x in v]
-            return guess([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
-    return guessed
+            return infer_axes([b.with_vertices(x) for b, x in zip(source.bodies, own, strict=True)])
+    return inferred
 
 
 def describe_mesh(
     nodes: Sequence[RawNode], up: str | None, scale: float | None, naming: Naming, width: int | None
 ) -> list[str]:
     """Describe the content of a file, in lines for a terminal."""
-    guessed = _guess_within_domes(nodes, scale, naming)
-    taken_up, taken_scale = up or guessed.up, scale or guessed.units[0][0]
+    inferred = _infer_within_domes(nodes, scale, naming)
+    taken_up, taken_scale = up or inferred.up, scale or inferred.units[0][0]
     source = SourceMesh.of(nodes, MeshOptions(taken_up, taken_scale, naming=naming))
     triangles = sum(len(b.faces) for b in (*source.bodies, *source.domes))
     bodies = [(b, *connected_bodies(b.faces, len(b.vertices))) for b in source.bodies]
     pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)
     colours = len(np.unique(np.concatenate([b.colours for b in source.bodies]) // 16, axis=0))
     low, high = source.low, source.high
-    sure = "" if guessed.up_sure else ", not by much: look at it in a viewer"
+    sure = "" if inferred.up_sure else ", not by much: look at it in a viewer"
     lines = [
         f"{len(nodes):,} node{'s' * (len(nodes) != 1)} with {triangles:,} triangle{'s' * (triangles != 1)} in "
         f"{pieces:,} connected piece{'s' * (pieces != 1)}, {colours:,} colour{'s' * (colours != 1)}",
-        f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {guessed.up} is the guess)",
-        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {guessed.units[0][1]}'}: "
+        f"up: {taken_up} {'as given' if up else f'by its form{sure}'} (--up {inferred.up} is the guess)",
+        f"scale: {taken_scale:g} {'as given' if scale else f'if its unit is {inferred.units[0][1]}'}: "
         f"{size_text(high - low)} (x, y, z)",
         *(
             f"   or: {other:g} if its unit is {unit}: {size_text((high - low) * other / taken_scale)}"
-            for other, unit in guessed.units
+            for other, unit in inferred.units
             if other != taken_scale
         ),
         f"there: {describe_extent(source.bodies)}",

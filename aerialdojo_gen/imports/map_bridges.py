@@ -35,7 +35,7 @@ _GRADE = {"rail": (0.03, 0.08), "road": (0.06, 0.14), "path": (0.1, 0.2)}
 _MAX_OFFSET_M, _ALONG = 14.0, math.cos(math.radians(30.0))
 _MAX_RAMP_M = 120.0
 _STATION_M, _ROUND_M = 2.0, 8.0
-_LEAST_M = 4.0
+_MIN_M = 4.0
 
 Ground = Callable[[float, float], float]
 At = tuple[float, float]
@@ -80,7 +80,7 @@ def bridges(
     net = _RoadNetwork(ways)
     out: list[Bridge] = []
     on: dict[int, list[Feature]] = {}
-    clusters = _clusters([f for f in ways if _is_bridge(f.tags) and f.shape.length >= _LEAST_M])
+    clusters = _clusters([f for f in ways if _is_bridge(f.tags) and f.shape.length >= _MIN_M])
     for members in clusters:
         if not any(f.shape.intersects(site) for f in members):
             continue

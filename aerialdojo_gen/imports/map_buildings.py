@@ -23,13 +23,13 @@ from aerialdojo_gen.scenes.materials import parse_colour
 
 STOREY_M = 3.2
 _ROOF_LEVEL_M = 2.4
-_LEAST_M2, _LEAST_WIDTH_M = 6.0, 1.2
-_LEAST_HOLE_M2 = 1.0
+_MIN_M2, _MIN_WIDTH_M = 6.0, 1.2
+_MIN_HOLE_M2 = 1.0
 # As many as a line of a plan has, or a little less.
-_MOST_POINTS = 900
+_MAX_POINTS = 900
 _LEFT_OUT = "outlines left out: self-intersecting or with too many corners"
 _PITCH = 0.62
-_MOST_RISE_M = 5.0
+_MAX_RISE_M = 5.0
 # If the parts cover more than this share of a building, its outline adds nothing.
 _PARTED = 0.85
 _SHOP_NEAR_M = 2.5
@@ -90,7 +90,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> li
         if not rounded[0].is_valid:
             # GEOS snaps to whole centimetres, so that rounding again changes nothing.
             rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
-        valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MOST_POINTS]
+        valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MAX_POINTS]
         if len(valid) < len(rounded):
             summary.add(_LEFT_OUT, len(rounded) - len(valid))
         out += valid
@@ -107,7 +107,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
     def ring(r: Any) -> list[tuple[float, float]]:
         return [(round(float(x), 2), round(float(y), 2)) for x, y in r.coords]
 
-    return Polygon(ring(plan.exterior), [ring(r) for r in plan.interiors if Polygon(r).area > _LEAST_HOLE_M2])
+    return Polygon(ring(plan.exterior), [ring(r) for r in plan.interiors if Polygon(r).area > _MIN_HOLE_M2])
 
 
 def buildings(
@@ -188,7 +188,7 @@ def _bodies(
 ) -> list[dict[str, Any]]:
     out = []
     for plan in plans_of(shape.intersection(site), 0.12, summary):
-        if plan.area < _LEAST_M2 or plan.buffer(-_LEAST_WIDTH_M / 2).is_empty:
+        if plan.area < _MIN_M2 or plan.buffer(-_MIN_WIDTH_M / 2).is_empty:
             continue
         base, top, roof, rise = _heights(area, plan, usual, None if part else summary)
         out.append({
@@ -218,7 +218,7 @@ def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | Non
         rise = (
             roof_levels * _ROOF_LEVEL_M
             if roof_levels
-            else min(half * (1.0 if form == "dome" else _PITCH), _MOST_RISE_M)
+            else min(half * (1.0 if form == "dome" else _PITCH), _MAX_RISE_M)
         )
     rise = 0.0 if form == "flat" else rise
     base = metres(tags, "min_height", "building:min_height") or STOREY_M * (count(tags, "building:min_level") or 0)

@@ -36,10 +36,10 @@ _SHOPS = ("a_board", "cafe_table", "planter", "clothes_rack", "menu_board", "bic
 _ON_ROOFS = ("air_conditioner", "vent_stack", "satellite_dish", "skylight", "solar_panels")
 # What stands though the map does not say so: shares of what there could be.
 _SHARE_PARKED, _SHARE_DRIVING, _SHARE_FURNITURE = 0.55, 0.35, 0.6
-_FROM_EDGE_M, _LEAST_ROOF_M2 = 1.8, 40.0
+_FROM_EDGE_M, _MIN_ROOF_M2 = 1.8, 40.0
 _LAMPS_M, _FURNITURE_M, _BAY_M, _TRAFFIC_M = 26.0, 9.0, 6.2, 34.0
-_LEAST_LAMPS = 4
-_LEAST_TREES = 3
+_MIN_LAMPS = 4
+_MIN_TREES = 3
 _AROUND = tuple(math.radians(45.0 * k) for k in range(8))
 _ROOTED = frozenset({"urban_tree", "oak_tree", "spruce_tree", "pine_tree", "birch_tree"})
 # One street has one kind of them.
@@ -128,7 +128,7 @@ class Furniture:
         prop = self._site.catalogue[category]
         alike = next(iter(v.name for v in prop.variants), None) if category in _ALIKE else None
         return self._placer.place(
-            category, *pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
+            category, pose, phrase=phrase or (f"on {street}" if street else ""), scale=scale, variant=alike,
             drawn=prop.kind == "vegetation",
         )  # fmt: skip
 
@@ -208,7 +208,7 @@ class Furniture:
                     self._try(_drawn(_PARKED, rng.random()), pose, phrase)
 
     def _lamps(self) -> None:
-        if sum(thing["category"] == "street_lamp" for thing in self._town["things"]) >= _LEAST_LAMPS:
+        if sum(thing["category"] == "street_lamp" for thing in self._town["things"]) >= _MIN_LAMPS:
             return
         for road, line in zip(self._streets.roads, self._streets.lines, strict=True):
             if road.get("pavement_m"):
@@ -233,13 +233,13 @@ class Furniture:
         turn = k
         for body, plan in zip(building["bodies"], plans, strict=True):
             room = plan.buffer(-_FROM_EDGE_M)
-            if building.get("canopy") or body["roof"] != "flat" or room.area < _LEAST_ROOF_M2:
+            if building.get("canopy") or body["roof"] != "flat" or room.area < _MIN_ROOF_M2:
                 continue
             rng = self._site.rng_for("roof", k, round(room.area))
             for pose in poisson_disc(room, 7.0, rng, limit=4):
                 if rng.random() < _SHARE_FURNITURE:
                     self._placer.place(
-                        _ON_ROOFS[turn % len(_ON_ROOFS)], pose.x, pose.y, 90.0 * round(pose.yaw_deg / 90.0),
+                        _ON_ROOFS[turn % len(_ON_ROOFS)], pose._replace(yaw_deg=90.0 * round(pose.yaw_deg / 90.0)),
                         phrase="on the roof", on=round(base + body["top_m"] - PARAPET_M, 3),
                     )  # fmt: skip
                     turn += 1
@@ -261,7 +261,7 @@ class Furniture:
                  if r["kind"] == "path"]  # fmt: skip
         plan = plan.difference(shapely.union_all(paths)) if paths else plan
         mapped = sum(t["category"] in _ROOTED and whole.contains(Point(t["at"])) for t in self._town["things"])
-        if plan.is_empty or (area["grows"] == "park" and mapped >= _LEAST_TREES):
+        if plan.is_empty or (area["grows"] == "park" and mapped >= _MIN_TREES):
             return
         spacing, kinds = {
             "wood": (4.5, ("oak_tree", "birch_tree", "urban_tree", "spruce_tree")),

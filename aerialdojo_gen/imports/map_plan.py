@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_things
+from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_props
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows, plan_of
@@ -124,7 +124,7 @@ def _town(
     window = site.buffer(_BEYOND_M, join_style="mitre")
     points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
     inner = site.buffer(-0.3, join_style="mitre")
-    shops = map_things.shop_points(points, areas)
+    shops = map_props.shop_points(points, areas)
     buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, summary)
     built = shapely.union_all([plan_of(b) for one in buildings for b in one["bodies"]])
     ground = None if table is None else table.terrain()
@@ -133,8 +133,8 @@ def _town(
     )
     town: dict[str, list[Any]] = {
         "rails": map_ground.rails(lines, window),
-        "crossings": map_things.crossings(points, site),
-        "signals": map_things.signals(points, site),
+        "crossings": map_props.crossings(points, site),
+        "signals": map_props.signals(points, site),
         "areas": map_ground.areas(areas, lines, window, summary),
         "roads": map_ground.streets(lines, window, summary),
         "bridges": [
@@ -143,7 +143,7 @@ def _town(
         ],
         "buildings": buildings,
         "barriers": map_ground.barriers(lines, inner),
-        "things": map_things.things(points, lines, areas, inner, built, summary),
+        "things": map_props.props(points, lines, areas, inner, built, summary),
     }
     for key, value in town.items():
         most = _MAX_BUILDINGS if key == "buildings" else _MAX_ITEMS

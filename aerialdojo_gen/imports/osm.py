@@ -17,7 +17,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.environment_errors import is_out_of_memory
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, lacks
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, no_package
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
 from aerialdojo_gen.imports.untrusted import MAX_MEMORY_BYTES, exit_status, read_in_sandbox
 from aerialdojo_gen.store.staging import scratch_folder
@@ -64,7 +64,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     try:
         importlib.import_module("osmium")
     except ImportError:
-        raise MissingPackage(lacks("add-map", "osmium", "maps")) from None
+        raise MissingPackage(no_package("add-map", "osmium", "maps")) from None
     if not path.name.endswith(SUFFIXES):
         raise AssetError(f"{path}: a map is a file {', '.join(SUFFIXES)}")
     try:

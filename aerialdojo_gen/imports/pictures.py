@@ -49,7 +49,7 @@ def decode_surfaces(
     names: dict[str, set[str]] = {}
     for s in made:
         names.setdefault(s.digest, set()).add(s.name)
-    # A picture of several materials is kept once, without a name: it is not told which of them it shows.
+    # A picture of several materials is kept once, without a name: it is unknown which of them it shows.
     made = [s if s.texture is None or len(names[s.digest]) == 1 else replace(s, name="") for s in made]
     surfaces = {(s.digest, s.name): s for s in reversed(made)}
     order = sorted(surfaces)

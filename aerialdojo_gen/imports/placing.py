@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from aerialdojo_gen.scenes.grammar_scatter import Pose
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.site import MAX_NODES, Site
 
@@ -25,18 +26,18 @@ class Placer:
         self._section = section
 
     def place(
-        self, category: str, x: float, y: float, yaw_deg: float, *, phrase: str = "", scale: float = 1.0,
-        on: float | None = None, settle_m: float | None = None, drawn: bool = False, variant: str | None = None,
+        self, category: str, pose: Pose, *, phrase: str = "", scale: float = 1.0, on: float | None = None,
+        settle_m: float | None = None, drawn: bool = False, variant: str | None = None,
     ) -> bool:  # fmt: skip
         """Place a thing where it has room: the variant that is given, a drawn one, or the one used least."""
         # The ground is one too.
         if len(self.site.instances) + 1 >= MAX_NODES:
             self.left_out += 1
             return False
-        x, y, yaw_deg = round(x, 2), round(y, 2), round(yaw_deg % 360.0, 1)
+        x, y, yaw_deg = round(pose.x, 2), round(pose.y, 2), round(pose.yaw_deg % 360.0, 1)
         settle_m = None if on is not None else settle_m or self._settle_m
-        look = DRAWN if drawn and variant is None else variant
-        one = Placement(category, x, y, yaw_deg, look, on, phrase, scale=scale)
+        variant = DRAWN if drawn and variant is None else variant
+        one = Placement(category, x, y, yaw_deg, variant, on, phrase, scale=scale)
         thing = self.site.place(one, "skip", settle_m=settle_m)
         if thing is None:
             return False

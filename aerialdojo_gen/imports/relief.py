@@ -15,7 +15,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.imports.relief_things import place_things
+from aerialdojo_gen.imports.relief_props import place_things
 from aerialdojo_gen.scenes.height_table import heights_text
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -24,9 +24,9 @@ Floats = NDArray[np.float64]
 
 SMALLEST_M, LARGEST_M = 20.0, 1000.0
 # Two triangles per cell: as many as a whole scene of the dataset.
-MOST_CELLS = 40_000
+MAX_CELLS = 40_000
 _FINEST_M = 0.25
-_LEAST_SHARE = 0.5
+_MIN_SHARE = 0.5
 _HEADROOM_M = 25.0
 _SETTLE_M = 0.5
 _ROCK_SLOPE = 0.75
@@ -46,7 +46,7 @@ def grid(
         z = dem.at(x + middle[0], y + middle[1])
         where = f"{size[0]:,.0f} by {size[1]:,.0f} m about ({middle[0]:,.0f}, {middle[1]:,.0f})"
     missing = np.isnan(z)
-    if missing.mean() > 1.0 - _LEAST_SHARE:
+    if missing.mean() > 1.0 - _MIN_SHARE:
         raise UsageError(f"{missing.mean():.0%} of {where} has no height: {describe_coverage(dem)}")
     if missing.any():
         nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
@@ -55,13 +55,13 @@ def grid(
 
 
 def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float) -> float:
-    """Choose the cell size: not finer than the model's, and at most `MOST_CELLS` cells."""
-    least = math.sqrt(size[0] * size[1] / MOST_CELLS)
+    """Choose the cell size: not finer than the model's, and at most `MAX_CELLS` cells."""
+    least = math.sqrt(size[0] * size[1] / MAX_CELLS)
     if cell_m is not None:
         if not (math.isfinite(cell_m) and cell_m >= _FINEST_M) or cell_m < least * 0.999 or cell_m > min(size) / 2:
             raise UsageError(
                 f"--cell {cell_m:g}: {size[0]:,.0f} by {size[1]:,.0f} m take cells of "
-                f"{max(least, _FINEST_M):.2f} m or more ({MOST_CELLS:,} of them at most), "
+                f"{max(least, _FINEST_M):.2f} m or more ({MAX_CELLS:,} of them at most), "
                 f"and of {min(size) / 2:g} m or less"
             )
         return cell_m

@@ -74,13 +74,13 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
             # The name of a file's only node does not name the things in it.
             pieces = [replace(piece, name="") for piece in pieces]
         stats.pieces += len(pieces)
-        grounds, things = [], []
+        ground_bodies, things = [], []
         for piece in pieces:
             if _is_ground_surface(piece, low, high):
                 ground, attached = _ground_and_things(piece)
                 attached = [replace(thing, name="") for thing in attached]
                 stats.attached += len(attached)
-                grounds += [ground] if len(ground.faces) else []
+                ground_bodies += [ground] if len(ground.faces) else []
                 things += attached
             elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and (_materials(piece) > 0).any():
                 parts = _by_material(piece)
@@ -89,8 +89,8 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
             else:
                 things.append(piece)
         gathered = _group_pieces(things)
-        stats.things += len(grounds) + len(gathered)
-        out += [*grounds, *gathered]
+        stats.things += len(ground_bodies) + len(gathered)
+        out += [*ground_bodies, *gathered]
     return out, stats
 
 

@@ -108,7 +108,7 @@ def vary(
 def count(types: Sequence[str], seeds: range) -> int:
     """Count the worlds of some types and seeds."""
     if not seeds or seeds[0] < 0 or seeds[-1] > MAX_SEED:
-        raise UsageError(f"--seeds: FIRST:END is wanted, from 0 to {MAX_SEED:,}, the end not included: 1000:1010")
+        raise UsageError(f"--seeds: expected FIRST:END from 0 to {MAX_SEED:,}, END not included, such as 1000:1010")
     return len(seeds) * len(choose_scenes(list(types), type_names(home() / "scene_assets"), "type"))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.cli_context import command
-from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, UsageError, first_line, no_package
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.learning.encoding import actions_fingerprint
@@ -60,11 +60,11 @@ def read(path: str | Path) -> tuple[dict[str, Any], PolicyInfo, dict[str, Any]]:
         raise UsageError(f"there are no weights {path}: run {command('train', 'imitation')}")
     try:
         with _safetensors().safe_open(str(path), framework="pt") as file:
-            told = file.metadata() or {}
+            metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
-        if told.get("format") != _FORMAT:
-            raise ValueError(f"its format is {told.get('format')!r}, not {_FORMAT!r}")
-        given, state = loads_json(told["about"]), loads_json(told["state"])
+        if metadata.get("format") != _FORMAT:
+            raise ValueError(f"its format is {metadata.get('format')!r}, not {_FORMAT!r}")
+        given, state = loads_json(metadata["about"]), loads_json(metadata["state"])
         views, width, height, fov_deg, max_depth_m = given["sensors"]
         sensors = Sensors(tuple(views), bool(views), bool(views), width, height, fov_deg, max_depth_m)
         words = Vocabulary(given["words"], given["length"])
@@ -87,4 +87,4 @@ def _safetensors() -> Any:
         importlib.import_module("safetensors.torch")
         return importlib.import_module("safetensors")
     except ImportError:
-        raise MissingPackage(lacks("a policy", "safetensors", "train")) from None
+        raise MissingPackage(no_package("a policy", "safetensors", "train")) from None

@@ -27,7 +27,7 @@ from aerialdojo_gen.store.root import DataRoot
 
 # Trajectories per part: seconds of work, so that parts finish at about the same time.
 _PART = 64
-_LOOKS = 2000
+_VIEWS_PER_PART = 2000
 _MEMORY_MB = 1500
 
 
@@ -71,8 +71,8 @@ def view_parts(
     code = [code_of(f"aerialdojo_gen.{name}").digest for name in ("rendering.gl", "learning.exploration_views")]
     s, parts, release = like.sensors, [], release_fingerprint(data)
     for scene in scenes:
-        for number, begin in enumerate(range(0, looks, _LOOKS)):
-            own = Exploration(min(_LOOKS, looks - begin), seed, number, target_split)
+        for number, begin in enumerate(range(0, looks, _VIEWS_PER_PART)):
+            own = Exploration(min(_VIEWS_PER_PART, looks - begin), seed, number, target_split)
             facts = [s.views, s.width, s.height, s.fov_deg, s.max_depth_m, like.renderer, code, release, split,
                      mesh_of(data, scene)[1], asdict(own)]  # fmt: skip
             parts.append(replace(

@@ -1,4 +1,4 @@
-"""What a policy sees and is told, as arrays: the same in training and in flight."""
+"""A policy's observations and goals as arrays: the same in training and in flight."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ class Teacher:
                     out[k] = agent_actions(route.actions)
         return out
 
-    def keep_fields(self) -> AbstractContextManager[None]:
+    def cache_fields(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
         return self._planner.keeping_fields(*_FIELDS_MB)
 
@@ -146,31 +146,33 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     teacher = teacher_of(open_scene(*mesh, SEVERAL), PlanConfig(), body.radius_m)
     tensors, about, _ = checkpoints.read(dagger_round.weights)
     network = network_of(about, tensors, str(dagger_round.weights)).eval()
-    goals, told = goal_poses(part, index), goals_of(part, index)
+    goals, columns = goal_poses(part, index), goals_of(part, index)
     order = np.lexsort((np.arange(len(index)), *index.goal.T))
     flown: dict[int, FlownEpisode] = {}
-    with torch.inference_mode(), teacher.keep_fields():
+    with torch.inference_mode(), teacher.cache_fields():
         for k in range(0, len(order), _PARALLEL_EPISODES):
             rows = order[k : k + _PARALLEL_EPISODES]
             own = [FlownEpisode(space, index.start[r], goals[r], int(index.budget[r])) for r in rows]
             most = [int(_TIMES * index.steps[r]) + _MORE for r in rows]
             draws = [rng.generator(dagger_round.seed, "dagger", dagger_round.round, index.nav_id[r]) for r in rows]
-            shown = np.array([bool(d.random() < 0.5) for d in draws]) & (told["image"][rows] >= 0)
-            goal = _understood(torch, network, about.vocabulary, told, rows, shown)
+            shown = np.array([bool(d.random() < 0.5) for d in draws]) & (columns["image"][rows] >= 0)
+            goal = _encoded_goal(torch, network, about.vocabulary, columns, rows, shown)
             _fly(torch, network, part, teacher, own, most, draws, dagger_round.teacher_share, goal)
             flown |= dict(zip(rows.tolist(), own, strict=True))
-    return _steps([flown[r] for r in range(len(index))], told, part)
+    return _steps([flown[r] for r in range(len(index))], columns, part)
 
 
-def _understood(
-    torch: Any, network: Any, vocabulary: Vocabulary, told: dict[str, Any], rows: NDArray[np.int64],
+def _encoded_goal(
+    torch: Any, network: Any, vocabulary: Vocabulary, columns: dict[str, Any], rows: NDArray[np.int64],
     shown: NDArray[np.bool_],
 ) -> Any:  # fmt: skip
-    shown = shown | ~told["semantic"][rows]
-    images = np.zeros((len(rows), *told["images"].shape[1:]), np.uint8)
-    images[shown] = told["images"][told["image"][rows[shown]]]
-    tokens = np.array([vocabulary.encode(text) for text in told["text"][rows, 1 - shown.astype(np.int64)].tolist()])
-    return network.understand(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
+    shown = shown | ~columns["semantic"][rows]
+    images = np.zeros((len(rows), *columns["images"].shape[1:]), np.uint8)
+    images[shown] = columns["images"][columns["image"][rows[shown]]]
+    tokens = np.array(
+        [vocabulary.encode(text) for text in columns["text"][rows, 1 - shown.astype(np.int64)].tolist()]
+    )
+    return network.encode_goal(torch.from_numpy(tokens), torch.from_numpy(images), torch.from_numpy(shown))
 
 
 def _fly(
@@ -208,7 +210,7 @@ def _fly(
         going = left
 
 
-def _steps(flown: list[FlownEpisode], told: dict[str, Any], part: Part) -> Steps:
+def _steps(flown: list[FlownEpisode], columns: dict[str, Any], part: Part) -> Steps:
     counts = [len(f.labels) for f in flown]
     poses = np.array([pose for f in flown for pose in f.poses]).reshape(-1, 4)
     goals = np.repeat(np.array([f.goal[:3] for f in flown]).reshape(-1, 3), counts, axis=0)
@@ -219,5 +221,5 @@ def _steps(flown: list[FlownEpisode], told: dict[str, Any], part: Part) -> Steps
         label=np.array([label for f in flown for label in f.labels], np.int64),
         odometry=np.array([o for f in flown for o in f.odometry], np.float32).reshape(-1, 4),
         offset=offsets(poses, goals), pose=poses.astype(np.float32),
-        blocked=np.array([one for f in flown for one in f.blocked], np.bool_).reshape(-1, N_ACTIONS), **told,
+        blocked=np.array([one for f in flown for one in f.blocked], np.bool_).reshape(-1, N_ACTIONS), **columns,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from aerialdojo_gen.pipeline.executors.local import own_cores
 
 # Batches of like lengths are put together from so many: padding costs time.
 _CHUNK = 24
-# Weight of the warning's mean loss: what is in the way is soon seen, and the same pictures are to tell places.
+# Weight of the warning's mean loss: what is in the way is soon seen, and the same pictures are to show places.
 _WARNING = 4.0
 # Pictures are kept on the accelerator where they take at most this share of what is free there.
 _RESIDENT = 0.7
@@ -41,13 +41,13 @@ class Progress:
 
 @dataclass(frozen=True)
 class Epoch:
-    """What came of an epoch: loss and accuracy of choices told where the goal is, and what `Learner.assess` finds."""
+    """What came of an epoch: loss and accuracy of choices given the goal's place, and what `Learner.assess` finds."""
 
     phase: int
     number: int
     loss: float
     accuracy: float
-    kept_back: Assessment | None
+    held_out: Assessment | None
     left_s: float
 
 
@@ -64,7 +64,7 @@ class Assessment:
 
 @dataclass(frozen=True)
 class TrainingLog:
-    """Who is told how a training goes."""
+    """Receives a training's progress."""
 
     on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
     on_epoch: Callable[[Epoch], None]
@@ -109,21 +109,21 @@ class Learner:
     def state(self) -> dict[str, Any]:
         """Return all tensors that a training goes on from: weights, and the optimiser's moments."""
         named = {f"network.{name}": t for name, t in self.network.state_dict().items()}
-        for number, moments in self.optimiser.state_dict()["state"].items():
-            named |= {f"optimiser.{number}.{name}": t for name, t in moments.items()}
+        for number, states in self.optimiser.state_dict()["state"].items():
+            named |= {f"optimiser.{number}.{name}": t for name, t in states.items()}
         return named
 
     def restore(self, tensors: Mapping[str, Any], progress: Mapping[str, Any]) -> None:
         """Go on from a checkpoint."""
         weights = {n.removeprefix("network."): t for n, t in tensors.items() if n.startswith("network.")}
         self.network.load_state_dict(weights)
-        moments: dict[int, dict[str, Any]] = {}
+        states: dict[int, dict[str, Any]] = {}
         for name, tensor in tensors.items():
             if name.startswith("optimiser."):
                 _, number, what = name.split(".", 2)
-                moments.setdefault(int(number), {})[what] = tensor
+                states.setdefault(int(number), {})[what] = tensor
         given = self.optimiser.state_dict()
-        self.optimiser.load_state_dict({"state": moments, "param_groups": given["param_groups"]})
+        self.optimiser.load_state_dict({"state": states, "param_groups": given["param_groups"]})
         self.progress = Progress(**progress)
 
     def begin(self, phase: int) -> None:
@@ -149,13 +149,13 @@ class Learner:
         self.optimiser.step()
 
     def learn(
-        self, pool: Pool, exploration: Pool | None, kept_back: NDArray[np.bool_], epochs: int, learning_rate: float,
+        self, pool: Pool, exploration: Pool | None, held_out: NDArray[np.bool_], epochs: int, learning_rate: float,
         log: TrainingLog,
     ) -> None:  # fmt: skip
-        """Train through a phase's epochs, from where the progress is; `kept_back` (n,) are not learned from."""
+        """Train through a phase's epochs, from where the progress is; `held_out` (n,) are not learned from."""
         self.share_cores()
-        anywhere = np.flatnonzero(np.repeat(~kept_back, pool.lengths))
-        lengths = np.where(kept_back, 0, pool.lengths)
+        anywhere = np.flatnonzero(np.repeat(~held_out, pool.lengths))
+        lengths = np.where(held_out, 0, pool.lengths)
         frames = self._frames(pool)
         self._about = [(pool, frames, anywhere)]
         if exploration is not None:
@@ -167,7 +167,7 @@ class Learner:
         self.run_epochs(
             [len(batches(epoch)) for epoch in range(epochs)], batches, learning_rate, log,
             step=lambda episodes, rate: self._step(pool, frames, episodes, rate),
-            assess=lambda: self.assess(pool, frames, kept_back),
+            assess=lambda: self.assess(pool, frames, held_out),
         )  # fmt: skip
 
     def run_epochs(
@@ -201,17 +201,17 @@ class Learner:
         with self.torch.no_grad():
             for episodes in epoch_batches(lengths, self.recipe.train.batch_steps, 0, 0, 0):
                 batch = self._batch(pool, frames, episodes, rng.generator(0, "kept back"))
-                (thought, guess), mask = self._forward(batch, told=False), batch["mask"]
+                (thought, estimate), mask = self._forward(batch, teacher_forced=False), batch["mask"]
                 right.append((thought.logits.argmax(-1) == batch["label"])[mask])
                 said, is_so = thought.blocked[mask] > 0.0, batch["blocked"][mask]
                 blocked_at.append(said[is_so])
                 free.append(~said[~is_so])
-                away = self.torch.linalg.vector_norm(guess.offset * UNIT_M - batch["offset"], dim=-1)
+                away = self.torch.linalg.vector_norm(estimate.offset * UNIT_M - batch["offset"], dim=-1)
                 off.append(away[mask])
                 first.append(away[:, 0])
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
-        told = [self.torch.cat(one).float() for one in (blocked_at, free)]
-        shares = [float(one.mean()) if len(one) else None for one in told]
+        rates = [self.torch.cat(one).float() for one in (blocked_at, free)]
+        shares = [float(one.mean()) if len(one) else None for one in rates]
         return Assessment(float(self.torch.cat(right).float().mean()), *median, *shares)
 
     def _optimiser(self) -> Any:
@@ -253,16 +253,18 @@ class Learner:
             out["pictures"] = self._pictures(pool, frames, rows)
         return out
 
-    def _forward(self, batch: dict[str, Any], *, told: bool) -> tuple[PolicyOutput, LocalizationOutput]:
-        """Guess where goals are, and choose by that guess, or by where they are where the choice is told."""
-        # A choice is learned beside the true offset: beside guesses that are still wrong it learns not to go by them.
+    def _forward(self, batch: dict[str, Any], *, teacher_forced: bool) -> tuple[PolicyOutput, LocalizationOutput]:
+        """Estimate where goals are; choose by that, or by the true offset if teacher-forced."""
+        # A choice is learned beside the true offset: beside wrong estimates it learns not to go by them.
         network = self.network
         with self.autocast():
-            goal = network.understand(batch["tokens"], batch["images"], batch["told_by_image"])
+            goal = network.encode_goal(batch["tokens"], batch["images"], batch["goal_by_image"])
             seen = network.features(batch.get("pictures"), goal, batch["mask"])
             blank = network.blank(len(seen)).to(self.device)
-            guess, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
-            return network.choose(seen, guess.with_goal_offset(batch["offset"]) if told else guess), guess
+            estimate, _ = network.whereabouts(seen, goal, batch["odometry"], blank)
+            return network.choose(
+                seen, estimate.with_goal_offset(batch["offset"]) if teacher_forced else estimate
+            ), estimate
 
     def _views_loss(self, draw: np.random.Generator) -> Any:
         """Loss of the place predicted from pictures of the whole scene: one episode's are too similar."""
@@ -277,8 +279,8 @@ class Learner:
             looks.append((self._pictures(pool, frames, chosen), *at))
         pictures, pose, number, blocked = (self.torch.cat(same) for same in zip(*looks, strict=True))
         with self.autocast():
-            seen = self.network.look(pictures.flatten(0, 1)).reshape(n, -1)
-            place, heading, scene, _ = self.network.whereabouts.found(seen)
+            seen = self.network.encode_pictures(pictures.flatten(0, 1)).reshape(n, -1)
+            place, heading, scene, _ = self.network.whereabouts.locate(seen)
             blocked_at = self.network.blocked(seen)
         return pose_loss(place, heading, scene, pose, number) + blocked_loss(blocked_at, blocked)
 
@@ -293,11 +295,11 @@ class Learner:
         batch = self._batch(pool, frames, episodes, draw)
         # What is dropped out is drawn anew at every batch, so that a resumed training draws the same.
         self.torch.manual_seed(int(draw.integers(2**31)))
-        (thought, guess), mask = self._forward(batch, told=True), batch["mask"]
+        (thought, estimate), mask = self._forward(batch, teacher_forced=True), batch["mask"]
         logits, label = thought.logits[mask].float(), batch["label"][mask]
         loss = functional.cross_entropy(logits, label)
         touches = blocked_loss(thought.blocked[mask], batch["blocked"][mask])
-        where = offset_loss(guess, batch) + touches + self._views_loss(draw)
+        where = offset_loss(estimate, batch) + touches + self._views_loss(draw)
         self.update(loss + self.recipe.train.goal_weight * where, rate)
         right = (logits.argmax(-1) == label).sum()
         return float(loss.detach()), float(right), int(mask.sum())
@@ -350,7 +352,7 @@ def _select_patches(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Choose patches to learn from: their numbers, and the chances of their words."""
     flat = shown.ravel()
-    # An object of whose name no word is known tells nothing.
-    told = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
-    keep = np.flatnonzero(told | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
+    # An object of whose name no word is known teaches nothing.
+    named = (flat >= 0) & (chances.sum(axis=1)[flat] > 0.0)
+    keep = np.flatnonzero(named | ((flat == NOTHING) & (draw.random(len(flat)) < _EMPTY)))
     return keep, chances[np.where(flat[keep] == NOTHING, len(chances) - 1, flat[keep])]

@@ -184,18 +184,18 @@ def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
 def _scene(
     root: DataRoot, scene: str, rows: pa.Table, target_split: str | None, flown: dict[str, NDArray[np.int8]]
 ) -> Index:
-    wanted: dict[str, dict[str, object]] = {}
+    tasks: dict[str, dict[str, object]] = {}
     allowed = None if target_split is None else _of_target_split(root, scene, target_split)
     for row in rows.to_pylist():
         if allowed is not None and row["nav_id"] not in allowed:
             continue
-        known = wanted.setdefault(row["nav_id"], row)
+        known = tasks.setdefault(row["nav_id"], row)
         for name in _BY_MODALITY:
             known[name] = row[name] if known[name] is None else known[name]
     routes: dict[str, tuple[NDArray[np.int8], list[float]]] = {}
-    for side in sorted({str(row["subset"]) for row in wanted.values()}):
-        routes |= _routes(root, scene, side, wanted)
-    ids = sorted(wanted)
+    for side in sorted({str(row["subset"]) for row in tasks.values()}):
+        routes |= _routes(root, scene, side, tasks)
+    ids = sorted(tasks)
     for nav_id in ids:
         if nav_id not in routes:
             raise StoreError(f"task {nav_id} has no route in {root}/release: run {command('split', scene=scene)}")
@@ -207,19 +207,19 @@ def _scene(
         ids,
         np.concatenate([*pieces, np.empty(0, np.int8)]),
         _starts(pieces),
-        np.array([[wanted[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
+        np.array([[tasks[i][c] for c in _START] for i in ids], np.float64).reshape(-1, 4),
         np.array([routes[i][1] for i in ids], np.float64).reshape(-1, 3),
-        np.array([wanted[i]["action_budget"] for i in ids], np.int32),
-        {name: [wanted[i][name] for i in ids] for name in (*_GOAL_WORDS, *_BY_MODALITY)},
+        np.array([tasks[i]["action_budget"] for i in ids], np.int32),
+        {name: [tasks[i][name] for i in ids] for name in (*_GOAL_WORDS, *_BY_MODALITY)},
     )
 
 
 def _routes(
-    root: DataRoot, scene: str, side: str, wanted: dict[str, dict[str, object]]
+    root: DataRoot, scene: str, side: str, tasks: dict[str, dict[str, object]]
 ) -> dict[str, tuple[NDArray[np.int8], list[float]]]:
     columns = ("nav_id", "action", "agent_action", *_GOAL)
     table = store.read_stored(root, f"routes/{side}", scene, columns)
-    table = table.filter(pc.is_in(table["nav_id"], pa.array(list(wanted), pa.string())))
+    table = table.filter(pc.is_in(table["nav_id"], pa.array(list(tasks), pa.string())))
     own = table["agent_action"].to_pylist() if "agent_action" in table.column_names else [None] * table.num_rows
     found = {}
     for k, nav_id in enumerate(table["nav_id"].to_pylist()):

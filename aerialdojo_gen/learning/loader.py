@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, StoreError, UsageError, first_line, no_package
 from aerialdojo_gen.benchmark.observations import used_opengl
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.trajectories import Trajectories
@@ -173,7 +173,7 @@ def torch_package(who: str = "a policy") -> Any:
         importlib.import_module("torch.utils.data")
         return importlib.import_module("torch")
     except ImportError:
-        raise MissingPackage(lacks(who, "torch", "train")) from None
+        raise MissingPackage(no_package(who, "torch", "train")) from None
 
 
 def as_tensors(batch: Mapping[str, Any]) -> dict[str, Any]:

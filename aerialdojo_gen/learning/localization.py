@@ -1,4 +1,4 @@
-"""Where the body and its goal are: guessed at every step from pictures and words, joined over steps by own motion."""
+"""Where the body and its goal are: estimated at every step from pictures and words, fused by own motion."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from torch.nn import functional
 
 # Networks reckon places in units of this many metres.
 UNIT_M = 10.0
-# Places are told as chances of intervals of each axis, headings as those of sectors.
+# Places are distributions over intervals of each axis, headings as those of sectors.
 # Intervals reach beyond every scene.
 _CELL_M, _STOREY_M, _SECTOR_RAD = 4.0, 2.0, math.radians(15.0)
 _AXES = (_CELL_M, 64, -128.0), (_CELL_M, 64, -128.0), (_STOREY_M, 36, -24.0)
 _PLACES, _HEADINGS = sum(n for _, n, _ in _AXES), round(2.0 * math.pi / _SECTOR_RAD)
 # Intervals to either side of the likeliest one whose mean is a place.
-_BESIDE = 2
+_NEIGHBOURS = 2
 # Sums over the steps so far: of each axis' weights, of weighted places, of own motion weighted as each axis is (ahead
 # and left for x and for y, up for z), of the start's heading; beside them those of the scenes' logits.
 _SUMS = 3 + 3 + 5 + 2
 _LEAST = 1e-3
-# A place is never told better than so, in units: what nearby steps have in common cannot be averaged away.
+# Least variance of a place, in units: what nearby steps have in common cannot be averaged away.
 _FLOOR = 0.05
 
 
@@ -39,20 +39,20 @@ class LocalizationOutput(NamedTuple):
     @property
     def scene_nats(self) -> Any:
         """How unsure each step's pictures are of which scene they show: (n, T), nats, 0 where there is no doubt."""
-        told = self.scene.log_softmax(dim=-1)
-        return -(told.exp() * told).sum(dim=-1)
+        log_chances = self.scene.log_softmax(dim=-1)
+        return -(log_chances.exp() * log_chances).sum(dim=-1)
 
     def with_goal_offset(self, offset_m: Any) -> LocalizationOutput:
         """Set the goal where an offset (n, T, 3), metres ahead, left and up, says that it is."""
         return self._replace(offset=offset_m / UNIT_M)
 
 
-class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
-    """Guess where the goal is.
+class Localization(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
+    """Estimates where the goal is.
 
-    Own motion is used for one thing alone: to carry guesses of earlier steps over to the present one. Of the pictures
-    the goal's guess knows no more than which scene they show. So the goal's place cannot be read off the actions that
-    a reference takes towards it, nor off what is seen where they lead, which tell it in training and never in flight
+    Own motion has one use: to carry estimates of earlier steps over to the present one. Of the pictures the goal's
+    estimate gets no more than which scene they show. So the goal's place cannot be read off the actions that a
+    reference takes towards it, nor off what is seen on the way, which reveal it in training and never in flight
     (causal confusion in imitation learning: de Haan, Jayaraman and Levine 2019).
     """
 
@@ -71,15 +71,15 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         """Numbers that are carried from step to step."""
         return _SUMS + self.scenes
 
-    def found(self, seen: Any) -> tuple[Any, Any, Any, Any]:
-        """Guess by pictures alone where bodies are: logits of places, headings, scenes, and how far to trust them."""
+    def locate(self, seen: Any) -> tuple[Any, Any, Any, Any]:
+        """Localize bodies by pictures alone: logits of places, headings, scenes, and how far to trust them."""
         place, heading, scene, trust = self.body(seen).float().split([_PLACES, _HEADINGS, self.scenes, 1], dim=-1)
         return place, heading, scene, functional.softplus(trust) + _LEAST
 
     def forward(self, seen: Any, goal: Any, odometry: Any, sums: Any) -> tuple[LocalizationOutput, Any]:
         """Estimate poses for steps (n, T) of episodes from features and odometry; also the sums (n, sums) after."""
         steps = seen.shape[1]
-        seen_at, facing, scene, trust = self.found(seen)
+        seen_at, facing, scene, trust = self.locate(seen)
         # The offset's loss teaches which steps to trust; intervals learn by their own, which is steadier.
         place, spread = places(seen_at.detach())
         place, weight = place / UNIT_M, trust / ((spread / UNIT_M).square() + _FLOOR**2)
@@ -100,10 +100,10 @@ class Localization(nn.Module):  # type: ignore[misc]  # torch is looked at by no
         goal_at, _ = places(target.detach())
         # The mean place minus where own motion leads from the start, turned as the start faced, is the start.
         c, s = start.unbind(-1)
-        led = torch.stack(
+        moved_start = torch.stack(
             [c * moves[..., 0] - s * moves[..., 1], s * moves[..., 2] + c * moves[..., 3], moves[..., 4]], dim=-1
         )
-        away = goal_at / UNIT_M - (been - led) / weights
+        away = goal_at / UNIT_M - (been - moved_start) / weights
         ahead = torch.cat([_rotate_back(away[..., :2], start), away[..., 2:]], dim=-1) - moved
         offset = torch.cat([_rotate_back(ahead[..., :2], turn), ahead[..., 2:]], dim=-1)
         return LocalizationOutput(offset, seen_at, facing, scene, target), total[:, -1]
@@ -122,7 +122,7 @@ def places(logits: Any) -> tuple[Any, Any]:
     for one, (width, n, low) in zip(logits.split([n for _, n, _ in _AXES], dim=-1), _AXES, strict=True):
         number = torch.arange(n, device=logits.device)
         middle = low + (number + 0.5) * width
-        near = (number - one.argmax(dim=-1, keepdim=True)).abs() <= _BESIDE
+        near = (number - one.argmax(dim=-1, keepdim=True)).abs() <= _NEIGHBOURS
         place = (one.masked_fill(~near, -torch.inf).softmax(dim=-1) * middle).sum(dim=-1, keepdim=True)
         out.append(place)
         spread.append((one.softmax(dim=-1) * (middle - place).square()).sum(dim=-1, keepdim=True).sqrt())
@@ -139,7 +139,7 @@ def directions(logits: Any) -> Any:
     return mean * (2.0 - length.square()) / (1.05 - length.square())
 
 
-def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
+def offset_loss(estimate: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     """Loss of the goal offset, in units of 10 m, and mean cross-entropies of the intervals."""
     mask = batch["mask"]
     offset, pose = batch["offset"][mask] / UNIT_M, batch["pose"][mask]
@@ -147,9 +147,9 @@ def offset_loss(guess: LocalizationOutput, batch: Mapping[str, Any]) -> Any:
     back = torch.stack([pose[:, 3].cos(), -pose[:, 3].sin()], dim=-1)
     away_m = torch.cat([_rotate_back(offset[:, :2], back), offset[:, 2:]], dim=-1) * UNIT_M
     scene = batch["scene"][:, None].expand(mask.shape)[mask]
-    own = pose_loss(guess.place[mask], guess.heading[mask], guess.scene[mask], pose, scene)
-    at_goal = _interval_loss(guess.goal[mask], pose[:, :3] + away_m)
-    return functional.smooth_l1_loss(guess.offset[mask], offset) + own + at_goal
+    own = pose_loss(estimate.place[mask], estimate.heading[mask], estimate.scene[mask], pose, scene)
+    at_goal = _interval_loss(estimate.goal[mask], pose[:, :3] + away_m)
+    return functional.smooth_l1_loss(estimate.offset[mask], offset) + own + at_goal
 
 
 def pose_loss(place: Any, heading: Any, scene: Any, pose: Any, number: Any) -> Any:

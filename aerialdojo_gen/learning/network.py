@@ -27,11 +27,11 @@ def as_patches(pictures: Any) -> Any:
     return cut.reshape(n, rows, columns, -1).float().div(127.5).sub(1.0)
 
 
-class PatchClassifier(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class PatchClassifier(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
     """Chances that the words of objects' names name what a patch of a picture shows.
 
     Objects of a kind look alike in every scene: what is learned here holds in scenes that were never seen. It shares
-    nothing with the network that tells places apart, which learns scenes by heart.
+    nothing with the network that localizes, which learns scenes by heart.
     """
 
     def __init__(self, words: int, channels: tuple[int, int, int]) -> None:
@@ -64,7 +64,7 @@ class PatchClassifier(nn.Module):  # type: ignore[misc]  # torch is looked at by
         return self.words(flat).view(n, rows * columns, -1)
 
 
-# Wave lengths of the sines that tell places apart, metres; beside them the place itself.
+# Wave lengths of the sines that encode places, metres; beside them the place itself.
 _WAVES_M = (4.0, 12.0, 36.0, 108.0)
 _FAR_M = 30.0
 _BEARING = 3 * (2 * len(_WAVES_M) + 1) + 3
@@ -96,7 +96,7 @@ class PolicyOutput(NamedTuple):
 
     logits: Any  # (n, T, 16); of the actions
     blocked: Any  # (n, T, 16); logits of each action's touching a surface or leaving the flight volume
-    guess: LocalizationOutput  # Where the goal is thought to be, or was said to be
+    estimate: LocalizationOutput  # Where the goal is thought to be, or was said to be
 
     def actions(self, back: Any) -> Any:
         """Choose the likeliest free action, (n, T), never a turn that leads back; Stop within 2 m of the goal."""
@@ -108,11 +108,11 @@ class PolicyOutput(NamedTuple):
         # Where all of them lead back, any but Stop.
         onward = (moving - _NEVER * (turns | back)).argmax(dim=-1)
         chosen = torch.where(back.gather(-1, likeliest)[..., 0], onward, likeliest[..., 0])
-        near = torch.linalg.vector_norm(self.guess.offset, dim=-1) * UNIT_M <= ARRIVED_M
+        near = torch.linalg.vector_norm(self.estimate.offset, dim=-1) * UNIT_M <= ARRIVED_M
         return chosen.masked_fill(near, STOP)
 
 
-class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type checker here
+class Network(nn.Module):  # type: ignore[misc]  # no type checker sees torch here
     """Actions from pictures, goal and own motion.
 
     What it remembers is its map: where pictures of earlier steps put the body. A memory of its own, a GRU beside the
@@ -146,7 +146,7 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         self.phrase = nn.Conv1d(shape.word_features, shape.features, 3, padding=1)
         # Whether the goal is a picture stands beside what it shows.
         self.goal = nn.Sequential(nn.Linear(2 * shape.features + 1, shape.features), nn.ReLU(inplace=True))
-        # Who sees nothing guesses by what is said alone.
+        # Without pictures the estimate is by words alone.
         pictured = max(shape.views, 1) * shape.features
         self.whereabouts = Localization(pictured, shape.features, shape.hidden, shape.scenes)
         self.choice = nn.Sequential(
@@ -160,18 +160,18 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         # The last, so that the others begin as they do without it.
         self.sight = PatchClassifier(shape.named, shape.channels) if shape.named else None
 
-    def look(self, pictures: Any) -> Any:
+    def encode_pictures(self, pictures: Any) -> Any:
         """Encode pictures: (n, H, W, 4) uint8 to (n, features)."""
         patches = self.patches(as_patches(pictures))
         # As they lie in memory, channels last: on a CPU convolutions take half the time so.
         return self.eye(patches.permute(0, 3, 1, 2))
 
-    def understand(self, tokens: Any, images: Any, told_by_image: Any) -> Any:
+    def encode_goal(self, tokens: Any, images: Any, goal_by_image: Any) -> Any:
         """Encode goals from tokens (n, length) and pictures (n, H, W, 4) uint8; (n, features)."""
         said = functional.relu(self.phrase(self.words(tokens).transpose(1, 2)))
         said = said.masked_fill((tokens == 0)[:, None], 0.0).amax(dim=2)
-        shown = self.look(images) * told_by_image[:, None]
-        return self.goal(torch.cat([said, shown, told_by_image[:, None].float()], dim=1))
+        shown = self.encode_pictures(images) * goal_by_image[:, None]
+        return self.goal(torch.cat([said, shown, goal_by_image[:, None].float()], dim=1))
 
     def forward(
         self, pictures: Any, goal: Any, odometry: Any, mask: Any, memory: Any = None
@@ -179,34 +179,34 @@ class Network(nn.Module):  # type: ignore[misc]  # torch is looked at by no type
         """Policy outputs for steps (n, T) of episodes, odometry in the start's frame; also the memory (n, sums)."""
         memory = self.blank(len(mask)).to(odometry.device) if memory is None else memory
         seen = self.features(pictures, goal, mask)
-        guess, memory = self.whereabouts(seen, goal, odometry, memory)
-        return self.choose(seen, guess), memory
+        estimate, memory = self.whereabouts(seen, goal, odometry, memory)
+        return self.choose(seen, estimate), memory
 
     def features(self, pictures: Any, goal: Any, mask: Any) -> Any:
         """Encode what is seen at steps, (n, T, ...); of who sees nothing, the goal. Parameters are `forward`'s."""
         n, steps = mask.shape
         if pictures is None:
             return goal[:, None].expand(n, steps, -1)
-        looked = self.look(pictures.flatten(0, 1)).reshape(len(pictures), -1)
-        flat = torch.zeros(n * steps, looked.shape[1], dtype=looked.dtype, device=looked.device)
+        encoded = self.encode_pictures(pictures.flatten(0, 1)).reshape(len(pictures), -1)
+        flat = torch.zeros(n * steps, encoded.shape[1], dtype=encoded.dtype, device=encoded.device)
         rows = mask.flatten().nonzero()[:, 0]
-        return flat.index_copy(0, rows, looked).reshape(n, steps, -1)
+        return flat.index_copy(0, rows, encoded).reshape(n, steps, -1)
 
-    def choose(self, seen: Any, guess: LocalizationOutput) -> PolicyOutput:
+    def choose(self, seen: Any, estimate: LocalizationOutput) -> PolicyOutput:
         """Choose actions by what is seen, (n, T, ...), and where the goal is thought to be, and by nothing else."""
         # With the goal's words a choice learns routes of the training's scenes by heart, and beside a map that is
         # still poor it learns not to go by the map.
-        logits = self.choice(torch.cat([seen, bearing(guess).to(seen.dtype)], dim=2))
-        return PolicyOutput(logits, self.blocked(seen), guess)
+        logits = self.choice(torch.cat([seen, bearing(estimate).to(seen.dtype)], dim=2))
+        return PolicyOutput(logits, self.blocked(seen), estimate)
 
     def blank(self, n: int) -> Any:
         """Return the memory of n episodes that begin: (n, sums)."""
         return torch.zeros(n, self.whereabouts.sums)
 
 
-def bearing(guess: LocalizationOutput) -> Any:
+def bearing(estimate: LocalizationOutput) -> Any:
     """Where the goal is thought to be, as numbers: (n, T, 30); choices teach it nothing."""
-    away_m = guess.offset.detach() * UNIT_M
+    away_m = estimate.offset.detach() * UNIT_M
     flat = torch.linalg.vector_norm(away_m[..., :2], dim=-1, keepdim=True)
     towards = away_m[..., :2] / (flat + 0.5)
     return torch.cat([_waves(away_m), towards, torch.log1p(flat)], dim=-1)

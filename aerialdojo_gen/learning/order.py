@@ -9,6 +9,8 @@ as streams each has one scene open at a time, and with any number the batches ar
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,53 +19,56 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 
 
+@dataclass(frozen=True, eq=False)
 class Order:
     """The batches of one epoch, as lists of sample numbers: a batch sampler for ``torch.utils.data.DataLoader``."""
 
-    def __init__(
-        self,
-        scene: NDArray[np.integer],
-        first: NDArray[np.int64],
-        batch_size: int,
-        *,
-        seed: int = 0,
-        epoch: int = 0,
-        start: int = 0,
-        block: int = 2048,
-        streams: int = 2,
-        shuffle: bool = True,
-        drop_last: bool = False,
-    ) -> None:
-        for what, value in (("batch_size", batch_size), ("block", block), ("streams", streams)):
-            if value < 1:
-                raise UsageError(f"{what} is at least 1, not {value}")
-        self.how = {"block": block, "streams": streams, "shuffle": shuffle, "drop_last": drop_last}
-        self._scene, self._first = scene, first
-        self._batch_size = batch_size
-        self._seed, self._epoch, self._block, self._streams = seed, epoch, block, streams
-        self._shuffle = shuffle
-        n = int(first[-1])
-        self._n_batches = n // batch_size if drop_last else -(-n // batch_size)
-        if not 0 <= start <= self._n_batches:
-            raise UsageError(f"the epoch has {self._n_batches} batches: there is no batch {start} to go on with")
-        self._start = start
+    scene: NDArray[np.integer]
+    first: NDArray[np.int64]  # Number of every trajectory's first sample, and of what would come next
+    batch_size: int
+    _: KW_ONLY
+    seed: int = 0
+    epoch: int = 0
+    start: int = 0  # The batch to begin with
+    block: int = 2048  # Samples of a block
+    streams: int = 2
+    shuffle: bool = True
+    drop_last: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no order."""
+        for what in ("batch_size", "block", "streams"):
+            if getattr(self, what) < 1:
+                raise UsageError(f"{what} is at least 1, not {getattr(self, what)}")
+        if not 0 <= self.start <= (n := self._n_batches):
+            raise UsageError(f"the epoch has {n} batches: there is no batch {self.start} to go on with")
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """What decides the order beside the seed, by name: JSON."""
+        return {name: getattr(self, name) for name in ("block", "streams", "shuffle", "drop_last")}
+
+    @property
+    def _n_batches(self) -> int:
+        n = int(self.first[-1])
+        return n // self.batch_size if self.drop_last else -(-n // self.batch_size)
 
     def __len__(self) -> int:
         """Return the number of batches that are left."""
-        return self._n_batches - self._start
+        return self._n_batches - self.start
 
     def __iter__(self) -> Iterator[list[int]]:
         """Yield the samples of every batch from `start` on."""
         numbers = self._numbers()
-        for k in range(self._start, self._n_batches):
-            yield numbers[k * self._batch_size : (k + 1) * self._batch_size].tolist()
+        for k in range(self.start, self._n_batches):
+            yield numbers[k * self.batch_size : (k + 1) * self.batch_size].tolist()
 
     def _numbers(self) -> NDArray[np.int64]:
-        if not self._shuffle:
-            return np.arange(self._first[-1])
-        draw = rng.generator(self._seed, "learning", self._epoch)
-        blocks = [block for scene in np.unique(self._scene) for block in self._blocks(int(scene), draw)]
-        streams: list[list[NDArray[np.int64]]] = [[] for _ in range(min(self._streams, len(blocks)) or 1)]
+        if not self.shuffle:
+            return np.arange(self.first[-1])
+        draw = rng.generator(self.seed, "learning", self.epoch)
+        blocks = [block for scene in np.unique(self.scene) for block in self._blocks(int(scene), draw)]
+        streams: list[list[NDArray[np.int64]]] = [[] for _ in range(min(self.streams, len(blocks)) or 1)]
         lengths = [0] * len(streams)
         for k in draw.permutation(len(blocks)):
             shortest = lengths.index(min(lengths))
@@ -72,17 +77,17 @@ class Order:
         return self._interleave([np.concatenate([*stream, np.empty(0, np.int64)]) for stream in streams])
 
     def _blocks(self, scene: int, draw: np.random.Generator) -> list[NDArray[np.int64]]:
-        own = draw.permutation(np.flatnonzero(self._scene == scene))
-        samples = np.cumsum(self._first[own + 1] - self._first[own])
-        cuts = np.flatnonzero(np.diff((samples - 1) // self._block)) + 1
+        own = draw.permutation(np.flatnonzero(self.scene == scene))
+        samples = np.cumsum(self.first[own + 1] - self.first[own])
+        cuts = np.flatnonzero(np.diff((samples - 1) // self.block)) + 1
         return [
-            draw.permutation(np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in part]))
+            draw.permutation(np.concatenate([np.arange(self.first[k], self.first[k + 1]) for k in part]))
             for part in np.split(own, cuts)
         ]
 
     def _interleave(self, streams: list[NDArray[np.int64]]) -> NDArray[np.int64]:
         """Take a batch from every stream in turn; what is left of them at the end fills the last batches."""
-        size = self._batch_size
+        size = self.batch_size
         full = min(len(stream) // size for stream in streams)
         turns = np.stack([stream[: full * size].reshape(full, size) for stream in streams], axis=1)
         return np.concatenate([turns.ravel(), *(stream[full * size :] for stream in streams)])

@@ -79,7 +79,7 @@ class CachedFrames:
             if not self._full and self._room():
                 n = int(self._index.steps[k])
                 whole = self._source.frames(np.full(n, k), np.arange(n))
-                self._keep(k, whole)
+                self._write(k, whole)
                 drawn = take(whole, steps[rows])
             else:
                 drawn = self._source.frames(trajectories[rows], steps[rows])
@@ -137,7 +137,7 @@ class CachedFrames:
             parts.append(frames["depth_m"][row].astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes())
         return bytes(self._codec.compress(b"".join(parts), asbytes=True))
 
-    def _keep(self, k: int, frames: Frames) -> None:
+    def _write(self, k: int, frames: Frames) -> None:
         packed = [self._pack(frames, row) for row in range(int(self._index.steps[k]))]
         starts = np.cumsum([len(_MAGIC) + len(packed) * _ENTRY.size, *(len(p) for p in packed)])
         head = b"".join(_ENTRY.pack(int(at), len(p), zlib.crc32(p)) for at, p in zip(starts, packed, strict=False))

@@ -110,7 +110,7 @@ class Policy(AgentBase):
         return {"sha256": self._sha256}
 
     def used_options(self) -> dict[str, Any]:
-        """Return the options for the log, and what the weights tell of their training."""
+        """Return the options for the log, and what the weights record of their training."""
         return {
             "weights": self._weights, "sha256": self._sha256, "any_release": self._any_release,
             "device": self._device, "trained_on": list(self._about.scenes), "init": self._about.init,
@@ -132,16 +132,16 @@ class Policy(AgentBase):
         image = torch.from_numpy(goal_picture(goal.image, about.shape["size_px"])[None]).to(self._device)
         shown = torch.tensor([goal.image is not None], device=self._device)
         with torch.inference_mode():
-            self._goal = self.network.understand(tokens, image, shown)
+            self._goal = self.network.encode_goal(tokens, image, shown)
         self._reckoning, self._previous, self._memory = DeadReckoning(), N_ACTIONS, None
         self._doubt: list[float] = []
         # Looks that nothing was searched in: what is known needs no search, and it takes half as long as all else.
         self._unsearched: list[tuple[Any, NDArray[np.float32]]] = []
-        wanted = word_targets([goal.target_name], about.named)[0] if about.named else None
-        self._search = None if wanted is None else Search(wanted, self.sensors)
+        target_words = word_targets([goal.target_name], about.named)[0] if about.named else None
+        self._search = None if target_words is None else Search(target_words, self.sensors)
 
     def act(self, observation: Observation) -> int:
-        """Look, remember, choose."""
+        """Observe, update the memory, choose."""
         torch, device, sensors = self._torch, self._device, self.sensors
         if self._previous != N_ACTIONS:
             self._reckoning.add(self._previous, bool(observation.refused))
@@ -155,15 +155,15 @@ class Policy(AgentBase):
             step = torch.ones((1, 1), dtype=torch.bool, device=device)
             seen = self.network.features(pictures, self._goal, step)
             memory = self.network.blank(1).to(device) if self._memory is None else self._memory
-            guess, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
+            estimate, self._memory = self.network.whereabouts(seen, self._goal, odometry, memory)
             if self._search is not None and pictures is not None:
-                self._doubt.append(float(guess.scene_nats[0, 0]))
+                self._doubt.append(float(estimate.scene_nats[0, 0]))
                 self._unsearched.append((pictures[0], self._reckoning.odometry))
                 if np.mean(self._doubt) > LOST_NATS:
                     self._notice(self._search)
                     away = self._search.towards(self._reckoning.odometry, observation.remaining_actions)
-                    guess = guess.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
-            thought = self.network.choose(seen, guess)
+                    estimate = estimate.with_goal_offset(torch.from_numpy(away[None, None]).to(device))
+            thought = self.network.choose(seen, estimate)
         back = torch.from_numpy(self._reckoning.back[None, None]).to(device)
         self._previous = int(thought.actions(back)[0, 0])
         return self._previous
@@ -172,7 +172,7 @@ class Policy(AgentBase):
         """Search what was seen so far: a map that was trusted may turn out to be of somewhere else."""
         for pictures, odometry in self._unsearched:
             chances = self.network.sight(pictures).log_softmax(dim=-1).flatten(0, 1)
-            search.look(chances.cpu().numpy(), pictures.cpu().numpy(), odometry)
+            search.observe(chances.cpu().numpy(), pictures.cpu().numpy(), odometry)
         self._unsearched.clear()
 
 

@@ -44,7 +44,7 @@ class DataConfig(Section):
         if self.size_px % 16:
             raise ValueError("size_px is halved four times: a multiple of 16")
         if len(set(self.views)) != len(self.views):
-            raise ValueError("a view stands twice in views")
+            raise ValueError("duplicate view in views")
         return self
 
 

@@ -28,9 +28,9 @@ _THING_M, _FARTHEST_M = 2.5, 14.0
 _BEFORE_M = 1.5
 # A sighting's weight falls with its distance, to a quarter at this one, metres.
 _CLEAR_M = 8.0
-# Weight and score of what is thought of a thing before it is seen: one look alone is believed less than several.
+# Weight and score of what is thought of a thing before it is seen: one sighting alone is believed less than several.
 _PRIOR, _PRIOR_SCORE = 0.3, -4.0
-# What was seen from so near need not be looked at again, metres.
+# Inspected once seen from so near, metres.
 _LOOKED_AT_M = 4.5
 # Patches that are surely no object.
 _NOTHING = math.log(0.5)
@@ -58,8 +58,8 @@ class _Candidate:
 class Search:
     """One episode's sightings, in the frame of its start: x ahead, y left, z up, metres."""
 
-    def __init__(self, wanted: NDArray[np.float32], sensors: Sensors) -> None:
-        self._wanted = wanted.astype(np.float64)
+    def __init__(self, target_words: NDArray[np.float32], sensors: Sensors) -> None:
+        self._target_words = target_words.astype(np.float64)
         self._rays = patch_rays(sensors)
         self._range_m = sensors.max_depth_m
         self._candidates: dict[tuple[int, int, int], _Candidate] = {}
@@ -69,11 +69,11 @@ class Search:
         self._corner = self._since = 0
         self._last: _Candidate | None = None
 
-    def look(
+    def observe(
         self, log_chances: NDArray[np.float32], pictures: NDArray[np.uint8], odometry: NDArray[np.float32]
     ) -> None:
         """Add what is seen at a step: log chances (patches, words + 1), pictures (views, H, W, 4), odometry (4,)."""
-        if not self._wanted.any():
+        if not self._target_words.any():
             return
         away_m = self._rays * patch_depths_m(pictures, self._range_m)[:, None]
         distance_m = np.linalg.norm(away_m, axis=1)
@@ -81,9 +81,9 @@ class Search:
         if not rows.any():
             return
         away_m, distance_m = away_m[rows], distance_m[rows]
-        said = self._wanted[self._wanted > 0.0]
+        said = self._target_words[self._target_words > 0.0]
         # How much less likely these words are than if they were all that is seen there.
-        score = log_chances[rows, :-1] @ self._wanted - float(said @ np.log(said))
+        score = log_chances[rows, :-1] @ self._target_words - float(said @ np.log(said))
         before = away_m * (1.0 - _BEFORE_M / np.maximum(distance_m, _BEFORE_M))[:, None]
         weight = 1.0 / (1.0 + distance_m / _CLEAR_M) ** 2
         cells = np.floor(_from_start(away_m, odometry) / _THING_M).astype(int)

@@ -120,11 +120,11 @@ class Pool:
 
     @property
     def names(self) -> list[str]:
-        """Of all objects that looks about show."""
+        """Of all objects that exploration views show."""
         return [name for part in self.parts for name in part.names.tolist()]
 
     def shown(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Read which objects the patches of looks show: (n, patches), numbers of `names`; see `Steps`."""
+        """Read which objects the patches of exploration views show: (n, patches), numbers of `names`; see `Steps`."""
         part = np.searchsorted(self._steps, rows, side="right") - 1
         shifts = np.cumsum([0, *(len(p.names) for p in self.parts)])
         found = [
@@ -147,7 +147,7 @@ class Pool:
             out[name][mask] = values[rows]
         image = j["image"][episodes]
         shown = (by_image | ~j["semantic"][episodes]) & (image >= 0)
-        out["told_by_image"] = shown
+        out["goal_by_image"] = shown
         out["scene"] = self._scene[episodes]
         out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
         out["images"] = np.zeros((len(episodes), *j["images"].shape[1:]), np.uint8)

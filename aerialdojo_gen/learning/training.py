@@ -214,7 +214,7 @@ class _Training:
             self._learn(parts, phase)
             weights = {n: t for n, t in learner.state().items() if n.startswith("network.")}
             checkpoints.write(self._weights(phase), weights, self._about, asdict(learner.progress))
-            self._keep()
+            self._save_checkpoint()
         last = self._folder / "policy.safetensors"
         # Its bytes, so that they stay the same: who began with these weights, or flies them, goes by their digest.
         with atomic_file(self._folder, last.name) as temporary:
@@ -241,7 +241,7 @@ class _Training:
         """Draw a round's tasks, without those kept for validation."""
         index, want = self._index, self._recipe.dagger.episodes
         rank = [rng.rank(self._recipe.seed, "dagger tasks", phase, nav_id) for nav_id in index.nav_id]
-        free = np.flatnonzero(~self._kept_back(np.array(index.nav_id)))
+        free = np.flatnonzero(~self._held_out(np.array(index.nav_id)))
         return index.take(np.sort(free[np.argsort(np.array(rank, np.uint64)[free], kind="stable")[:want]]))
 
     def _parts(self, index: Index, dagger_round: DaggerRound | None) -> list[Part]:
@@ -269,7 +269,7 @@ class _Training:
     def _pool(self, parts: list[Steps]) -> Pool:
         return Pool(parts, self._about.scenes, self._about.vocabulary)
 
-    def _kept_back(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
+    def _held_out(self, nav_ids: NDArray[np.str_]) -> NDArray[np.bool_]:
         share = self._recipe.data.validation_share * 2.0**64
         return np.array([rng.rank(self._recipe.seed, "kept back", n) < share for n in nav_ids.tolist()], np.bool_)
 
@@ -284,7 +284,7 @@ class _Training:
         epochs, rate = (dagger.epochs, dagger.learning_rate) if phase else (train.epochs, train.learning_rate)
         pool = self._pool(parts)
         log = self._log(f"round {phase}" if phase else "imitation", epochs)
-        self._learner.learn(pool, self._exploration, self._kept_back(pool.nav_id), epochs, rate, log)
+        self._learner.learn(pool, self._exploration, self._held_out(pool.nav_id), epochs, rate, log)
 
     def _log(self, what: str, epochs: int) -> TrainingLog:
         from aerialdojo_gen.learning.imitation import TrainingLog
@@ -304,10 +304,10 @@ class _Training:
                     f"{what}: batch {done:,} of {total:,}, loss {loss:.3f}, accuracy {accuracy:.1%}{left}"
                 )
             if now - self._kept >= self._recipe.train.checkpoint_s:
-                self._keep()
+                self._save_checkpoint()
 
         def on_epoch(epoch: Epoch) -> None:
-            k = epoch.kept_back
+            k = epoch.held_out
             kept = "" if k is None else f" (kept back: {_describe(k)})"
             self._reporter.line(
                 f"{what}: epoch {epoch.number + 1} of {epochs}, loss {epoch.loss:.3f}, accuracy "
@@ -317,11 +317,11 @@ class _Training:
                    "kept_back": None if k is None else asdict(k)}  # fmt: skip
             with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
-            self._keep()
+            self._save_checkpoint()
 
         return TrainingLog(on_batch, on_epoch)
 
-    def _keep(self) -> None:
+    def _save_checkpoint(self) -> None:
         progress = asdict(self._learner.progress)
         checkpoints.write(self._folder / _CHECKPOINT, self._learner.state(), self._about, progress)
         self._kept = time.monotonic()
@@ -372,9 +372,9 @@ def _describe(kept: Assessment) -> str:
     """Describe the accuracy on what was not trained on."""
     shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
-    told = f"; {' and '.join(known)} actions told" if known else ""
+    suffix = f"; {' and '.join(known)} actions told" if known else ""
     off = f"{kept.goal_off_at_start_m:.1f} m at the start, {kept.goal_off_m:.1f} m in all"
-    return f"{kept.accuracy:.1%}; goal off by {off}{told}"
+    return f"{kept.accuracy:.1%}; goal off by {off}{suffix}"
 
 
 def _tensorboard(folder: Path) -> Any:

@@ -1,4 +1,4 @@
-"""A release as a data set: reference trajectories with what the body sees, what it was told, and what it did."""
+"""A release as a data set: reference trajectories with observations, goals and actions."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ _WORD = re.compile(r"\w+|[^\w\s]")
 
 
 def goal_text(target_name: str, landmark: str, direction: str, description: str | None) -> str:
-    """Say a goal in words, as the task tells it: name, direction from the landmark, and any description."""
+    """Say a goal in words, as the task gives it: name, direction from the landmark, and any description."""
     said = f"{target_name}, {direction} of {landmark}"
     return f"{said}. {description}" if description else said
 
@@ -41,7 +41,7 @@ class Vocabulary:
         if length < 1:
             raise UsageError(f"a text has at least 1 token, not {length}")
         if len(set(words)) != len(words):
-            raise UsageError("a word stands twice in the vocabulary")
+            raise UsageError("duplicate word in the vocabulary")
         self.words = tuple(words)
         self.length = length
         self._number = {word: k for k, word in enumerate(self.words, start=UNKNOWN + 1)}

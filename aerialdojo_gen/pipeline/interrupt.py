@@ -16,7 +16,7 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        self._seen = False
+        self._interrupted = False
         self._before: Any = None
 
     def __enter__(self) -> Interrupts:
@@ -35,10 +35,10 @@ class Interrupts:
             signal.signal(signal.SIGINT, self._before)
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self._seen = True
+        self._interrupted = True
         raise KeyboardInterrupt
 
     def check(self) -> None:
         """Raise KeyboardInterrupt if SIGINT arrived since `__enter__`."""
-        if self._seen:
+        if self._interrupted:
             raise KeyboardInterrupt

@@ -125,10 +125,10 @@ class SceneScheduler(TaskQueue[Task]):
                 return
         self._end([scene])
 
-    def put_back(self, task: Task) -> None:
+    def requeue(self, task: Task) -> None:
         """Queue a task again whose process is gone, as the first of its scene."""
         del self._running[task.scene, task.job.part]
-        super().put_back(task)
+        super().requeue(task)
 
     def _enter(self, number: int, scenes: list[str]) -> list[str]:
         """Queue the stale shards of a stage; returns the scenes that have none, which have passed the stage."""
@@ -174,7 +174,7 @@ class SceneScheduler(TaskQueue[Task]):
     def _weight(self, scene: str) -> float:
         return sum(self._estimate.left(stage.name, scene) for stage in self._stages)
 
-    def _worth_joining(self, scene: str) -> bool:
+    def _should_join(self, scene: str) -> bool:
         stage = self._stages[self._passed[scene]]
         seconds = self._estimate.left(stage.name, scene) * len(self._scenes[scene]) / max(1, self._left[scene])
         return seconds >= _JOIN_S

@@ -57,7 +57,7 @@ def init_config(path: str | Path, pipeline: str | Path | Pipeline | None = None,
     if path.suffix != ".toml":
         raise UsageError(f"{path}: a pipeline file is called NAME.toml")
     if path.exists() and not force:
-        raise UsageError(f"{path} is there already: --force overwrites it")
+        raise UsageError(f"{path} exists: --force overwrites it")
     if not isinstance(pipeline, Pipeline):
         pipeline = Pipeline() if pipeline is None else load_pipeline(pipeline)
     try:
@@ -158,7 +158,7 @@ def key_lines(keys: list[Key], width: int | None = None) -> list[str]:
 def _key_lines(key: Key, width: int | None) -> list[str]:
     inner = "." in key.section
     table = key.kind == "table" and key.value is not None
-    # What has no table to stand in has no value either: its default is told.
+    # What has no table to stand in has no value either: its default is written.
     value = key.default if inner and key.value is None else key.value
     changed = key.changed and not table and value is key.value
     begin = f"{'*' if changed else ' '} {'  ' if inner else ''}"

@@ -82,7 +82,7 @@ def parse_anatomy(raw: Any, counts: Sequence[int]) -> Anatomy:
     if not all(type(a) in (int, float) and math.isfinite(a) for a in angles):
         raise ValueError("a direction is no finite number")
     if not all(isinstance(text, str) for text in raw["tells"]):
-        raise ValueError("an identifying part is no text")
+        raise ValueError("an identifying part must be text")
     return Anatomy(float(angles[0]), tuple(float(a) for a in angles[1:]), tuple(raw["tells"]), runs)
 
 

@@ -47,9 +47,9 @@ def build_scene(path: Path, catalogue: Catalogue) -> Scene:
         return _imported(path, imported)
     layout = body.get("layout")
     if layout is not None:
-        again = _NOW_PLANS.get(layout) if isinstance(layout, str) else None
-        mend = f"run {again} again, with --force" if again else "docs/plans.md has the format"
-        raise AssetError(f"{path}: scenes are plans since version 0.2.0, without 'layout': {mend}")
+        rebuild = _NOW_PLANS.get(layout) if isinstance(layout, str) else None
+        advice = f"run {rebuild} again, with --force" if rebuild else "docs/plans.md has the format"
+        raise AssetError(f"{path}: scenes are plans since version 0.2.0, without 'layout': {advice}")
     return build_tables(path.stem, body, catalogue, where=str(path), folder=path.parent)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,18 @@ _DESIGNS = "designs.toml"
 _CACHE_SIZE = 2000
 _CROWN_SHAPES = 6
 _SHAPE_DIGITS = 12
+
+
+class Overrides(NamedTuple):
+    """What an instance has in place of its category's values; the stretch multiplies its design's."""
+
+    params: Mapping[str, float] | None = None
+    roles: Mapping[str, str] | None = None
+    attributes: Mapping[str, str] | None = None
+    stretch: tuple[float, float, float] | None = None
+
+
+_NONE = Overrides()
 
 
 class Catalogue:
@@ -70,51 +83,47 @@ class Catalogue:
         yaw_deg: float = 0.0,
         variant: str | None = None,
         scale: float = 1.0,
-        params: Mapping[str, float] | None = None,
-        roles: Mapping[str, str] | None = None,
-        attributes: Mapping[str, str] | None = None,
         design: str | None = None,
-        stretch: tuple[float, float, float] | None = None,
+        own: Overrides = _NONE,
     ) -> Instance:
         """Make an instance at a position (world metres); variant, parameters and builder draw from `rng` in order.
 
-        Its design is the first of its category where none is given. `scale` multiplies the category's own, `stretch`
-        the design's.
+        Its design is the first of its category where none is given. `scale` multiplies the category's own.
         """
         prop = self[category]
-        look = self._draw_variant(prop, variant, rng)
+        kind = self._draw_variant(prop, variant, rng)
         form = prop.designs[0] if design is None else prop.design(design)
-        if stretch is not None:
-            x, y, z = (own * factor for own, factor in zip(form.stretch, stretch, strict=True))
+        if own.stretch is not None:
+            x, y, z = (mine * factor for mine, factor in zip(form.stretch, own.stretch, strict=True))
             form = replace(form, stretch=(x, y, z))
-        sizes = self._draw_params(prop, look, {**form.params, **(params or {})}, rng)
+        sizes = self._draw_params(prop, kind, {**form.params, **(own.params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
-        surfaces = dict(prop.roles) | dict(look.roles) | dict(roles or {})
-        refuse_unknown(roles or {}, prop.roles, f"{prop.source} roles")
-        words = dict(look.attributes) | dict(attributes or {})
+        surfaces = dict(prop.roles) | dict(kind.roles) | dict(own.roles or {})
+        refuse_unknown(own.roles or {}, prop.roles, f"{prop.source} roles")
+        words = dict(kind.attributes) | dict(own.attributes or {})
         if prop.builder is not None:
             assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
             drawn = (form.name, form.stretch, tuple(sizes.items()))
-            key = (category, look.name, *drawn, tuple(surfaces.items()), signs, shape_seed)
+            key = (category, kind.name, *drawn, tuple(surfaces.items()), signs, shape_seed)
             if key not in self._parts:
                 if len(self._parts) >= _CACHE_SIZE:
                     self._parts.clear()
-                self._parts[key] = self._assembled(prop, look, form, sizes, surfaces, words, shape_seed)
+                self._parts[key] = self._assembled(prop, kind, form, sizes, surfaces, words, shape_seed)
             assembly = self._parts[key]
         scale = scale * prop.scale
         placed_parts, kept_faces = _placed(assembly.parts, position, yaw_deg, scale)
         if not placed_parts:
-            raise AssetError(f"{prop.source}: no triangle of variant {look.name!r} has an area")
+            raise AssetError(f"{prop.source}: no triangle of variant {kind.name!r} has an area")
         anatomy = None
         if prop.front:
             yaw = math.radians(yaw_deg)
             fronts = tuple(float(wrap_angle_rad(yaw + math.radians(side))) for side in FRONTS[prop.front])
-            identifying = tuple(dict.fromkeys((*prop.identifying_parts, *look.identifying_parts)))
+            identifying = tuple(dict.fromkeys((*prop.identifying_parts, *kind.identifying_parts)))
             anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, identifying, remap_runs(assembly.runs, kept_faces))
         shape = sha256(assembly.shape + str(round(scale, 3)).encode()).hexdigest()[:_SHAPE_DIGITS]
-        return Instance(node, category, look.name, words, placed_parts, anatomy, shape=shape, held_out=form.held_out)
+        return Instance(node, category, kind.name, words, placed_parts, anatomy, shape=shape, held_out=form.held_out)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -123,12 +132,12 @@ class Catalogue:
 
     @staticmethod
     def _draw_params(
-        prop: Category, look: Variant, fixed: Mapping[str, float], rng: np.random.Generator
+        prop: Category, kind: Variant, fixed: Mapping[str, float], rng: np.random.Generator
     ) -> dict[str, float]:
         refuse_unknown(fixed, prop.params, f"{prop.source} params")
         out = {}
         for name, ends in prop.params.items():
-            low, high = look.params.get(name, ends)
+            low, high = kind.params.get(name, ends)
             drawn = float(rng.uniform(low, high)) if low < high else low
             # Rounded to centimetres, so that equal sizes share their geometry.
             out[name] = float(fixed[name]) if name in fixed else round(drawn, 2) if low < high else low
@@ -137,7 +146,7 @@ class Catalogue:
     def _assembled(
         self,
         prop: Category,
-        look: Variant,
+        kind: Variant,
         form: Design,
         sizes: Mapping[str, float],
         surfaces: Mapping[str, str],
@@ -147,7 +156,7 @@ class Catalogue:
         meshes: list[_Piece] = []
         for k, part in enumerate(prop.parts):
             only = designs_of(part)
-            if (look.without | form.without).intersection(tags_of(part)) or (only and form.name not in only):
+            if (kind.without | form.without).intersection(tags_of(part)) or (only and form.name not in only):
                 continue
             own = part
             if part["shape"] == "crown" and "seed" not in part:

@@ -38,7 +38,7 @@ def faults(scene: Scene, catalogue: Catalogue, reach_m: float = 1.5) -> Iterator
     for one, other in clashes(scene, catalogue, 0.1, SPANNING):
         yield "stands in another", f"{one} and {other}"
     landmarks = [i for i in scene.instances if i.category in catalogue and catalogue[i.category].kind == "landmark"]
-    for landmark, share in zip(landmarks, seen_from(scene, landmarks), strict=True):
+    for landmark, share in zip(landmarks, visible_share(scene, landmarks), strict=True):
         if share < _MIN_SEEN:
             yield "landmark is hidden", f"{landmark.node}: seen from {share:.0%}"
 
@@ -106,7 +106,7 @@ def clashes(
     return out
 
 
-def seen_from(scene: Scene, things: Sequence[Instance]) -> list[float]:
+def visible_share(scene: Scene, things: Sequence[Instance]) -> list[float]:
     """Share, 0 to 1, of drawn points of the flight volume above the ground that see some of each thing."""
     if not things:
         return []

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.scenes.appearances import Appearance, Comparison, Order
 from aerialdojo_gen.scenes.colours import colour_name
-from aerialdojo_gen.scenes.looks import Comparison, Look, Order
 from aerialdojo_gen.scenes.model import Instance, Material
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ _END = 0.1
 
 
 # Descriptions need a choice: with fewer phrases true of an instance, all of its kind would read alike.
-MIN_TRUE_LOOKS = 2
+MIN_TRUE_PHRASES = 2
 
 
 class Materials(Protocol):
@@ -54,27 +54,27 @@ class Body:
         counts = instance.face_counts
         self._part_of = np.repeat(np.arange(len(counts)), counts)
 
-    def false_claims(self, look: Look) -> list[str]:
+    def false_claims(self, appearance: Appearance) -> list[str]:
         """List the claims of a phrase that do not hold."""
-        wrong = [f"has no {name}" for name in look.parts if not len(self._faces_of(name))]
-        wrong += [f"has {name}" for name in look.lacks if len(self._faces_of(name))]
+        wrong = [f"has no {name}" for name in appearance.parts if not len(self._faces_of(name))]
+        wrong += [f"has {name}" for name in appearance.lacks if len(self._faces_of(name))]
         if wrong:
             return wrong
-        for name, (least, most) in look.count.items():
+        for name, (least, most) in appearance.count.items():
             n = self.count(name)
             wrong += [] if least <= n <= most else [f"has {n} x {name}"]
-        for name, form in look.form.items():
+        for name, form in appearance.form.items():
             copies = self._copies_of(name)
             if not all(_FORMS[form](self, faces) for faces in copies):
                 wrong.append(f"its {name} is not {form}")
-        for name, words in look.colour.items():
+        for name, words in appearance.colour.items():
             found = self._shown(name, lambda m: colour_name(m.colour))
             wrong += [] if found in words else [f"its {name} is {found}"]
-        for name, words in look.material.items():
+        for name, words in appearance.material.items():
             found = self._shown(name, lambda m: m.name.partition(":")[0])
             wrong += [] if found in words else [f"its {name} is of {found}"]
-        wrong += [f"{c.text} is false" for c in look.size if not self._compares(c)]
-        wrong += [f"{o.text} is false" for o in look.order if not self._ordered(o)]
+        wrong += [f"{c.text} is false" for c in appearance.size if not self._compares(c)]
+        wrong += [f"{o.text} is false" for o in appearance.order if not self._ordered(o)]
         return wrong
 
     def count(self, name: str) -> int:
@@ -196,9 +196,9 @@ _PLACES: Mapping[str, _Boxes] = {
 }
 
 
-def valid_looks(looks: Iterable[Look], instance: Instance, materials: Materials) -> tuple[Look, ...]:
+def valid_phrases(every: Iterable[Appearance], instance: Instance, materials: Materials) -> tuple[Appearance, ...]:
     """Phrases without false claims about an instance."""
     if instance.anatomy is None:
         return ()
     body = Body(instance, materials)
-    return tuple(look for look in looks if not body.false_claims(look))
+    return tuple(one for one in every if not body.false_claims(one))

@@ -26,7 +26,7 @@ _SUNK_M = 0.015  # what is let down is so deep in the ground, or its edge would 
 _LET_DOWN_M = 0.25  # more would bury the door of a booth
 _STEEPEST_DEG = 18.0
 _SLENDER = 1.7  # times as high as its narrow side: poles and booths stay upright
-_LEAST_M = 0.35  # a smaller foot is let down
+_MIN_M = 0.35  # a smaller foot is let down
 _BURIED_M = 0.15  # a vehicle whose wheels are deeper in the ground leans as well
 _BURIED_SHARE = 0.4  # no more of a thing's height goes into the ground
 _PLINTH_M = 8.0  # longer things than this span: no block is put under them
@@ -35,7 +35,7 @@ _ELSEWHERE_M = 4.0  # what is so far off the ground stands on something else, or
 _LEVEL = frozenset({"building", "landmark"})
 
 
-def stand(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mesh | None]:
+def rest_on_ground(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mesh | None]:
     """Bring a thing into contact with the ground, and give it a plinth where nothing less does.
 
     Parameters
@@ -92,15 +92,15 @@ def _leans(instance: Instance, kind: str, feet: NDArray[np.int64]) -> bool:
         return False
     high = float(np.ptp(instance.bounds[:, 2]))
     # Whichever way it faces.
-    foot, narrow = _narrow_side(instance.vertices[feet]), _narrow_side(instance.vertices)
-    low = high <= _SLENDER * narrow
+    foot, shorter_side = _shorter_side(instance.vertices[feet]), _shorter_side(instance.vertices)
+    low = high <= _SLENDER * shorter_side
     if kind == "vehicle":
         # A boat on land lies on its keel.
-        return foot >= _LEAST_M or (low and narrow >= _LEAST_M)
-    return foot >= _LEAST_M and low
+        return foot >= _MIN_M or (low and shorter_side >= _MIN_M)
+    return foot >= _MIN_M and low
 
 
-def _narrow_side(points: Floats) -> float:
+def _shorter_side(points: Floats) -> float:
     """Shorter side of the smallest rectangle about points (n, 3) seen from above, metres."""
     around = shapely.minimum_rotated_rectangle(shapely.multipoints(np.round(points[:, :2], 4)))
     if around.geom_type != "Polygon":

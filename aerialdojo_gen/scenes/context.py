@@ -83,7 +83,7 @@ def open_scene(mesh: Path, sha256: str, keep: int = 1) -> SceneContext:
         return context
 
 
-def keep_scene(scene: Scene, sha256: str) -> None:
+def cache_scene(scene: Scene, sha256: str) -> None:
     """Cache a scene that was just written to a mesh: `open_scene` need not read it."""
     with _lock:
         if sha256 in _contexts:

@@ -39,10 +39,10 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
                 kept.append(instance if whole else replace(instance, parts=tuple(rest), anatomy=None))
         if not inside:
             raise AssetError(f"scene {scene.name}: the box {cut.node!r} holds no triangle's middle: make it larger")
-        look = {"colour": colour_words(*shown_colours(inside, scene.materials))}
+        attributes = {"colour": colour_words(*shown_colours(inside, scene.materials))}
         # A piece of the ground stays ground: no body flies below it.
         surface = "ground" if "ground" in surfaces else "sheet" if surfaces - {""} else ""
-        instances = [*kept, Instance(cut.node, cut.category, "", look, tuple(inside), surface=surface)]
+        instances = [*kept, Instance(cut.node, cut.category, "", attributes, tuple(inside), surface=surface)]
     return replace(scene, instances=tuple(instances))
 
 

@@ -76,7 +76,7 @@ def evaluate_arrays(text: str, names: Mapping[str, Floats | float]) -> Floats:
     """
     computed, used = _parse(text, arrays=True)
     if not names.keys() >= used:
-        raise ShapeError(f"{text!r} speaks of the unknown name {min(used - names.keys())!r}")
+        raise ShapeError(f"{text!r} uses the unknown name {min(used - names.keys())!r}")
     with np.errstate(all="ignore"):
         value = np.asarray(computed(names), dtype=np.float64)
     if not np.isfinite(value).all():
@@ -88,7 +88,7 @@ def evaluate(text: str, names: Mapping[str, float]) -> float:
     """Compute an expression; `ShapeError` for what `names_in` refuses, an unknown name or no finite result."""
     computed, used = _parse(text)
     if not names.keys() >= used:
-        raise ShapeError(f"{text!r} speaks of the unknown parameter {min(used - names.keys())!r}")
+        raise ShapeError(f"{text!r} uses the unknown parameter {min(used - names.keys())!r}")
     try:
         value = float(computed(names))
     except (ArithmeticError, ValueError) as error:

@@ -245,16 +245,16 @@ def _check(scene: Scene) -> None:
         raise ValueError("a scene shows at least one instance")
     shown = (*scene.instances, *scene.backdrop)
     if not all(i.surface in ("", *SURFACES) for i in shown):
-        raise ValueError("a surface of no kind")
+        raise ValueError("unknown kind of surface")
     texts = [scene.name, *(t for i in shown for t in (i.node, i.category, i.variant))]
     words = [w for i in shown for pair in i.attributes.items() for w in pair]
     if not all(isinstance(text, str) for text in (*texts, *words, *scene.materials)):
-        raise ValueError("a name is no text")
+        raise ValueError("a name must be text")
     for colour in (scene.sky, *(m.colour for m in scene.materials.values())):
         if len(colour) != 3 or not all(type(c) is int and 0 <= c <= 255 for c in colour):
             raise ValueError("a colour is none")
     if scene.weather not in WEATHERS:
-        raise ValueError("a weather of no kind")
+        raise ValueError("unknown kind of weather")
     numbers = [*scene.sun, *(m.tile_m for m in scene.materials.values())]
     if len(scene.sun) != 3 or not all(isinstance(n, int | float) and abs(n) < 1e9 for n in numbers):
         raise ValueError("sun or tiles are no numbers")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from shapely.geometry import LineString, MultiPolygon, Polygon
@@ -23,41 +24,39 @@ from aerialdojo_gen.scenes.site import Site
 ROOFS = ("flat", "gable", "hip")
 
 
+class Roof(NamedTuple):
+    """A building's roof: of `ROOFS`, the rise and overhang of a pitched one, the parapet of a flat one, metres."""
+
+    material: str
+    kind: str = "flat"
+    rise_m: float = 2.5
+    parapet_m: float = 0.6
+    overhang_m: float = 0.4
+
+
 def building(
-    site: Site,
-    plan: Polygon,
-    *,
-    wall: str,
-    roof: str,
-    storeys: int = 2,
-    storey_m: float = 3.2,
-    roof_kind: str = "flat",
-    roof_m: float = 2.5,
-    parapet_m: float = 0.6,
-    overhang_m: float = 0.4,
-    z: float | None = None,
-    node: str | None = None,
-    category: str = "building",
-    attributes: Mapping[str, str] | None = None,
+    site: Site, plan: Polygon, wall: str, roof: Roof, height_m: float = 6.4, *, z: float | None = None,
+    node: str | None = None, category: str = "building", attributes: Mapping[str, str] | None = None,
     extra: Sequence[tuple[str, Mesh]] = (),
-) -> Instance:
+) -> Instance:  # fmt: skip
     """Put up a building on an outline (world metres).
 
     The windows of a façade are stretched to whole ones on every wall.
     """
-    if roof_kind not in ROOFS:
-        raise ValueError(f"roof_kind {roof_kind!r} is none of {', '.join(ROOFS)}")
+    if roof.kind not in ROOFS:
+        raise ValueError(f"kind of roof {roof.kind!r} is none of {', '.join(ROOFS)}")
     base = min(site.ground_z(x, y) for x, y in plan.exterior.coords) if z is None else z
-    top = base + storeys * storey_m
+    top = base + height_m
     parts: list[tuple[str, Mesh]] = [(wall, facade(plan, base, top, site.catalogue.materials.tile_m(wall)))]
-    if roof_kind == "flat":
+    if roof.kind == "flat":
         # The roof's sides must not lie in the walls' plane, where both would flicker.
-        lid = plan.buffer(-0.02 if parapet_m > 0.0 else 0.15, join_style="mitre")
-        parts += [(roof, slab(p, top - 0.3, top)) for p in _pieces(lid)]
-        if parapet_m > 0.0:
-            parts += [("concrete", slab(p, top, top + parapet_m)) for p in _pieces(edge_strip(plan, 0.3))]
+        lid = plan.buffer(-0.02 if roof.parapet_m > 0.0 else 0.15, join_style="mitre")
+        parts += [(roof.material, slab(p, top - 0.3, top)) for p in _pieces(lid)]
+        if roof.parapet_m > 0.0:
+            parts += [("concrete", slab(p, top, top + roof.parapet_m)) for p in _pieces(edge_strip(plan, 0.3))]
     else:
-        parts += pitched_roof(plan, top, roof_m, wall, roof, hip=roof_kind == "hip", overhang_m=overhang_m)
+        hip, overhang_m = roof.kind == "hip", roof.overhang_m
+        parts += pitched_roof(plan, top, roof.rise_m, wall, roof.material, hip=hip, overhang_m=overhang_m)
     return site.add(node, category, [*parts, *extra], attributes, footprint=plan)
 
 

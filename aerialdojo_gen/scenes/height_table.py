@@ -69,7 +69,7 @@ def read_heights(path: Path) -> Terrain:
     try:
         check_regular(path)
         if path.resolve(strict=True).parent != path.parent.resolve():
-            raise AssetError(f"{path} leads out of its folder: put the table itself there")
+            raise AssetError(f"{path} points outside its folder: put the table itself there")
     except OSError as error:
         raise AssetError(f"{path} cannot be read ({error.strerror}): it belongs beside the plan") from None
     grid = read_ascii_grid(path, _MAX_CELLS, _MAX_TEXT_BYTES, _MAX_M)

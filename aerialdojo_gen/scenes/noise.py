@@ -21,8 +21,8 @@ def value_noise(size: int, cells: int, rng: np.random.Generator, cells_y: int | 
     i, j = np.floor(y).astype(int), np.floor(x).astype(int)
     ty, tx = _smooth(y - i)[:, None], _smooth(x - j)[None, :]
     # Along x once a row of the lattice, not once a row of the picture.
-    rungs = lattice[:, j] * (1 - tx) + lattice[:, (j + 1) % cells] * tx
-    return np.asarray(rungs[i] * (1 - ty) + rungs[(i + 1) % rows] * ty)
+    rows_mixed = lattice[:, j] * (1 - tx) + lattice[:, (j + 1) % cells] * tx
+    return np.asarray(rows_mixed[i] * (1 - ty) + rows_mixed[(i + 1) % rows] * ty)
 
 
 def fractal(size: int, cells: int, octaves: int, rng: np.random.Generator, gain: float = 0.5) -> Floats:

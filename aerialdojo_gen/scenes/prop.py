@@ -10,9 +10,9 @@ from typing import Any
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.anatomy import FRONTS
+from aerialdojo_gen.scenes.appearances import Appearance, parse_appearances
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, parse_designs
-from aerialdojo_gen.scenes.looks import Look, parse_looks
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
@@ -24,7 +24,7 @@ _VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "
 _MIRRORS = ("x", "y", "xy")
 _MAX_PARTS = 1000
 _MAX_VALUE = 10_000.0
-_LEAST_SCALE, _MOST_SCALE = 0.1, 10.0
+_MIN_SCALE, _MAX_SCALE = 0.1, 10.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Category:
     category: str  # Its key, e.g. ``"delivery_van"``
     name: str  # Common noun, e.g. ``"delivery van"``
     kind: str  # One of `KINDS`
-    looks: tuple[Look, ...]
+    looks: tuple[Appearance, ...]
     params: Mapping[str, Range]  # Sizes drawn once an instance; a fixed one has low == high
     roles: Mapping[str, str]  # Default material of every role
     parts: tuple[Mapping[str, Any], ...]  # Tables of the parts; empty where a builder makes them
@@ -109,7 +109,7 @@ def parse_category(
         raise AssetError(f"{where}: {len(parts):,} parts, the maximum is {_MAX_PARTS}")
     tags = {tag for p in parts for tag in tags_of(p)}
     named = sorted({*tags, *roles, *(p["role"] for p in parts)})
-    looks = parse_looks(body.get("looks", []), named, materials.names, where)
+    looks = parse_appearances(body.get("looks", []), named, materials.names, where)
     identifying_parts = _identifying_parts(body.get("tells", []), named, where)
     raw = body.get("variants", [])
     if not isinstance(raw, list):
@@ -127,8 +127,8 @@ def parse_category(
         raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
     designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
     scale = body.get("scale", 1.0)
-    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _LEAST_SCALE <= scale <= _MOST_SCALE:
-        raise AssetError(f"{where}: scale must be a number from {_LEAST_SCALE:g} to {_MOST_SCALE:g}, got {scale!r}")
+    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _MIN_SCALE <= scale <= _MAX_SCALE:
+        raise AssetError(f"{where}: scale must be a number from {_MIN_SCALE:g} to {_MAX_SCALE:g}, got {scale!r}")
     known = [one.name for one in designs]
     for k, part in enumerate(parts):
         for one in designs_of(part):

@@ -18,8 +18,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator, rank
-from aerialdojo_gen.scenes.catalogue import Catalogue, placed
-from aerialdojo_gen.scenes.contact import CONTACT_M, stand
+from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
+from aerialdojo_gen.scenes.contact import CONTACT_M, rest_on_ground
 from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.footprints import Footprints, disc, footprint, hull
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
@@ -125,8 +125,6 @@ class Site:
         holds = near[shapely.contains_xy(self._areas[near], x, y)] if len(near) else near
         return self._surfaces[holds[-1]] if len(holds) else None
 
-    # Things
-
     @overload
     def place(self, thing: Placement, fit: Literal["as_is", "must"] = ..., **room: Unpack[Room]) -> Instance: ...
 
@@ -150,16 +148,16 @@ class Site:
         z, at = thing.z, (thing.x, thing.y)
         settle_m = room.get("settle_m")
         if z is None and settle_m is not None:
-            z = self.settled_z(*at, settle_m)
+            z = self.foot_z(*at, settle_m)
         base = self.ground_z(*at) if z is None else z
         before = dict(self._counts)
         name = thing.node or self.node(thing.category)
         variant = self.next_variant(thing.category) if thing.variant is None else thing.variant
         attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
         options: dict[str, Any] = {
-            "variant": None if variant == DRAWN else variant, "scale": thing.scale, "params": thing.params,
-            "stretch": thing.stretch, "roles": thing.roles, "attributes": attributes or None,
+            "variant": None if variant == DRAWN else variant, "scale": thing.scale,
             "design": thing.design or self.design(thing.category, name),
+            "own": Overrides(thing.params, thing.roles, attributes or None, thing.stretch),
         }  # fmt: skip
         instance = self.catalogue.instantiate(
             thing.category, name, self.rng_for("prop", name), (*at, base), thing.yaw_deg, **options
@@ -178,13 +176,13 @@ class Site:
         if thing.z is None:
             self._on_ground.append(len(self.instances))
         self.instances.append(moved or instance)
-        self._keep_free(thing, instance, room)
+        self._reserve(thing, instance, room)
         return instance
 
     def _has_room(self, area: BaseGeometry, low: float, high: float) -> bool:
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
 
-    def _keep_free(self, thing: Placement, instance: Instance, room: Room) -> None:
+    def _reserve(self, thing: Placement, instance: Instance, room: Room) -> None:
         if room.get("clear_m"):
             self.occupy(disc(thing.x, thing.y, room["clear_m"]))
         if room.get("margin_m"):
@@ -208,7 +206,7 @@ class Site:
         used = Counter(i.variant for i in self.instances if i.category == category)
         return min(names, key=lambda name: (used[name], names.index(name)), default=None)
 
-    def settled_z(self, x: float, y: float, radius_m: float = 0.5) -> float:
+    def foot_z(self, x: float, y: float, radius_m: float = 0.5) -> float:
         """Give the height at which a prop of that radius neither floats nor is buried on a slope, metres."""
         angles = np.arange(6) * np.pi / 3
         ring = [self.ground_z(x + radius_m * float(np.cos(a)), y + radius_m * float(np.sin(a))) for a in angles]
@@ -244,7 +242,8 @@ class Site:
         base = self.ground_z(*target) + above
         self._moved_nodes.add(node)
         if move.place is not None:
-            options = {**options, "attributes": {**(options.get("attributes") or {}), "place": move.place}}
+            own: Overrides = options["own"]
+            options = {**options, "own": own._replace(attributes={**(own.attributes or {}), "place": move.place})}
         return self.catalogue.instantiate(
             category, node, self.rng_for("prop", node), (*target, base + move.up_m), yaw_deg + move.turn_deg,
             **options,
@@ -332,7 +331,7 @@ class Site:
             under = self._terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
             if np.ptp(under) <= CONTACT_M / 2.0:
                 continue
-            self.instances[k], plinth = stand(thing, self.catalogue[thing.category].kind, heights)
+            self.instances[k], plinth = rest_on_ground(thing, self.catalogue[thing.category].kind, heights)
             if plinth is not None:
                 self.add(f"plinth_{thing.node}", "plinth", [(self.material("plinth", "concrete"), plinth)])
 

@@ -16,7 +16,7 @@ def mesh_copy(where: Where, mesh_path: str) -> Path:
     """Return the local copy of a release's mesh; FileNotFoundError where it is missing."""
     root = open_root(where)
     if is_outside(root, mesh_path):
-        raise AssetError(f"release/scenes: mesh_path {mesh_path!r} leads out of {root}")
+        raise AssetError(f"release/scenes: mesh_path {mesh_path!r} points outside {root}")
     path = root.local_copy(mesh_path)
     if not path.is_file():
         raise FileNotFoundError(2, os.strerror(2), str(path))

@@ -29,7 +29,7 @@ def atomic_file(data: Path, relative: str) -> Iterator[Path]:
     except (OSError, RuntimeError) as error:
         raise StoreError(f"cannot write {path}: {first_line(error)}") from None
     if not inside:
-        raise StoreError(f"{relative!r} leads out of the data directory {data}")
+        raise StoreError(f"{relative!r} points outside the data directory {data}")
     try:
         _make_folders(path.parent)
         with staged(_staging_root(data, path), path) as item:

@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from aerialdojo_gen.base.environment_errors import number_of
-from aerialdojo_gen.base.errors import MissingPackage, StoreError, lacks
+from aerialdojo_gen.base.errors import MissingPackage, StoreError, no_package
 from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_transient
 
 # A file of more bytes goes up in parts, several at a time; S3 takes 10,000 of them at most.
-_SINGLE, _PART, _MOST_PARTS, _AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
+_SINGLE, _PART, _MAX_PARTS, _AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
 _BLOCK = 1 << 20
 _TRIES = 6
 # A connection that is silent for so long is given up and made anew: well below the time that a lock holds.
@@ -115,7 +115,7 @@ class Bucket:
             return Entry(size, self._put_parts(key, path, size, metadata))
 
     def _put_parts(self, key: str, path: Path, size: int, metadata: Mapping[str, str]) -> str:
-        length = max(_PART, -(-size // _MOST_PARTS))
+        length = max(_PART, -(-size // _MAX_PARTS))
         where = {"Bucket": self.name, "Key": key}
         upload = self._client.create_multipart_upload(**where, Metadata=dict(metadata))["UploadId"]
 
@@ -248,7 +248,7 @@ def _made_client(_process: int) -> Any:
         import botocore.session
         from botocore.config import Config
     except ImportError:
-        raise MissingPackage(lacks("s3://", "botocore", "cloud")) from None
+        raise MissingPackage(no_package("s3://", "botocore", "cloud")) from None
     retries: dict[str, Any] = {} if "AWS_RETRY_MODE" in os.environ else {"mode": "standard"}
     if "AWS_MAX_ATTEMPTS" not in os.environ:
         retries["total_max_attempts"] = _TRIES

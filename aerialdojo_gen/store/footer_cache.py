@@ -24,7 +24,7 @@ from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, changed_ns
 
-# No file system tells times less closely.
+# No file system has coarser times.
 _TIME_RESOLUTION_NS = 2 * 10**9
 
 

@@ -1,4 +1,4 @@
-"""What a shard's footer says of it, as JSON with a checksum of its own: a damaged one is told from a true one.
+"""What a shard's footer says of it, as JSON with a checksum of its own: damage is detected.
 
 Parquet's page checksums cover the rows and not the footer, so that what stands there must vouch for itself.
 """
@@ -70,7 +70,7 @@ def decode(raw: bytes) -> ShardInfo:
     elif fields.keys() != _KEYS or fields.pop("checksum") != _checksum(fields):
         raise ValueError("its footer's checksum is wrong")
     if not _well_formed(fields):
-        raise ValueError("its footer has values that none can have")
+        raise ValueError("its footer has impossible values")
     files = {name: ShardFile(*pair) for name, pair in fields.pop("files").items()}
     return ShardInfo(**fields, files=files)
 

@@ -1,7 +1,7 @@
 """A lock in an object store: a small object that its holder renews, taken over when it was not for too long.
 
 Whoever puts it first has it (a conditional put); a holder puts it anew, under the condition that nobody else did,
-every quarter of the lease. Its age is told by the store's clock alone. A holder that was killed leaves it to grow
+every quarter of the lease. Its age is measured by the store's clock alone. A holder that was killed leaves it to grow
 old: the next one waits for that, and takes it under the condition that it is still the old one, so that of two takers
 one gets it. A holder that could not renew it in time has lost it and writes nothing more; so do its workers, on
 whatever machine, which look whose it is before they commit, at most a quarter of a lease ago. What such a worker is

@@ -17,7 +17,7 @@ _TEXT = "text"
 
 
 def memo_key(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
-    """Tell what is asked of which files by which code from everything else."""
+    """Identify a result by what was computed from which files by which code."""
     digest = hashlib.sha256(f"{_sources()}\n{root}\n{parameters!r}".encode())
     for name in sorted(files):
         try:
@@ -60,7 +60,7 @@ def cache_text(key: str, text: str = "") -> None:
 
 @cache
 def _sources() -> str:
-    """Return what tells the package's sources, and the paper's figures, from others, which may say other things."""
+    """Return what identifies the package's sources and the paper's figures: others may say other things."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
     kinds = ("*.py", "*.j2", "*.toml", "*.csv")

@@ -84,7 +84,7 @@ class ObjectRoot(DataRoot):
                 return self._copied(relative)
             except Changed:
                 self._state.forget()
-        raise StoreError(f"{self.at(relative)} is replaced again and again: run the command again")
+        raise StoreError(f"{self.at(relative)} is being replaced repeatedly: run the command again")
 
     def _copied(self, relative: str) -> Path:
         files = self._files(relative)
@@ -126,7 +126,7 @@ class ObjectRoot(DataRoot):
                 return self._digest(relative, reread)
             except Changed:
                 self._state.forget()
-        raise StoreError(f"{self.at(relative)} is replaced again and again: run the command again")
+        raise StoreError(f"{self.at(relative)} is being replaced repeatedly: run the command again")
 
     def _digest(self, relative: str, reread: bool) -> str:
         files, state = self._files(relative), self._state

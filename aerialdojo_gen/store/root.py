@@ -57,7 +57,7 @@ class DataRoot(ABC):
 
     @abstractmethod
     def version(self, relative: str) -> str:
-        """Return what tells a file from any other of its name; FileNotFoundError where there is none.
+        """Return what distinguishes a file from any other of its name; FileNotFoundError where there is none.
 
         It says nothing by itself, and nothing on another root.
         """
@@ -82,7 +82,7 @@ class DataRoot(ABC):
     def commit(self, relative: str) -> AbstractContextManager[Path]:
         """Yield an empty local path to write a file to; at the end it is there whole, on an error not at all.
 
-        StoreError where the path leads out of the root, or the store is full, read-only or does not answer.
+        StoreError where the path points outside the root, or the store is full, read-only or does not answer.
         """
 
     @abstractmethod
@@ -245,7 +245,7 @@ def changed_ns(version: str) -> int:
 
 
 def is_outside(root: DataRoot, path_text: str) -> bool:
-    """Whether a path that a table names leads out of the data root, by dots or by a symbolic link."""
+    """Whether a path that a table names points outside the data root, by dots or by a symbolic link."""
     path = PurePosixPath(path_text)
     if path.is_absolute() or ".." in path.parts:
         return True
@@ -255,7 +255,7 @@ def is_outside(root: DataRoot, path_text: str) -> bool:
 def inside(relative: str) -> str:
     """Return a path if it stays below the root; StoreError otherwise."""
     if relative.startswith("/") or ".." in relative.split("/"):
-        raise StoreError(f"{relative!r} leads out of the data directory")
+        raise StoreError(f"{relative!r} points outside the data directory")
     return relative
 
 

@@ -4,7 +4,7 @@ What is being made for a place below ROOT lies in a folder of its own, ``ROOT/.a
 is the thing itself, ``lease`` a file that its writer holds locked and that says where the thing belongs. The kernel
 lets go of the lock when the writer ends, however it ends, in whatever PID namespace or on whichever host it ran: an
 item whose lease can be locked belongs to nobody and is removed, one whose lease cannot is being written. Where the
-file system knows no locks nobody can tell, and nothing is removed.
+file system knows no locks that is unknown, and nothing is removed.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
             return item, lease
         lease.close()
         if time.monotonic() > end:
-            raise OSError(errno.EBUSY, "it is swept again and again", str(area))
+            raise OSError(errno.EBUSY, "it is swept repeatedly", str(area))
 
 
 def sweep(root: Path) -> None:
@@ -125,7 +125,7 @@ def sweep_unstaged(data: Path) -> None:
 
 
 def _discard(item: Path) -> None:
-    """Remove an item; its lease last, so that a kill on the way leaves something that can be told to be dead."""
+    """Remove an item; its lease last, so that a kill on the way leaves something that is known to be dead."""
     with contextlib.suppress(OSError):
         for path in item.iterdir():
             if path.name != _LEASE:

@@ -1,4 +1,4 @@
-"""Tables in memory: made of rows, held to their schema, told apart by a digest of their content."""
+"""Tables in memory: made of rows, checked by their schema, identified by a digest of their content."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check_table(spec: TableSpec, table: pa.Table) -> pa.Table:
             raise StoreError(f"{spec.name}: rows are not sorted by {', '.join(spec.order)}")
         keys = table.select(list(spec.key))
         if keys.group_by(list(spec.key), use_threads=False).aggregate([]).num_rows != keys.num_rows:
-            raise StoreError(f"{spec.name}: a key ({', '.join(spec.key)}) stands twice")
+            raise StoreError(f"{spec.name}: duplicate key ({', '.join(spec.key)})")
     return table
 
 
@@ -68,7 +68,7 @@ def column_digests(table: pa.Table) -> dict[str, str]:
         digest = hashlib.sha256(str(table.num_rows).encode())
         for piece in _pieces(table, name):
             digest.update(piece)
-        # Half of it tells damage as well, and a footer has one for each column, twice.
+        # Half of it detects damage as well, and a footer has one for each column, twice.
         digests[name] = digest.hexdigest()[:32]
     return digests
 

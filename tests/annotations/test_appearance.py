@@ -15,7 +15,7 @@ from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.phrases import noun_of, words_of
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.claims import valid_looks
+from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 
@@ -28,7 +28,7 @@ def test_a_phrase_of_the_catalogue_must_be_so_of_the_instance(catalogue):
     sign = catalogue.instantiate("stop_sign", "stop_sign_000", generator(0, "test", "looks"), position=(-60, 0, 0))
     looks = catalogue["stop_sign"].looks
     materials = {part.material: catalogue.materials[part.material] for part in sign.parts}
-    true = valid_looks(looks, sign, materials)
+    true = valid_phrases(looks, sign, materials)
     scene = dataclasses.replace(
         street(), instances=(*street().instances, sign), materials=street().materials | materials
     )

@@ -11,7 +11,7 @@ from aerialdojo_gen.annotations.appearance import repeats
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, valid_looks
+from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, valid_phrases
 from aerialdojo_gen.scenes.model import Scene
 
 WHEELS = "silvery hubcaps"
@@ -34,7 +34,7 @@ def stand(catalogue, category: str, level_m: float, variant: str | None = None, 
 
 
 def said(catalogue, scene: Scene) -> tuple[str, ...]:
-    return Vocabulary(scene, catalogue).looks(scene.instances[0])
+    return Vocabulary(scene, catalogue).unrepeated_phrases(scene.instances[0])
 
 
 def test_what_is_under_water_is_not_told(catalogue):
@@ -53,7 +53,7 @@ def test_more_water_hides_more(catalogue, category):
     assert all(more >= less for more, less in pairwise(shown))
     assert len(shown[-1]) < len(shown[0])
     thing = stand(catalogue, category, 0.0).instances[0]
-    true = {look.phrase for look in valid_looks(catalogue[category].looks, thing, catalogue.materials)}
+    true = {look.phrase for look in valid_phrases(catalogue[category].looks, thing, catalogue.materials)}
     assert true <= shown[0]
 
 
@@ -83,7 +83,7 @@ def test_a_deck_overhead_hides_nothing(catalogue):
 def test_a_phrase_that_says_an_attribute_again_is_not_used(catalogue, category, variant, twice):
     scene = stand(catalogue, category, 0.0, variant)
     assert twice in {
-        look.phrase for look in valid_looks(catalogue[category].looks, scene.instances[0], scene.materials)
+        look.phrase for look in valid_phrases(catalogue[category].looks, scene.instances[0], scene.materials)
     }
     assert twice not in said(catalogue, scene)
 
@@ -106,6 +106,6 @@ def test_of_every_variant_of_which_a_phrase_is_not_used_there_is_something_to_te
     materials["grey"] = catalogue.materials["concrete"]
     scene = Scene("U_All_0", (*things, ground), materials, np.array([[-99.0, -99.0, -1.0], [99.0, 99.0, 99.0]]))
     vocabulary = Vocabulary(scene, catalogue)
-    phrases = {thing.node: vocabulary.looks(thing) for thing in things}
-    assert [pairs[k] for k, said in enumerate(phrases.values()) if len(said) < MIN_TRUE_LOOKS] == []
+    phrases = {thing.node: vocabulary.unrepeated_phrases(thing) for thing in things}
+    assert [pairs[k] for k, said in enumerate(phrases.values()) if len(said) < MIN_TRUE_PHRASES] == []
     assert not any(repeats(say, thing) for thing in things for say in phrases[thing.node])

@@ -38,7 +38,7 @@ MEASURES = ("seen", "framed", "open", "told", "parts", "front")
 
 
 def measures(found, chosen, radius_m, config):
-    looked = CandidateViews.of(found, np.array(chosen), radius_m, config)
+    looked = CandidateViews.of(found, np.array(chosen), config)
     for view in looked.pictures(np.arange(len(chosen)), config.picture_px, config.fov_deg):
         terms = judge(view, radius_m, config.standoff_m)
         front = None if view.off_front_rad is None else view.off_front_rad <= FRONT_RAD

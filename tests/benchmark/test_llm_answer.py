@@ -56,7 +56,7 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         ('{"action": "stop"}', "'stop' is none of the actions"),
         ('{"action": "Approach"}', "'Approach' is none of the actions"),
         ('{"action": "Stop", "confidence": 1}', "confidence: Extra inputs are not permitted"),
-        ('{"action": "Stop", "action": "MoveUp1"}', "a key stands twice"),
+        ('{"action": "Stop", "action": "MoveUp1"}', "duplicate key"),
         ("[" * 10_000, "not one JSON object"),
         ('{"a":' * 3_000 + "1" + "}" * 3_000, "not one JSON object|a: Extra inputs"),
         ('{"thought": ' + "9" * 5_000 + ', "action": "Stop"}', "not one JSON object .*digits"),

@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.runs import load_runs
-from aerialdojo_gen.benchmark.tables import conduct_cells
+from aerialdojo_gen.benchmark.tables import outcome_cells
 
 KEY = "sk-test-0b7a41dc95e84f2f8c63"
 TURN, STOP, UNREADABLE = '{"thought": "Look.", "action": "TurnLeft15"}', '{"action": "Stop"}', "I am lost."
@@ -80,7 +80,7 @@ def test_an_evaluation_logs_what_was_said_and_what_it_cost(smoke: Path, tmp_path
     assert steps["action"].to_pylist() == [14, None, 0] * 2
     assert steps["answer"].to_pylist() == [TURN, UNREADABLE, STOP] * 2
     (run,) = load_runs(tmp_path)
-    assert conduct_cells(run, PROFILES["aerialdojo"])[5:7] == ("2", "8")
+    assert outcome_cells(run, PROFILES["aerialdojo"])[5:7] == ("2", "8")
     # Defaults too: how many pictures were sent is in the log.
     used = json.loads(episodes["agent_options"][0].as_py())
     expected = {"history_images": 1, "actions": "sixteen", "image_size_px": 32, "answer": "text"}

@@ -25,7 +25,7 @@ from aerialdojo_gen.benchmark import figures, registry, score_rows, tables
 from aerialdojo_gen.benchmark.metrics import PROFILES, Profile, summarize
 from aerialdojo_gen.benchmark.report import html, write_report
 from aerialdojo_gen.benchmark.runs import Run, load_runs
-from aerialdojo_gen.benchmark.tables import conduct_cells
+from aerialdojo_gen.benchmark.tables import outcome_cells
 from aerialdojo_gen.cli import app as cli
 
 pytestmark = pytest.mark.slow
@@ -152,7 +152,7 @@ def test_what_a_comparison_lacks_is_said_under_the_table(tmp_path: Path) -> None
 
 def test_conduct_counts_ends_and_does_not_add_what_is_not_known(runs: list[Run]) -> None:
     for run in runs:
-        cells = conduct_cells(run, AT_3)
+        cells = outcome_cells(run, AT_3)
         assert sum(map(float, cells[:3])) == pytest.approx(100.0, abs=0.15)
         assert float(cells[1]) == pytest.approx(100.0 * run.episodes.collision.mean(), abs=0.05)
         assert (cells[-1] == "–") == (run.agent != "explorer")
@@ -267,14 +267,14 @@ def test_the_papers_axes_are_fixed_and_nothing_leaves_them() -> None:
     families = summarize(runs[0].episodes, AT_3).families
     assert min(family.osr for family in families.values()) > 0.15
     ends = {"sr": 5.0, "osr": 15.0, "spl": 5.0, "dts_m": 40.0, "cr": 100.0}
-    for axes, family in zip(figures.family_radars(runs, AT_3, paper=True).axes, families.values(), strict=True):
+    for axes, family in zip(figures.family_radars(runs, AT_3, paper_axes=True).axes, families.values(), strict=True):
         sr, osr, spl, dts, cr = axes.lines[0].get_ydata()[:5]
         assert osr == 1.0
         assert [sr, spl] == pytest.approx([min(1.0, 100 * v / 5.0) for v in (family.sr, family.spl)])
         assert [dts, cr] == pytest.approx([1.0 - family.dts_m / 40.0, 1.0 - family.cr])
         shown = {text.get_text() for text in axes.texts}
         assert {"SR\n5 %", "OSR\n15 %", "SPL\n5 %", "DTS\n0 m", "CR\n0 %"} <= shown
-    metrics = figures.metric_radars(runs, AT_3, paper=True).axes
+    metrics = figures.metric_radars(runs, AT_3, paper_axes=True).axes
     centres = [next(t.get_text() for t in axes.texts if "centre" in t.get_text()) for axes in metrics[:5]]
     assert centres == [f"{ends[m] if m in ('dts_m', 'cr') else 0:g} at the centre" for m in ends]
 

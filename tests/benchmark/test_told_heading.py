@@ -77,7 +77,7 @@ def test_a_model_is_told_what_turns_do_to_the_heading() -> None:
 def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path) -> None:
     Listener.heard.clear()
     evaluate(court, Evaluation("plain", ME), out=tmp_path)
-    evaluate(court, Evaluation("told", ME, tell=("heading",)), out=tmp_path)
+    evaluate(court, Evaluation("told", ME, hints=("heading",)), out=tmp_path)
     # The tasks look west.
     assert [goal.heading for goal in Listener.heard] == [None] * 3 + [Heading("west", 270)] * 3
     plain, told = Listener.heard[0], Listener.heard[3]
@@ -100,12 +100,12 @@ def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path
 def test_a_run_with_it_never_mixes_with_one_without(court: Path, tmp_path: Path) -> None:
     evaluate(court, Evaluation("r", "stop"), out=tmp_path)
     with pytest.raises(UsageError, match=r"run 'r' was begun with tell = \[\], not \['heading'\]: give"):
-        evaluate(court, Evaluation("r", "stop", tell=("heading",)), out=tmp_path)
-    evaluate(court, Evaluation("r", "stop", tell=("heading",)), out=tmp_path, restart=True)
+        evaluate(court, Evaluation("r", "stop", hints=("heading",)), out=tmp_path)
+    evaluate(court, Evaluation("r", "stop", hints=("heading",)), out=tmp_path, restart=True)
     with pytest.raises(UsageError, match=r"begun with tell = \['heading'\], not \[\]"):
         evaluate(court, Evaluation("r", "stop"), out=tmp_path)
-    with pytest.raises(UsageError, match="nothing to tell called 'headings': did you mean 'heading'"):
-        Evaluation("r", "stop", tell=("headings",))
+    with pytest.raises(UsageError, match="no hint 'headings': did you mean 'heading'"):
+        Evaluation("r", "stop", hints=("headings",))
 
 
 def test_the_environment_observes_it(court: Path) -> None:

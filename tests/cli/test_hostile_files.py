@@ -107,7 +107,7 @@ def assert_named(message, start, place):
     [
         ({"paint": ["nan", -6, 0, 0], "material": "mud"}, "(paint): paint = ['nan', -6, 0, 0]: 'nan' speaks of"),
         ({"paint": [0, 0, float("inf"), 9], "material": "mud"}, ".paint[2]: is inf, no finite number"),
-        ({"paint": [-6, False, 0, 0], "material": "mud"}, "a number or an expression is wanted, got False"),
+        ({"paint": [-6, False, 0, 0], "material": "mud"}, "expected a number or an expression, got False"),
         ({"paint": [-6, -1e-300, 0, 0], "material": "mud"}, "a rectangle must be 0.01 m wide and deep or more"),
         (drawn({"corners": ["nan", -6, 0, 0]}), "parts[0] (block): 'nan' speaks of"),
         (drawn({"corners": [-6, -1e-300, 0, 0]}), "parts[0] (block): the outline has no area"),

@@ -15,7 +15,7 @@ from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
-from aerialdojo_gen.dataset.contents import scenes_there
+from aerialdojo_gen.dataset.contents import existing_scenes
 from aerialdojo_gen.pipeline import runner
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
@@ -109,7 +109,7 @@ def test_a_pipeline_of_ones_own_is_found_beside_the_data_or_asked_for(data, pipe
 
 def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
     split(data, pipeline(), replace=True)
-    assert scenes_there(data) == [B]
+    assert existing_scenes(data) == [B]
     (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
     assert (entry["name"], entry["scenes"]) == ("other", [B])
     split(data, pipeline())
@@ -151,7 +151,7 @@ def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipe
     assert release(data) == before
     # Narrowed and nothing else: the release holds what the pipeline asks for, as ever.
     split(data, pipeline("smoke"))
-    assert scenes_there(data) == [B]
+    assert existing_scenes(data) == [B]
 
 
 @pytest.mark.parametrize("record", [None, "{", '{"pipelines": [{"name": 3}]}'])

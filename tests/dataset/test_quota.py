@@ -16,7 +16,13 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
-from aerialdojo_gen.pipeline.stages.work.quota import Kept, apportion, difficulty_level, select_quota, train_quotas
+from aerialdojo_gen.pipeline.stages.work.quota import (
+    Accepted,
+    apportion,
+    difficulty_level,
+    select_quota,
+    train_quotas,
+)
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -65,12 +71,12 @@ def test_a_choice_has_the_numbers_and_the_metres(seed, longer):
     ids, setting, lengths = pool(1500, seed)
     wanted = {"base": 200, "standard": 150, "long_horizon": 40}
     plain = sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
-    mask = select_quota(Kept(ids, setting, lengths), wanted, longer * plain, seed)
+    mask = select_quota(Accepted(ids, setting, lengths), wanted, longer * plain, seed)
     assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
     assert lengths[mask].sum() == pytest.approx(longer * plain, rel=0.01)
     order = np.random.default_rng(seed).permutation(len(ids))
     again = select_quota(
-        Kept([ids[k] for k in order], [setting[k] for k in order], lengths[order]), wanted, longer * plain, seed
+        Accepted([ids[k] for k in order], [setting[k] for k in order], lengths[order]), wanted, longer * plain, seed
     )
     assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
 
@@ -79,15 +85,15 @@ def test_a_length_out_of_reach_takes_the_nearest():
     ids, setting, lengths = pool(300, 3)
     wanted = {"base": 40}
     bases = np.sort(lengths[np.asarray(setting) == "base"])
-    least = lengths[select_quota(Kept(ids, setting, lengths), wanted, 1.0, 0)].sum()
-    most = lengths[select_quota(Kept(ids, setting, lengths), wanted, 1e9, 0)].sum()
+    least = lengths[select_quota(Accepted(ids, setting, lengths), wanted, 1.0, 0)].sum()
+    most = lengths[select_quota(Accepted(ids, setting, lengths), wanted, 1e9, 0)].sum()
     assert least == pytest.approx(bases[:40].sum(), rel=0.02)
     assert most == pytest.approx(bases[-40:].sum(), rel=0.02)
 
 
 def test_another_seed_releases_other_tasks():
     ids, setting, lengths = pool(300, 3)
-    chosen = {select_quota(Kept(ids, setting, lengths), {"base": 40}, 700.0, seed).tobytes() for seed in range(4)}
+    chosen = {select_quota(Accepted(ids, setting, lengths), {"base": 40}, 700.0, seed).tobytes() for seed in range(4)}
     assert len(chosen) == 4
 
 
@@ -100,17 +106,18 @@ def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, pr
     assert set(levels.tolist()) == {0, 1, 2}
     wanted = {"base": 150, "standard": 120, "long_horizon": 40}
     path_m = longer * sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
-    plain = select_quota(Kept(ids, setting, lengths), wanted, path_m, seed)
-    mask = select_quota(Kept(ids, setting, lengths, levels), wanted, path_m, seed, preference)
+    plain = select_quota(Accepted(ids, setting, lengths), wanted, path_m, seed)
+    mask = select_quota(Accepted(ids, setting, lengths, levels), wanted, path_m, seed, preference)
     assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
     assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
     assert levels[mask].sum() > levels[plain].sum()
     # Equal steps are no preference, and the order of rows is none either.
     assert (
-        select_quota(Kept(ids, setting, lengths, np.ones(1500, np.int64)), wanted, path_m, seed, preference) == plain
+        select_quota(Accepted(ids, setting, lengths, np.ones(1500, np.int64)), wanted, path_m, seed, preference)
+        == plain
     ).all()
     order = rng.permutation(1500)
-    mixed = Kept([ids[k] for k in order], [setting[k] for k in order], lengths[order], levels[order])
+    mixed = Accepted([ids[k] for k in order], [setting[k] for k in order], lengths[order], levels[order])
     again = select_quota(mixed, wanted, path_m, seed, preference)
     assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
 
@@ -118,7 +125,7 @@ def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, pr
 def test_where_all_candidates_are_wanted_nothing_is_preferred():
     ids, setting, lengths = pool(300, 5)
     wanted = {s: setting.count(s) for s in SETTINGS}
-    assert select_quota(Kept(ids, setting, lengths, np.arange(300) % 3), wanted, 1.0, 0, 50.0).all()
+    assert select_quota(Accepted(ids, setting, lengths, np.arange(300) % 3), wanted, 1.0, 0, 50.0).all()
 
 
 def test_what_is_not_known_is_not_hard():

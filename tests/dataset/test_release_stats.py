@@ -25,11 +25,11 @@ from aerialdojo_gen.dataset.stats.measures import (
     difficulty_tables,
     flight_table,
     goal_table,
+    goal_tables,
     held_out_table,
+    novelty_table,
     scene_table,
-    seen_table,
     setting_table,
-    worth_tables,
 )
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
 from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
@@ -45,7 +45,7 @@ def as_the_paper(name, **changes):
     made = {
         "scene": name, "family": schemas.FAMILIES[name[0]], "scene_type": name.split("_")[1],
         "landmarks": paper.landmarks, "objects": paper.objects, "categories": frozenset({"van"}), "tasks": tasks,
-        "path_m": paper.path_m, "paper": paper, "anchors": paper.objects,
+        "path_m": paper.path_m, "paper_scene": paper, "anchors": paper.objects,
     }  # fmt: skip
     return Made(**(made | changes))
 
@@ -105,7 +105,7 @@ def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
 
 
 def test_shares_and_lengths_are_those_of_the_appendix(papers):
-    shares = {row.name: (row.ours[0], row.paper[0]) for row in tables(papers)[4].rows}
+    shares = {row.name: (row.ours[0], row.theirs[0]) for row in tables(papers)[4].rows}
     assert len(shares) == 12
     # The paper prints two digits; a release of its counts has its shares to half of the last one.
     for name, (ours, paper) in shares.items():
@@ -123,7 +123,7 @@ def test_types_and_anchors_are_those_of_table_2(papers):
     urban = dict(zip(columns, table.rows[0].ours, strict=True))
     assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
     some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
-    assert (some.rows[0].paper[0], some.rows[1].paper[0]) == (None, 6)
+    assert (some.rows[0].theirs[0], some.rows[1].theirs[0]) == (None, 6)
 
 
 def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
@@ -178,7 +178,7 @@ def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
 
 
 def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
-    for table in (*tables([replace(m, paper=None) for m in papers]),):
+    for table in (*tables([replace(m, paper_scene=None) for m in papers]),):
         assert table.compared == 0
         assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
 
@@ -210,7 +210,7 @@ def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
     tasks = read_tasks(smoke, check_release(smoke))
     test = frame[frame["subset"] == "test"]
     new = [~test[f"{what}_seen_in_train"] for what in ("target", "start", "pair")]
-    seen = {row.name: row.ours for row in seen_table(tasks).rows}["all"]
+    seen = {row.name: row.ours for row in novelty_table(tasks).rows}["all"]
     assert seen == pytest.approx((
         len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
         new[2].sum(), 100 * new[2].mean(),
@@ -256,9 +256,7 @@ def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
         100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
     ))  # fmt: skip
     assert (
-        max(
-            len(line) for t in worth_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80)
-        )
+        max(len(line) for t in goal_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80))
         <= 80
     )
 
@@ -302,7 +300,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
     scenes = in_paper_order([made_of(smoke, name) for name in check_release(smoke)])
     names = [m.scene for m in scenes]
     tasks = read_tasks(smoke, names)
-    measured = [*worth_tables(read_goals(smoke, names), tasks), *difficulty_tables(tasks)]
+    measured = [*goal_tables(read_goals(smoke, names), tasks), *difficulty_tables(tasks)]
     made = [*tables(scenes), *measured, benchmark_table(scenes)]
     assert (out / "stats.md").read_text() == as_markdown(made)
     assert (out / "stats.csv").read_text() == as_csv(made)

@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.paper_figures import PaperScene
-from aerialdojo_gen.dataset.contents import check_release, scenes_there
+from aerialdojo_gen.dataset.contents import check_release, existing_scenes
 from aerialdojo_gen.dataset.validate import ValidationOptions, counts, validate, write_report
 from aerialdojo_gen.dataset.validate.registry import Fault
 from aerialdojo_gen.store import shards as store
@@ -138,7 +138,7 @@ def test_a_card_and_a_croissant_that_tell_other_numbers(planted):
 
 def test_a_lost_part_is_told_by_whoever_reads_the_release(planted):
     planted.path("release/scenes").unlink()
-    assert planted.scene in scenes_there(planted.data)
+    assert planted.scene in existing_scenes(planted.data)
     with pytest.raises(StoreError, match="missing"):
         check_release(planted.data)
     with pytest.raises(StoreError, match=f"release/scenes of {planted.scene} is missing"):

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
 from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.dataset.contents import scenes_there
+from aerialdojo_gen.dataset.contents import existing_scenes
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.staging import AREA
@@ -335,7 +335,7 @@ def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
     arguments = ["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "32", "--out", str(tmp_path / "o")]
     done = runner.invoke(app, ["export", *arguments])
     assert done.exit_code == 0
-    scenes = scenes_there(smoke)
+    scenes = existing_scenes(smoke)
     n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)
     assert n > 100
     assert done.output.strip().endswith(f"2 scenes, 24 task files, {2 * n} tasks, {n} trajectories, 16 pictures")

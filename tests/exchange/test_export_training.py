@@ -15,17 +15,19 @@ from support import lerobot_reader
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
+from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange import lerobot_writer
 from aerialdojo_gen.exchange.folder import PartialExport
-from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
+from aerialdojo_gen.exchange.learning_export import export_for_learning
+from aerialdojo_gen.exchange.samples import ExportOptions
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.rendering.codecs import to_stored
 from aerialdojo_gen.store import shards as store
 
 VIEWS = ("front", "down")
-OPTIONS = {"split": ("all",), "limit": 1, "views": VIEWS, "size": (48, 32), "goal": ("text", "image")}
+OPTIONS = {"splits": ("all",), "limit": 1, "sensors": Sensors(VIEWS, width=48, height=32), "goal": ("text", "image")}
 # A Python that has LeRobot, which wants other versions of many packages than this project's environment has.
 LEROBOT = os.environ.get("LEROBOT_PYTHON", "")
 
@@ -33,7 +35,7 @@ LEROBOT = os.environ.get("LEROBOT_PYTHON", "")
 @pytest.fixture(scope="module")
 def made(smoke, tmp_path_factory):
     folder = tmp_path_factory.mktemp("exports")
-    options = export_options(**OPTIONS)
+    options = ExportOptions(**OPTIONS)
     counts = {
         form: export_for_learning(form, smoke, folder / form, options, workers=1)
         for form in ("lerobot", "webdataset")
@@ -193,7 +195,7 @@ def test_webdataset_reads_the_shards_back(made, seen, lerobot):
 
 def test_the_same_bytes_by_any_number_of_workers_and_the_same_data_in_other_parts(made, smoke, tmp_path, monkeypatch):
     """Of WebDataset's shards the test of a killed export shows it: two processes write them."""
-    folder, options = made[0] / "lerobot", export_options(**OPTIONS)
+    folder, options = made[0] / "lerobot", ExportOptions(**OPTIONS)
     again = export_for_learning("lerobot", smoke, tmp_path / "again", options, workers=2)
     assert again == made[1]["lerobot"]
     assert files(tmp_path / "again") == files(folder)
@@ -218,7 +220,9 @@ def test_what_is_killed_goes_on_with_finished_parts(made, smoke, tmp_path):
     script = f"""
 import os, pathlib, signal, sys
 from aerialdojo_gen.exchange import webdataset_writer
-from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
+from aerialdojo_gen.benchmark.agents.goal import Sensors
+from aerialdojo_gen.exchange.learning_export import export_for_learning
+from aerialdojo_gen.exchange.samples import ExportOptions
 whole, done = webdataset_writer.write_part, []
 def write(root, part, wanted, folder):
     whole(root, part, wanted, folder)
@@ -226,7 +230,7 @@ def write(root, part, wanted, folder):
     if len(done) == 2:
         os.kill(os.getpid(), signal.SIGKILL)
 webdataset_writer.write_part = write
-export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), export_options(**{OPTIONS!r}), workers=1)
+export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), ExportOptions(**{OPTIONS!r}), workers=1)
 """
     done = subprocess.run([sys.executable, "-c", script, str(smoke), str(out)], capture_output=True, text=True)
     assert done.returncode == -signal.SIGKILL, done.stderr
@@ -234,7 +238,7 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), export
     (unfinished,) = tmp_path.glob(".*.unfinished")
     assert [path.name for path in (unfinished / "parts").iterdir()] == ["000000"]
     first = (unfinished / "parts" / "000000" / "shard.tar").stat().st_ino
-    resumed = export_for_learning("webdataset", smoke, out, export_options(**OPTIONS), workers=1)
+    resumed = export_for_learning("webdataset", smoke, out, ExportOptions(**OPTIONS), workers=1)
     assert (resumed.parts_kept, resumed.parts) == (1, 2)
     assert (out / "shard-000000.tar").stat().st_ino == first, "it is the file of the killed run"
     assert files(out) == files(made[0] / "webdataset")
@@ -244,10 +248,10 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), export
 def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
     def parts(request):
         unfinished = PartialExport(tmp_path / "export", request)
-        with unfinished.held():
+        with unfinished.locked():
             before = sorted(path.name for path in (unfinished.folder / "parts").iterdir())
             unfinished.part(0).mkdir(exist_ok=True)
-            with pytest.raises(UsageError, match="another process is making this export"), unfinished.held():
+            with pytest.raises(UsageError, match="another process is making this export"), unfinished.locked():
                 pass
         return before
 
@@ -258,7 +262,8 @@ def test_parts_of_another_request_are_not_gone_on_with(smoke, tmp_path):
 
 def test_recordings_are_read_where_there_are_some(smoke, tmp_path):
     """What is not recorded is left out by recordings, and drawn by auto."""
-    options = export_options(split=("all",), source="recordings", size=64, depth=False)
+    sensors = Sensors(("front",), depth=False, width=64, height=64)
+    options = ExportOptions(("all",), source="recordings", sensors=sensors)
     made = export_for_learning("webdataset", smoke, tmp_path / "recorded", options, workers=1)
     assert 0 < made.counts["trajectories"] < 10
 
@@ -319,10 +324,10 @@ def test_what_makes_no_sense_is_one_line(smoke, tmp_path, options, message):
 
 def test_a_release_without_meshes_and_one_without_recordings_are_named(planted, tmp_path):
     with pytest.raises(UsageError, match=r"has a recording of the views asked for: run .*render.*--source render"):
-        export_for_learning("lerobot", planted.data, tmp_path / "x", export_options(source="recordings"))
+        export_for_learning("lerobot", planted.data, tmp_path / "x", ExportOptions(source="recordings"))
     shutil.rmtree(planted.data / "meshes")
     with pytest.raises(StoreError, match=r"the mesh .* is missing: run aerialdojo-gen build-scenes"):
-        export_for_learning("lerobot", planted.data, tmp_path / "x", export_options())
+        export_for_learning("lerobot", planted.data, tmp_path / "x", ExportOptions())
     assert not list(tmp_path.glob("x*"))
     assert not list(tmp_path.glob(".x*"))
 
@@ -333,7 +338,5 @@ def test_a_name_that_leads_out_of_the_folder_comes_into_no_tar(planted, tmp_path
         rows = [row | {"nav_id": "../../outside"} if row["nav_id"] == old else row for row in planted.rows(table)]
         planted.write(table, rows, schema=store.LAYOUT[table].spec.schema)
     with pytest.raises(StoreError, match=r"nav_id '../../outside' cannot name a file"):
-        export_for_learning(
-            "webdataset", planted.data, tmp_path / "x", export_options(split=("train",), size=(32, 32)), workers=1
-        )
+        export_for_learning("webdataset", planted.data, tmp_path / "x", ExportOptions(("train",)), workers=1)
     assert not (tmp_path / "x").exists()

@@ -176,7 +176,7 @@ def test_what_comes_damaged_is_told_and_not_kept(smoke, hub, call, tmp_path):
     part = "objects/part-U_Courtyard_0.parquet"
     whole = hub.repos[NAME].files[part]
     hub.spoilt[part] = whole[:100] + bytes([whole[100] ^ 1]) + whole[101:]
-    fails(call("pull", NAME, "--data", tmp_path), 1, part, "came damaged")
+    fails(call("pull", NAME, "--data", tmp_path), 1, part, "was damaged in transfer")
     assert not (tmp_path / "release").exists()
     hub.spoilt.clear()
     assert call("pull", NAME, "--data", tmp_path)[0] == 0

@@ -63,16 +63,16 @@ BAD = [
     ("uav-on", "true_name", "\ud800", "true_name", "half a Unicode character"),
     ("uav-on", "map_name", "../outside", "scene", "'../outside' is not a scene name"),
     ("uav-on", "map_name", "/etc", "scene", "'/etc' is not a scene name"),
-    ("uav-on", "episode_id", "0", "id", "BrushifyRoad_test/0 stands twice"),
+    ("uav-on", "episode_id", "0", "id", "BrushifyRoad_test/0 appears twice"),
     ("cityavos", "initial_pos.5", 90, "initial_pos[5]", "yaw 90 is more than a turn in radians"),
     ("cityavos", "initial_pos", [1, 2, 3], "initial_pos", "expected 6 numbers, found 3"),
     ("cityavos", "target_pos", [1, 2, NAN], "target_pos", "nan is no finite number"),
     ("cityavos", "target_image_path", "data/target_image/none.png", "target_image_path", "there is no file"),
-    ("cityavos", "target_image_path", "../secret.png", "target_image_path", "'../secret.png' leads out of"),
+    ("cityavos", "target_image_path", "../secret.png", "target_image_path", "'../secret.png' points outside"),
     ("cityavos", "target_image_path", "/etc/passwd", "target_image_path", "is no path relative to"),
     ("cityavos", "target_image_path", "C:\\x.png", "target_image_path", "is no path relative to"),
     ("cityavos", "target_text", " ", "target_text", "is empty"),
-    ("cityavos", "mission_id", 1, "id", "1 stands twice"),
+    ("cityavos", "mission_id", 1, "id", "1 appears twice"),
     ("aerialvln", "actions.2", 9, "actions[2]", "unknown action 9: known are 0, 1, 2, 3, 4, 5, 6, 7"),
     ("aerialvln", "actions.2", 1.5, "actions", "expected whole numbers, found 1.5"),
     ("aerialvln", "actions.2", 0, "actions[2]", "stop before the end"),
@@ -82,7 +82,7 @@ BAD = [
     ("aerialvln", "goals", [], "goals", "is empty"),
     ("aerialvln", "goals.0", 7, "goals[0]", "expected an object, found 7"),
     ("aerialvln", "instruction.instruction_text", None, "instruction.instruction_text", "expected a text"),
-    ("aerialvln", "episode_id", "A0", "id", "A0 stands twice"),
+    ("aerialvln", "episode_id", "A0", "id", "A0 appears twice"),
     ("openfly", "action.1", -1, "action[1]", "unknown action -1"),
     ("openfly", "pos.2", [1, 2, 3, 4], "pos[2]", "expected 3 numbers, found 4"),
     ("openfly", "yaw.3", 90.0, "yaw[3]", "90 is more than a turn in radians"),
@@ -178,7 +178,7 @@ def layout(exported, tmp_path) -> Path:
 PART = "OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test"
 LAYOUT_BAD = [
     ("episode_id", "../0", "episode_id", "'../0' cannot name a file"),
-    ("episode_id", "0", "episode_id", "0 stands twice"),
+    ("episode_id", "0", "episode_id", "0 appears twice"),
     ("episode_id", "100000", "episode_id", f"TrajectoryDATA/{PART}/100000.json: No such file"),
     ("map_name", "U_Courtyard_0", "map_name", "in a folder of U_Courtyard_1"),
     ("task", "long_task", "task", f"'long_task' in {PART}"),
@@ -295,7 +295,12 @@ def test_pictures_stay_in_their_folder_and_are_pictures(layout, tmp_path):
     (folder / text).write_text("no picture")
     tasks = [task | {"image": outside} if task["image"] == elsewhere else task for task in tasks]
     (folder / "Task.json").write_text(json.dumps(tasks))
-    why = {absent: "there is no file", link: "leads out of", outside: "leads out of", text: "neither PNG nor JPEG"}
+    why = {
+        absent: "there is no file",
+        link: "points outside",
+        outside: "points outside",
+        text: "neither PNG nor JPEG",
+    }
     with pytest.raises(ImportRefused) as refused:
         import_benchmark("aerialdojo", [layout], tmp_path / "data")
     lines = str(refused.value).splitlines()[1:]

@@ -113,4 +113,4 @@ def test_tasks_of_one_pair_are_told_apart(tmp_path):
     routes = pd.read_parquet(tmp_path / "imported/aerialdojo/routes")
     assert routes["nav_id"].nunique() == 2
     assert routes[["start_object_id", "start_anchor_id", "target_object_id"]].to_numpy().tolist() == [[3, 0, 5]] * 2
-    assert report.notes["task_id stands twice in the scene: named by partition and episode"] == 1
+    assert report.notes["task_id appears twice in the scene: named by partition and episode"] == 1

@@ -119,7 +119,7 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
         build_scene(place.recipe, load_catalogue(assets))
     (tmp_path / "elsewhere.asc").write_text(text)
     table.symlink_to(tmp_path / "elsewhere.asc")
-    with pytest.raises(AssetError, match="leads out of its folder"):
+    with pytest.raises(AssetError, match="points outside its folder"):
         build_scene(place.recipe, load_catalogue(assets))
 
 

@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.command import add_scene, add_tiles
 from aerialdojo_gen.imports.cutting import _GRID_M, Region, cut
 from aerialdojo_gen.imports.import_mesh import MeshOptions, SourceMesh, import_mesh
-from aerialdojo_gen.imports.listing import describe_mesh, guess
+from aerialdojo_gen.imports.listing import describe_mesh, infer_axes
 from aerialdojo_gen.imports.naming import Naming
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.glb import read_glb
@@ -164,7 +164,7 @@ def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
 )
 def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     (node,) = city(up=up)
-    found = guess([node.with_vertices(node.vertices * scale)])
+    found = infer_axes([node.with_vertices(node.vertices * scale)])
     assert found.up == up
     assert found.up_sure
     # 190 m in millimetres may be 1.9 km in centimetres: the second guess. Metres and centimetres are the first one.

@@ -2,8 +2,8 @@
 
 import pytest
 
+from aerialdojo_gen.imports.map_props import _thing
 from aerialdojo_gen.imports.map_tags import bearing_deg
-from aerialdojo_gen.imports.map_things import _thing
 
 
 @pytest.mark.parametrize(

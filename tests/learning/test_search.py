@@ -120,7 +120,7 @@ def test_who_sees_the_goal_is_led_to_it(looks):
             for begun in ((0.0, 0.0, 0.0, 0.0), (4.0, -2.0, 1.0, 1.2)):
                 odometry = np.array(begun, np.float32)
                 search = Search(wanted, SENSORS)
-                search.look(seeing(found.shown[k], number), found.frames[k], odometry)
+                search.observe(seeing(found.shown[k], number), found.frames[k], odometry)
                 ahead, left, up = search.towards(odometry, 1).astype(float)
                 c, s = np.cos(pose[3]), np.sin(pose[3])
                 place = pose[:3] + np.array([c * ahead - s * left, s * ahead + c * left, up])
@@ -146,7 +146,7 @@ def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby(
     chances[left] = [0.01, 0.45, 0.45, 0.09]
     pictures = np.zeros((4, 32, 32, 4), np.uint8)
     pictures[..., 3] = round(255 * np.sqrt(9.0 / SENSORS.max_depth_m))
-    search.look(np.log(chances).astype(np.float32), pictures, start)
+    search.observe(np.log(chances).astype(np.float32), pictures, start)
     first = search.towards(start, 60)
     assert first[1] > 5.0 > abs(first[0])
     # From nearby it is no van: what is ahead is more like one now.
@@ -155,7 +155,7 @@ def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby(
     chances[left] = chances[0]
     chances[ahead] = [0.9, 0.01, 0.001, 0.089]
     for _ in range(3):
-        search.look(np.log(chances).astype(np.float32), pictures, there)
+        search.observe(np.log(chances).astype(np.float32), pictures, there)
     second = search.towards(start, 60)
     assert second[0] > 5.0 > abs(second[1])
 
@@ -165,7 +165,7 @@ def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
     search = Search(word_targets(["red van"], WORDS)[0], SENSORS)
     nothing = np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997]))
     for odometry in places:
-        search.look(nothing, np.zeros((4, 32, 32, 4), np.uint8), odometry)
+        search.observe(nothing, np.zeros((4, 32, 32, 4), np.uint8), odometry)
         away = search.towards(odometry, remaining)
         assert np.linalg.norm(away) > 2.0
         c, s = np.cos(odometry[3]), np.sin(odometry[3])
@@ -201,7 +201,7 @@ def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
         chances = np.full((256, 4), 1e-3)
         chances[:, -1] = 0.997
         chances[patch] = [0.01, 0.45, 0.45, 0.09]
-        search.look(np.log(chances).astype(np.float32), pictures, odometry)
+        search.observe(np.log(chances).astype(np.float32), pictures, odometry)
 
     see(left)
     # It has looked at it, in vain, and is as far from it as it was: round the start, until the way there is due.

@@ -105,10 +105,10 @@ class CountedSearch(Search):
 
     looked = led = 0
 
-    def look(self, log_chances, pictures, odometry):
+    def observe(self, log_chances, pictures, odometry):
         CountedSearch.looked += 1
         assert np.allclose(np.exp(log_chances).sum(axis=1), 1.0, atol=1e-4)
-        super().look(log_chances, pictures, odometry)
+        super().observe(log_chances, pictures, odometry)
 
     def towards(self, odometry, remaining):
         CountedSearch.led += 1

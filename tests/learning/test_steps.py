@@ -81,7 +81,7 @@ def test_a_batch_has_each_episodes_own_steps_and_goal(pool, by_image):
         alone, last = len(LENGTHS[number]) == 1, own == len(LENGTHS[number]) - 1
         # The first of a part has no semantic instance, the last no picture unless it is alone.
         told = (by_image or own == 0) and (alone or not last)
-        assert batch["told_by_image"][i] == told
+        assert batch["goal_by_image"][i] == told
         assert batch["images"][i, 0, 0, 0] == (10 * number + own if told else 0)
         assert batch["scene"][i] == (number + own) % 2
         words = [WORDS[n - 2] for n in batch["tokens"][i].tolist() if n]

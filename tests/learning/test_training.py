@@ -262,8 +262,8 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
         unseen = view_parts(root, index.scenes, tmp_path, "id_train", None, 200, 7, like)
         with make_executor("local", 1) as executor, torch.no_grad():
             (found,) = collect(unseen, executor, Reporter(False), "looking")
-            seen = network.look(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
-            place, heading, scene, _ = network.whereabouts.found(seen)
+            seen = network.encode_pictures(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
+            place, heading, scene, _ = network.whereabouts.locate(seen)
         pose, number = torch.from_numpy(found.pose), torch.zeros(200, dtype=torch.int64)
         loss[looks] += float(pose_loss(place, heading, scene, pose, number))
     assert loss[300] < loss[0]
@@ -330,7 +330,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
         if planner.grid.distance_m(p) > 0.4 and planner.grid.reachable(p):
             free.append(np.array([*p, draw.uniform(-np.pi, np.pi)]))
     goal, starts = free[0], free[1:]
-    with teacher.keep_fields():
+    with teacher.cache_fields():
         labels = teacher.labels([goal] * len(starts), starts)
         for start, label in zip(starts, labels, strict=True):
             route = planner.plan_one(goal, start)

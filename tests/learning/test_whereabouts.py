@@ -164,7 +164,7 @@ def episode():
     }
     images = torch.randint(0, 256, (2, 32, 32, 4), dtype=torch.uint8, generator=draw)
     with torch.no_grad():
-        goal = network.understand(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
+        goal = network.encode_goal(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
     return network, goal, given
 
 
@@ -177,7 +177,7 @@ def test_flown_step_by_step_it_chooses_as_it_learned(episode):
             at = [given[name][:, k : k + 1] for name in ("odometry", "mask")]
             thought, memory = network(pictures[:, k], goal, *at, memory)
             assert torch.allclose(thought.logits[:, 0], all_at_once.logits[:, k], atol=1e-5)
-            assert torch.allclose(thought.guess.offset[:, 0], all_at_once.guess.offset[:, k], atol=1e-4)
+            assert torch.allclose(thought.estimate.offset[:, 0], all_at_once.estimate.offset[:, k], atol=1e-4)
     assert torch.allclose(memory, end, atol=1e-5)
 
 
@@ -195,11 +195,11 @@ def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
     logits = thought.logits.detach().clone()
     logits[..., 0] = 50.0
     away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
-    offset = torch.nn.functional.normalize(thought.guess.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
+    offset = torch.nn.functional.normalize(thought.estimate.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
     clear = torch.full_like(logits, -50.0)
-    actions = thought._replace(logits=logits, blocked=clear, guess=thought.guess._replace(offset=offset)).actions(
-        torch.zeros(2, T, 16, dtype=torch.bool)
-    )
+    actions = thought._replace(
+        logits=logits, blocked=clear, estimate=thought.estimate._replace(offset=offset)
+    ).actions(torch.zeros(2, T, 16, dtype=torch.bool))
     assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
     assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
 
@@ -211,15 +211,15 @@ def test_who_would_come_back_goes_on(episode):
     logits = thought.logits.detach().clone()
     logits[..., 14:] = 50.0
     logits[..., 14] = 51.0
-    clear, far = torch.full_like(logits, -50.0), thought.guess._replace(offset=torch.ones(2, T, 3))
+    clear, far = torch.full_like(logits, -50.0), thought.estimate._replace(offset=torch.ones(2, T, 3))
     back = torch.zeros(2, T, 16, dtype=torch.bool)
     back[:, ::2, 14], back[:, ::2, 3] = True, True
-    actions = thought._replace(logits=logits, blocked=clear, guess=far).actions(back)
+    actions = thought._replace(logits=logits, blocked=clear, estimate=far).actions(back)
     assert (actions[:, 1::2] == 14).all()
     logits[..., 3] = -50.0
     assert torch.equal(actions[:, ::2], logits[:, ::2, 1:14].argmax(dim=-1) + 1)
     everywhere = torch.ones_like(back)
-    assert (thought._replace(logits=logits, blocked=clear, guess=far).actions(everywhere) != 0).all()
+    assert (thought._replace(logits=logits, blocked=clear, estimate=far).actions(everywhere) != 0).all()
 
 
 def test_what_leads_back_is_told_by_own_motion_alone():
@@ -280,8 +280,8 @@ def test_of_likely_actions_it_takes_one_that_is_free(episode):
     logits[..., 3], logits[..., 2], logits[..., 1] = 9.0, 8.0, 4.0
     # The likeliest is surely blocked, the next one perhaps: 1 in 100, then 9 in 10.
     blocked[..., 3], blocked[:, 0, 2], blocked[:, 1:, 2] = 20.0, -4.6, 2.2
-    far = thought.guess._replace(offset=torch.ones(2, T, 3))
-    actions = thought._replace(logits=logits, blocked=blocked, guess=far).actions(
+    far = thought.estimate._replace(offset=torch.ones(2, T, 3))
+    actions = thought._replace(logits=logits, blocked=blocked, estimate=far).actions(
         torch.zeros(2, T, 16, dtype=torch.bool)
     )
     assert (actions[:, 0] == 2).all()

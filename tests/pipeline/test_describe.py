@@ -64,7 +64,7 @@ def test_parts_that_no_picture_shows_are_not_said(smoke, claims):
         i = claims.geometry.index[item["mesh_node"]]
         own = [Claim.from_json(raw) for raw in json.loads(item["claims"])]
         # Of the others, such as "longer than a car", the whole is the part.
-        named = {look.phrase for look in claims.vocabulary.catalogue_looks(claims.scene.instances[i]) if look.parts}
+        named = {look.phrase for look in claims.vocabulary.appearances_of(claims.scene.instances[i]) if look.parts}
         for text in writer.texts(i, own, set(), 5):
             assert not any(own[k].kind == "part" and own[k].key in named for k in text.claims)
         parts += sum(own[k].key in named for text in writer.texts(i, own, None, 5) for k in text.claims)

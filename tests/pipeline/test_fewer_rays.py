@@ -20,7 +20,7 @@ from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, 
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m, steps_back_m
-from aerialdojo_gen.pipeline.stages.work.reference_images import LEAST_SHARE, instance_map, instance_mask
+from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
 from aerialdojo_gen.rendering.backend import open_renderer
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
@@ -96,7 +96,7 @@ def test_all_candidates_at_once_step_back_as_far_as_each_by_the_definition(found
 def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(found):
     which = np.arange(0, len(found.positions_m), 2)
     places = found.positions_m[which] + np.where(which[:, None] % 4, [0.3, -0.2, 0.1], 0.0)
-    moved = found.moved(which, places, RADIUS, CONFIG)
+    moved = found.moved(which, places, CONFIG.fov_deg)
     anew = Candidates.of(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
     for name in (
         "positions_m",
@@ -114,7 +114,7 @@ def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(fou
 
 
 def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pictures(found):
-    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), RADIUS, CONFIG)
+    looked = CandidateViews.of(found, found.seeing(CONFIG.min_visible_fraction), CONFIG)
     away = found.positions_m - found.world.scene.instances[found.instance].centroid
     turn = np.arctan2(away[:, 1], away[:, 0])[looked.which]
     front, apart = found.before_front[looked.which], math.radians(CONFIG.separation_deg)
@@ -167,10 +167,10 @@ def test_shares_of_parts_are_those_of_all_pixels(found):
         face = caster.first_hit(pose[:3, 3], directions)[1] if visible.any() else np.zeros(0)
         whole = [float(np.isin(face, part).sum()) / visible.size for part in parts]
         assert part_shares(caster, thing, parts, camera, pose, visible) == whole
-        least = part_shares(caster, thing, parts, camera, pose, visible, LEAST_SHARE)
-        assert [share < LEAST_SHARE for share in least] == [share < LEAST_SHARE for share in whole]
-        assert all(a == b for a, b in zip(least, whole, strict=True) if b < LEAST_SHARE)
-        some.update("shown" if share >= LEAST_SHARE else "missing" for share in whole)
+        least = part_shares(caster, thing, parts, camera, pose, visible, MIN_SHARE)
+        assert [share < MIN_SHARE for share in least] == [share < MIN_SHARE for share in whole]
+        assert all(a == b for a, b in zip(least, whole, strict=True) if b < MIN_SHARE)
+        some.update("shown" if share >= MIN_SHARE else "missing" for share in whole)
     assert min(some["shown"], some["missing"]) > 3
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen.base.config.sections import FilterConfig, QuotaConfig
 from aerialdojo_gen.base.paper_figures import PaperScene
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import Candidates, PaperQuota
-from aerialdojo_gen.pipeline.stages.work.quota import Kept, difficulty_level, select_quota
+from aerialdojo_gen.pipeline.stages.work.quota import Accepted, difficulty_level, select_quota
 from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.planning.planner import Route
 
@@ -55,7 +55,7 @@ def released(
     c: Candidates, rows: np.ndarray, setting: np.ndarray, length: np.ndarray, paper: PaperScene
 ) -> np.ndarray:
     levels = difficulty_level(length[rows] / c.free_length_m[rows], c.visible[rows])
-    pool = Kept([c.sampling_keys[k] for k in rows], setting[rows].tolist(), length[rows], levels)
+    pool = Accepted([c.sampling_keys[k] for k in rows], setting[rows].tolist(), length[rows], levels)
     return rows[select_quota(pool, paper.tasks, paper.path_m, 200, PREFERENCE)]
 
 

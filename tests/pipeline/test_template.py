@@ -108,7 +108,7 @@ def test_hard_values_are_written_so_that_they_are_read(tmp_path):
 def test_what_cannot_be_written(tmp_path):
     path = init_config(tmp_path / "mine.toml")
     before = path.read_bytes()
-    with pytest.raises(UsageError, match=r"mine\.toml is there already: --force"):
+    with pytest.raises(UsageError, match=r"mine\.toml exists: --force"):
         init_config(path, Pipeline(seed=3))
     assert path.read_bytes() == before
     init_config(path, Pipeline(seed=3), force=True)

@@ -11,7 +11,7 @@ from support.flying import along, distances, solid, town
 from support.handmade import box, instance, scene
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
-from aerialdojo_gen.dataset.episode import Reference, fly, shortcoming
+from aerialdojo_gen.dataset.episode import Reference, fly, spl_fault
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.difficulty import agent_actions, difficulty_of, straight_lines_free
 from aerialdojo_gen.planning.flight_space import FlightSpace
@@ -143,7 +143,7 @@ def test_what_agents_fly_succeeds_by_the_evaluators_own_replay():
         assert 0 not in actions[:-1]
         budget = 90 if r.length_m < 30 else 180
         episode = fly(space, Reference(tuple(start), tuple(goal[:3]), budget, r.length_m, actions))
-        assert shortcoming(episode, r.length_m, 1.0 + 1e-9) == ""
+        assert spl_fault(episode, r.length_m, 1.0 + 1e-9) == ""
         assert abs(math.remainder(episode.yaw_rad - goal[3], 2 * math.pi)) <= math.radians(7.5) + 1e-9
 
 

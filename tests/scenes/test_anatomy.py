@@ -12,7 +12,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.anatomy import FRONTS, Run, parse_anatomy, remap_runs
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.claims import Body, valid_looks
+from aerialdojo_gen.scenes.claims import Body, valid_phrases
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
 
@@ -70,7 +70,7 @@ def lamp(assets, variant, yaw_deg=0.0, position=(0.0, 0.0, 0.0)):
 def test_phrases_are_true_of_the_variants_that_bear_them_out_whichever_way_they_stand(assets, variant, yaw_deg):
     catalogue = load_catalogue(assets)
     thing = lamp(assets, variant, yaw_deg, (120.25, -80.5, 3.0))
-    assert {look.phrase for look in valid_looks(catalogue["lamp"].looks, thing, catalogue.materials)} == TRUE[variant]
+    assert {one.phrase for one in valid_phrases(catalogue["lamp"].looks, thing, catalogue.materials)} == TRUE[variant]
 
 
 def test_a_phrase_that_is_not_true_says_what_is(assets):

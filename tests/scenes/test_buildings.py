@@ -10,7 +10,14 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Point, Polygon
 from support.layout_checks import blank_site, distances
 
-from aerialdojo_gen.scenes.grammar_buildings import before_walls, building, facade, pitched_roof, wall_with_openings
+from aerialdojo_gen.scenes.grammar_buildings import (
+    Roof,
+    before_walls,
+    building,
+    facade,
+    pitched_roof,
+    wall_with_openings,
+)
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
 
@@ -55,7 +62,7 @@ def test_pitched_roofs_are_closed_and_as_high_as_asked(length, width, turn, hip)
 def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
     site = blank_site("U_T_0", ceiling_m=30)
     plan = rotate(rectangle(-8, -5, 8, 5), 20)
-    house = building(site, plan, wall="facade_brick", roof="roof_tiles", roof_kind=roof_kind, parapet_m=parapet)
+    house = building(site, plan, "facade_brick", Roof("roof_tiles", roof_kind, parapet_m=parapet))
     assert not site.is_free(0, 0, 0.5)
     inside = np.array([(x, y) for x in np.arange(-9, 9, 0.37) for y in np.arange(-9, 9, 0.37)])
     inside = inside[shapely.contains_xy(plan.buffer(-0.03), inside[:, 0], inside[:, 1])]

@@ -7,7 +7,7 @@ import pytest
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.catalogue import Overrides, load_catalogue
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 
@@ -141,9 +141,9 @@ def test_what_was_asked_for_but_is_unknown(assets):
     with pytest.raises(AssetError, match="unknown variant 'blu': did you mean 'blue'"):
         catalogue.instantiate("mailbox", "n", rng, variant="blu")
     with pytest.raises(AssetError, match="params: unknown key 'body': did you mean 'body_h'"):
-        catalogue.instantiate("mailbox", "n", rng, params={"body": 1})
+        catalogue.instantiate("mailbox", "n", rng, own=Overrides({"body": 1}))
     with pytest.raises(AssetError, match=r"parts\[0\] \(box\): size must be positive, got 0\.4, 0\.5, -1"):
-        catalogue.instantiate("mailbox", "n", rng, params={"body_h": -1})
+        catalogue.instantiate("mailbox", "n", rng, own=Overrides({"body_h": -1}))
 
 
 def test_variant_changes_materials_sizes_and_parts(assets):
@@ -175,7 +175,7 @@ def test_draws_follow_weights_and_ranges_and_depend_on_the_generator_alone(asset
 
 def test_instance_stands_turned_and_scaled_in_the_world(assets):
     catalogue = load_catalogue(assets)
-    options = {"variant": "red", "params": {"body_h": 1.0}}
+    options = {"variant": "red", "own": Overrides({"body_h": 1.0})}
     here = catalogue.instantiate("mailbox", "a", generator(0, "t"), **options)
     there = catalogue.instantiate("mailbox", "b", generator(0, "t"), (10, 20, 3), 90.0, scale=2.0, **options)
     np.testing.assert_allclose(here.bounds, [[-0.2, -0.25, 0], [0.3, 0.25, 1.5]], atol=1e-6)
@@ -191,7 +191,7 @@ def test_sign_text_speaks_of_attributes(assets):
     )
     catalogue = load_catalogue(assets)
     widths = [
-        np.ptp(catalogue.instantiate("sign", "s", generator(0, "t"), attributes={"label": w}).vertices[:, 1])
-        for w in ("I", "WWW")
+        np.ptp(catalogue.instantiate("sign", "s", generator(0, "t"), own=own).vertices[:, 1])
+        for own in (Overrides(attributes={"label": w}) for w in ("I", "WWW"))
     ]
     assert widths[1] > 4 * widths[0]

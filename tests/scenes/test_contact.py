@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.contact import CONTACT_M, _feet, _gaps, stand
+from aerialdojo_gen.scenes.contact import CONTACT_M, _feet, _gaps, rest_on_ground
 from aerialdojo_gen.scenes.model import Instance
 
 LEANING, UPRIGHT = (
@@ -31,7 +31,7 @@ def slope(east: float, north: float):
 @given(st.sampled_from(LEANING), st.floats(0, 360), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
 def test_what_leans_follows_a_slope(catalogue, category, yaw_deg, east, north) -> None:
     before, ground = thing(catalogue, category, yaw_deg), slope(east, north)
-    after, plinth = stand(before, catalogue[category].kind, ground)
+    after, plinth = rest_on_ground(before, catalogue[category].kind, ground)
     gaps = _gaps(after, _feet(before), ground)
     assert plinth is None
     assert gaps.max() <= CONTACT_M
@@ -45,7 +45,7 @@ def test_what_leans_follows_a_slope(catalogue, category, yaw_deg, east, north) -
 @given(st.sampled_from(UPRIGHT), st.floats(0, 360), st.floats(0.02, 0.6))
 def test_what_stands_upright_has_no_air_below(catalogue, category, yaw_deg, east) -> None:
     before, ground = thing(catalogue, category, yaw_deg), slope(east, 0.0)
-    after, plinth = stand(before, catalogue[category].kind, ground)
+    after, plinth = rest_on_ground(before, catalogue[category].kind, ground)
     moved = after.vertices - before.vertices
     np.testing.assert_allclose(moved, np.tile(moved[0], (len(moved), 1)), atol=1e-4)
     if plinth is None:
@@ -60,5 +60,5 @@ def test_what_stands_upright_has_no_air_below(catalogue, category, yaw_deg, east
 
 def test_what_stands_on_something_else_stays(catalogue) -> None:
     before = thing(catalogue, "bench", 0.0)
-    assert stand(before, "prop", lambda x, y: slope(0.1, 0.0)(x, y) - 2.0) == (before, None)
-    assert stand(before, "prop", slope(0.0, 0.0)) == (before, None)
+    assert rest_on_ground(before, "prop", lambda x, y: slope(0.1, 0.0)(x, y) - 2.0) == (before, None)
+    assert rest_on_ground(before, "prop", slope(0.0, 0.0)) == (before, None)

@@ -26,7 +26,7 @@ from aerialdojo_gen.rendering.checks import Solid, scene_solid
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.rendering.raycast import RayRenderer, ray_renderer
 from aerialdojo_gen.rendering.world import RenderWorld
-from aerialdojo_gen.scenes.context import context_of, keep_scene, open_contexts, open_scene, release_scenes
+from aerialdojo_gen.scenes.context import cache_scene, context_of, open_contexts, open_scene, release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
 
 
@@ -70,10 +70,10 @@ def test_the_same_content_has_one_context_wherever_it_lies(meshes, tmp_path):
 def test_a_scene_that_was_just_written_is_not_read(meshes, tmp_path):
     before = open_scene(*meshes[1])
     scene = replace(probe_scene(), name="Probe_0")
-    keep_scene(scene, meshes[0][1])
+    cache_scene(scene, meshes[0][1])
     assert before not in open_contexts()
     assert open_scene(tmp_path / "nowhere.glb", meshes[0][1]).scene is scene
-    keep_scene(probe_scene(), meshes[0][1])
+    cache_scene(probe_scene(), meshes[0][1])
     assert open_scene(*meshes[0]).scene is scene
 
 

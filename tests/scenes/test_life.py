@@ -17,6 +17,7 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.scenes.catalogue import Overrides
 from aerialdojo_gen.scenes.checks import clashes, floating
 from aerialdojo_gen.scenes.kit.life import WALKED, life
 from aerialdojo_gen.scenes.model import Scene
@@ -54,7 +55,7 @@ def test_a_body_is_closed_and_stands_on_its_feet(catalogue, posture):
     assert len(names) >= 24
     for name in names:
         one = catalogue.instantiate(
-            "person", "p", generator(1, name), variant=name, params={"posture": POSTURES[posture]}
+            "person", "p", generator(1, name), variant=name, own=Overrides({"posture": POSTURES[posture]})
         )
         low, high = one.bounds[:, 2]
         assert -0.05 < low < 0.02, name

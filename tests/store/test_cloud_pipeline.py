@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.command_line import called
 
-from aerialdojo_gen.dataset.contents import scenes_there
+from aerialdojo_gen.dataset.contents import existing_scenes
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
@@ -37,7 +37,7 @@ def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
     done = called(*arguments, "--workers", "1", cwd=project, **lease)
     assert done.returncode == 0, done.stderr
     root.refresh()
-    assert scenes_there(root) == scenes
+    assert existing_scenes(root) == scenes
     for table, place in store.LAYOUT.items():
         for scene in scenes if place.command != "evaluate" else []:
             assert store.content(root, table, scene) == store.content(local, table, scene), (table, scene)

@@ -165,7 +165,7 @@ def test_an_import_lies_in_the_bucket_whole(capsys, cloud, tmp_path):
     assert code == 0, text
     assert text.startswith(f"{cloud}/imported/uav-on\n")
     code, text = said(capsys, "import-benchmark", path, "--format", "uav-on", "--data", cloud)
-    assert (code, text) == (2, f"error: {cloud}/imported/uav-on is there already: --force replaces it\n")
+    assert (code, text) == (2, f"error: {cloud}/imported/uav-on exists: --force replaces it\n")
     root = open_root(cloud)
     root.refresh()
     assert root.exists("imported/uav-on/import.json")

@@ -12,7 +12,7 @@ from support.handmade import filled
 from support.roots import fill, read_folder, write
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.dataset.contents import prune_release, scenes_there
+from aerialdojo_gen.dataset.contents import existing_scenes, prune_release
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import LocalRoot, open_root
@@ -123,9 +123,9 @@ def test_the_release_knows_its_scenes(root):
     for scene in ("U_A_0", "U_B_1"):
         write(root, store.shard_name("tasks/train", scene), b"x")
         write(root, store.shard_name("release/scenes", scene), b"x")
-    assert scenes_there(root) == ["U_A_0", "U_B_1"]
+    assert existing_scenes(root) == ["U_A_0", "U_B_1"]
     assert prune_release(root, ["U_A_0"]) == ["U_B_1"]
-    assert scenes_there(root) == ["U_A_0"]
+    assert existing_scenes(root) == ["U_A_0"]
 
 
 def test_a_root_travels(root):

@@ -89,7 +89,7 @@ def test_rows_with_a_missing_or_unknown_column_are_refused():
     [
         (lambda t: t.set_column(5, "euclidean_m", pa.array([1.0, None, 2.0])), "1 nulls in column euclidean_m"),
         (lambda t: t.take([1, 0, 2]), "not sorted by scene, pair_id"),
-        (lambda t: t.take([0, 0, 1]), r"key \(scene, pair_id\) stands twice"),
+        (lambda t: t.take([0, 0, 1]), r"duplicate key \(scene, pair_id\)"),
         (lambda t: t.drop_columns("euclidean_m"), "columns .* are not those"),
         (lambda t: t.set_column(5, "euclidean_m", pa.array([1, 2, 3])), "types differ"),
     ],
@@ -196,7 +196,7 @@ def test_file_outputs_cannot_leave_the_folder(tmp_path, relative):
     data = tmp_path / "data"
     data.mkdir()
     (data / "link").symlink_to(tmp_path)
-    with pytest.raises(StoreError, match="leads out of the data directory"), atomic_file(data, relative):
+    with pytest.raises(StoreError, match="points outside the data directory"), atomic_file(data, relative):
         pass
     assert [p.name for p in tmp_path.iterdir()] == ["data"]
 

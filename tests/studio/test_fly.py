@@ -23,7 +23,8 @@ from aerialdojo_gen.benchmark.scoring import score
 from aerialdojo_gen.benchmark.submission import write_submission
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, read_tasks, reference_actions, select
 from aerialdojo_gen.dataset.episode import Episode
-from aerialdojo_gen.exchange.learning_export import export_for_learning, export_options
+from aerialdojo_gen.exchange.learning_export import export_for_learning
+from aerialdojo_gen.exchange.samples import ExportOptions
 from aerialdojo_gen.learning import Trajectories
 from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.store.root import open_root
@@ -232,7 +233,7 @@ def test_successful_flights_are_demonstrations(planted, tmp_path):
         Trajectories(data, split=row["split"], run="human-ann", source="recordings")
     with pytest.raises(UsageError, match="no task of the selection has a successful flight in human-ann"):
         Trajectories(data, split="id_train", run="human-ann")
-    options = export_options(split=[row["split"]], run=["human-ann"], size=16)
+    options = ExportOptions((row["split"],), sensors=Sensors(("front",), width=16, height=16), runs=("human-ann",))
     made = export_for_learning("webdataset", data, tmp_path / "out", options, workers=1)
     assert (made.parts, made.counts["samples"]) == (1, len(way))
 

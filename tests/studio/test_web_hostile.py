@@ -17,7 +17,7 @@ from support import annotating
 from support.browser import until
 from support.viewing import YARD, served
 
-from aerialdojo_gen.studio.web.limits import MOST_PER_CLIENT
+from aerialdojo_gen.studio.web.limits import MAX_PER_CLIENT
 
 pytestmark = pytest.mark.slow
 
@@ -304,7 +304,7 @@ def test_half_requests_lock_nobody_out_and_end(outside, begun):
                 assert ask(port, "GET", "/api/facts", headers=cookie)[0] == 200
         # From another address, too.
         assert ask(port, "GET", "/api/facts", headers=cookie, host="127.0.0.2")[0] == 200
-        assert sum(not closed(client) for client in half) <= MOST_PER_CLIENT
+        assert sum(not closed(client) for client in half) <= MAX_PER_CLIENT
         if begun.startswith(b"GET"):
             until("all of them are closed", lambda: all(closed(client) for client in half))
         assert ask(port, "GET", "/api/facts", headers=cookie)[0] == 200

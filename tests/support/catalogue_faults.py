@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import MIN_TRUE_LOOKS, Body
+from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, Body
 from aerialdojo_gen.scenes.model import Instance
 
 MIN_LOOKS = 3
@@ -46,7 +46,7 @@ def catalogue_faults(
             body = Body(thing, catalogue.materials)
             wrong = {look.phrase: body.false_claims(look) for look in prop.looks}
             true = sum(not w for w in wrong.values())
-            if true < min(MIN_TRUE_LOOKS, len(prop.looks)):
+            if true < min(MIN_TRUE_PHRASES, len(prop.looks)):
                 faults.append(f"{prop.source} {made}: {true} looks are true of it: {_message(wrong)}")
             for say, claims in wrong.items():
                 why[say].append(f"{variant.name}: {', '.join(claims)}" if claims else "")

@@ -118,7 +118,7 @@ class Steps(TaskQueue):
         self._left[scene] = self._parts
         self._add([Chore(number, scene, self._folder)] * self._parts)
 
-    def _worth_joining(self, scene):
+    def _should_join(self, scene):
         return scene not in self._alone_at
 
 

@@ -1,4 +1,4 @@
-"""Choose what a text says: few claims that tell an object from its distractors, and now and then one more."""
+"""Choose what a text says: few claims that distinguish an object from its distractors, and now and then one more."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from aerialdojo_gen.annotations.language.locations import WHERE
 from aerialdojo_gen.annotations.language.subject import Wording, wordings_of
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.base.rng import pick
-from aerialdojo_gen.scenes.looks import Look
+from aerialdojo_gen.scenes.appearances import Appearance
 
-_MOST_PLACES = 3
+_MAX_PLACES = 3
 _SHORT_DETAIL = 10  # words of a detail that is said
 # How often an adjective of colour is said, and one of another kind.
 _COLOUR = {"terse": 0.75, "vague": 0.0, "normal": 0.85, "detailed": 1.0}
@@ -49,24 +49,24 @@ class About:
     """An object's claims, and which other things each fits."""
 
     def __init__(
-        self, scene: SceneClaims, i: int, claims: Sequence[Claim], looks: Mapping[str, Look],
+        self, scene: SceneClaims, i: int, claims: Sequence[Claim], appearances: Mapping[str, Appearance],
         shown: Collection[str] | None,
     ) -> None:  # fmt: skip
         self.scene, self.i, self.claims = scene, i, claims
         self.instance = scene.scene.instances[i]
         self.noun = scene.vocabulary.nouns[i].name
         said = [
-            w for w in wordings_of(claims, looks, self.instance.category)
+            w for w in wordings_of(claims, appearances, self.instance.category)
             if w.adjectives or w.tails or w.details
-            if w.key != "part" or _seen(looks, claims[w.index].key, shown)
+            if w.key != "part" or _is_visible(appearances, claims[w.index].key, shown)
         ]  # fmt: skip
-        self.looks = {wording.index: wording for wording in said}
+        self.wordings = {wording.index: wording for wording in said}
         self.adjectives = [w for w in said if w.key != "part" and (w.adjectives or w.tails)]
         self.details = [w for w in said if w.details and _sayable(w)]
         self.places = [k for k, claim in enumerate(claims) if claim.kind in WHERE]
         same = self.instance.category
         self._others = [j for j, it in enumerate(scene.scene.instances) if it.category == same and j != i]
-        self.telling = cache(self._telling)
+        self.is_unique = cache(self._is_unique)
         self._fits = cache(lambda index, j: scene.holds(claims[index], j, DISTRACTOR_SLACK))
 
     def distractors(self, indices: Collection[int]) -> list[int]:
@@ -77,11 +77,11 @@ class About:
         """Those of some things that a claim fits as well."""
         return [j for j in things if self._fits(index, j)]
 
-    def _telling(self, index: int) -> bool:
+    def _is_unique(self, index: int) -> bool:
         """Whether a claim is false of every other of the category in the scene, and there are others."""
         return bool(self._others) and not self.fitting(index, self._others)
 
-    def names_again(self, index: int, plan: Plan) -> bool:
+    def repeats(self, index: int, plan: Plan) -> bool:
         """Whether a claim of place names what one of the plan names, or is a second phrase of place."""
         claim = self.claims[index]
         own = _named(claim)
@@ -105,9 +105,9 @@ def _named(claim: Claim) -> frozenset[str]:
     return frozenset(word.removesuffix("s") for word in words if len(word) > 2)
 
 
-def _seen(looks: Mapping[str, Look], key: str, shown: Collection[str] | None) -> bool:
-    look = looks.get(key)
-    return look is None or shown is None or all(set(part.split("|")) & set(shown) for part in look.parts)
+def _is_visible(appearances: Mapping[str, Appearance], key: str, shown: Collection[str] | None) -> bool:
+    appearance = appearances.get(key)
+    return appearance is None or shown is None or all(set(part.split("|")) & set(shown) for part in appearance.parts)
 
 
 def choose(about: About, level: str, used: Collection[int], rng: np.random.Generator) -> Plan | None:
@@ -117,25 +117,25 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
         chance = (_COLOUR if wording.key == "colour" else _VALUE)[level]
         keys = {w.key for w in plan.adjectives}
         # One phrase after the noun is enough, and of "brown wooden" one word.
-        again = not wording.adjectives and any(not w.adjectives for w in plan.adjectives)
-        again = again or {wording.key, *keys} >= _ONE_OF
-        if rng.random() < chance and not again:
+        redundant = not wording.adjectives and any(not w.adjectives for w in plan.adjectives)
+        redundant = redundant or {wording.key, *keys} >= _ONE_OF
+        if rng.random() < chance and not redundant:
             plan.adjectives.append(wording)
     ranked = _ranked(about, level, used, rng)
     if ranked:
         plan.places.append(ranked[0])
     left = about.distractors(plan.indices)
     while left:
-        places = [k for k in ranked if len(plan.places) < _MOST_PLACES and not about.names_again(k, plan)]
-        rest = [k for k in (*places, *about.looks) if k not in plan.indices]
+        places = [k for k in ranked if len(plan.places) < _MAX_PLACES and not about.repeats(k, plan)]
+        rest = [k for k in (*places, *about.wordings) if k not in plan.indices]
         best = min(rest, key=lambda k: len(about.fitting(k, left)), default=None)
         if best is None or len(remaining := about.fitting(best, left)) == len(left):
             return None
         left = remaining
         _add(plan, about, best, rng)
     _drop_needless(plan, about)
-    if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MOST_PLACES:
-        plan.places += [k for k in ranked if k not in plan.places and not about.names_again(k, plan)][:1]
+    if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MAX_PLACES:
+        plan.places += [k for k in ranked if k not in plan.places and not about.repeats(k, plan)][:1]
     spare = [w for w in about.details if w.index not in plan.indices]
     if rng.random() < _MORE_DETAILS[level] and spare and not plan.details:
         _add(plan, about, pick(spare, rng).index, rng)
@@ -161,7 +161,7 @@ def _ranked(about: About, level: str, used: Collection[int], rng: np.random.Gene
 
 
 def _add(plan: Plan, about: About, index: int, rng: np.random.Generator) -> None:
-    wording = about.looks.get(index)
+    wording = about.wordings.get(index)
     if wording is None:
         plan.places.append(index)
     elif wording.details and not (wording.adjectives and rng.random() < 0.5):

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.language.nouns import Names, noun_phrase
-from aerialdojo_gen.annotations.language.relation_words import relation_words
+from aerialdojo_gen.annotations.language.relation_phrases import relation_phrases
 from aerialdojo_gen.annotations.phrases import group_of
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.rng import pick
@@ -38,7 +38,7 @@ class Location:
         return len(self.text.split()) <= _SHORT
 
 
-class LocationWords:
+class LocationPhrases:
     """Words for the claims of place in one scene."""
 
     def __init__(self, claims: SceneClaims, names: Names) -> None:
@@ -55,7 +55,7 @@ class LocationWords:
         key = "direction" if claim.kind == "direction" else "side" if direction in DIRECTIONS else claim.key
         index_of = self._claims.geometry.index
         nodes = [index_of[mention.node] for mention in claim.things]
-        text = self._words(level if level in relation_words() else "relation", key, i, nodes, rng)
+        text = self._words(level if level in relation_phrases() else "relation", key, i, nodes, rng)
         pronoun = self._words("pronoun", key, i, nodes, rng)
         if len(things) == 1 and things[0].startswith("the ") and _is_plural(claim.things[0].noun):
             pronoun = _of_many(pronoun)
@@ -67,7 +67,8 @@ class LocationWords:
 
     def _words(self, table: str, key: str, i: int, nodes: Sequence[int], rng: np.random.Generator) -> str:
         """Choose a wording whose conditions hold; empty if the table has none for the key."""
-        words = relation_words()[table].get(key) or (relation_words()["relation"][key] if table == "vague" else ())
+        phrases = relation_phrases()
+        words = phrases[table].get(key) or (phrases["relation"][key] if table == "vague" else ())
         for k in rng.permutation(len(words)).tolist():
             if all(words[k].holds(self._claims, i, j) for j in nodes):
                 return words[k].say

@@ -9,7 +9,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from aerialdojo_gen.annotations.phrases import Words, article, group_of
+from aerialdojo_gen.annotations.phrases import CategoryWords, article, group_of
 from aerialdojo_gen.base.rng import pick
 
 # What "a stack of fish crates" begins with: adjectives of colour and kind go before the crates.
@@ -94,7 +94,7 @@ def name_of(text: str) -> Name:
 class Names:
     """The nouns that texts of a scene may use, by category."""
 
-    def __init__(self, words: Mapping[str, Words], landmarks: Sequence[str]) -> None:
+    def __init__(self, words: Mapping[str, CategoryWords], landmarks: Sequence[str]) -> None:
         self._words = words
         users: defaultdict[str, set[str]] = defaultdict(set)
         for category, own in words.items():
@@ -125,7 +125,7 @@ class Names:
         return pick(others, rng)
 
 
-def _grouped(words: Words, noun: str) -> Name:
+def _grouped(words: CategoryWords, noun: str) -> Name:
     name = name_of(noun)
     # Where the usual name is a plural, its synonyms are, or mass nouns: "a clump of bracken".
     if name.group or not words.group or not (group_of(noun) or group_of(words.name)):

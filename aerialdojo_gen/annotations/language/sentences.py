@@ -29,7 +29,7 @@ _SHORT_LEAD, _RARELY = 2, 0.8
 _LONG = 8  # words of a place: what is longer ends its clause
 _VERBS = frozenset({"be", "ing", "stands"})  # slots of a verb, which is not said twice
 _TURNED = 0.6  # how often a further place is said of the thing that it names
-_CLAUSE, _TELLING = 0.5, 0.6
+_CLAUSE, _UNIQUE = 0.5, 0.6
 _SECOND_IN_FIRST = 0.6  # how often the first sentence says two places
 
 
@@ -82,8 +82,8 @@ def compose(
     if "w" in first.slots:
         slots["w"] = pick(details.pop(0)[0].details, rng)
     said = [(first, slots)]
-    for wording, telling in details:
-        said.append(_detail(wording, telling, said, rng))
+    for wording, unique in details:
+        said.append(_detail(wording, unique, said, rng))
     for place in places[len(own) :]:
         said.append(_place(place, "" if first.slots & _VERBS else content.verb[0], said, rng))
     text = " ".join(_ended(frame.text.format(**slots)) for frame, slots in said)
@@ -150,11 +150,11 @@ def _joined(places: Sequence[Location], template: str, rng: np.random.Generator)
 
 
 def _detail(
-    wording: Wording, telling: bool, said: Sequence[tuple[Frame, object]], rng: np.random.Generator
+    wording: Wording, unique: bool, said: Sequence[tuple[Frame, object]], rng: np.random.Generator
 ) -> tuple[Frame, dict[str, str]]:
     if wording.clauses and rng.random() < _CLAUSE:
         return _frame("clause", said, rng), {"clause": pick(wording.clauses, rng)}
-    kind = "telling" if telling and rng.random() < _TELLING else "with"
+    kind = "telling" if unique and rng.random() < _UNIQUE else "with"
     return _frame(kind, said, rng), {"w": pick(wording.details, rng)}
 
 

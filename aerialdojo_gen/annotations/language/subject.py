@@ -12,8 +12,8 @@ from aerialdojo_gen.annotations.claims import Claim
 from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, noun_phrase
 from aerialdojo_gen.annotations.phrases import phrases_of_value
 from aerialdojo_gen.base.rng import pick
+from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.colours import COLOURS
-from aerialdojo_gen.scenes.looks import Look
 
 # Small words, which may be said again; so may colours.
 _SMALL = re.compile(r"an?|the|and|or|of|on|in|at|to|by|for|from|with|without|over|under|its?|them|no|up|out|off")
@@ -22,7 +22,7 @@ _ORDER = ("size", "state", "pattern", "shape", "colour", "material")
 
 @dataclass(frozen=True)
 class Wording:
-    """A claim about an object's looks, and the ways to say it."""
+    """A claim about an object's appearance, and the ways to say it."""
 
     index: int  # Of the claim
     key: str  # The attribute's, or "part"
@@ -32,13 +32,13 @@ class Wording:
     clauses: tuple[str, ...] = ()  # "it lies on its roof"
 
 
-def wordings_of(claims: Sequence[Claim], looks: Mapping[str, Look], category: str) -> list[Wording]:
-    """Word the claims of the looks of a thing of a category."""
+def wordings_of(claims: Sequence[Claim], appearances: Mapping[str, Appearance], category: str) -> list[Wording]:
+    """Word the claims about the appearance of an instance of a category."""
     found = []
     for index, claim in enumerate(claims):
         if claim.kind == "part":
-            look = looks.get(claim.key)
-            said = (look.details, look.adjectives, look.clauses) if look is not None else ((claim.key,), (), ())
+            own = appearances.get(claim.key)
+            said = (own.details, own.adjectives, own.clauses) if own is not None else ((claim.key,), (), ())
             found.append(Wording(index, "part", said[1], (), said[0], said[2]))
         elif claim.kind in ("colour", "size", "attribute"):
             key, _, value = claim.key.rpartition("=")
@@ -70,10 +70,10 @@ def phrase_of(name: Name, said: Sequence[Wording], rng: np.random.Generator) -> 
         adjectives.append(" ".join(words[:-1] if words and words[-1] in known else words))
     # "Five round" says "round" as well.
     kept = [a for a in adjectives if a and not any(set(a.split()) < set(b.split()) for b in adjectives)]
-    return None if _again(kept, name.text) else noun_phrase(name, kept, tail)
+    return None if _repeats_word(kept, name.text) else noun_phrase(name, kept, tail)
 
 
-def _again(adjectives: Sequence[str], noun: str) -> bool:
+def _repeats_word(adjectives: Sequence[str], noun: str) -> bool:
     """Whether a word or a part of a compound is said twice: "striped blue-striped", "A-shaped A-board"."""
     words = [*(word for text in adjectives for word in text.split()), *(w for w in noun.split() if "-" in w)]
     parts = [part for word in words for part in word.split("-") if part != "and"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.language.choosing import About, Plan, choose
-from aerialdojo_gen.annotations.language.locations import LocationWords
+from aerialdojo_gen.annotations.language.locations import LocationPhrases
 from aerialdojo_gen.annotations.language.nouns import Names
 from aerialdojo_gen.annotations.language.sentences import Content, compose
 from aerialdojo_gen.annotations.language.subject import fresh, phrase_of
@@ -43,19 +43,19 @@ class Writer:
         vocabulary, instances = claims.vocabulary, claims.scene.instances
         words = {it.category: own for it, own in zip(instances, vocabulary.words, strict=True)}
         self._names = Names(words, landmarks)
-        self._locations = LocationWords(claims, self._names)
+        self._locations = LocationPhrases(claims, self._names)
         self._said: set[str] = set()
         self._openings: set[str] = set()
 
     def texts(self, i: int, claims: Sequence[Claim], shown: Collection[str] | None, n: int) -> list[Text]:
-        """Write up to `n` texts of instance `i`, none twice; fewer if its claims do not tell it from others.
+        """Write up to `n` texts of instance `i`, none twice; fewer if its claims do not distinguish it.
 
         `shown` are the parts that its pictures show, None if that is unknown.
         """
         instance = self._claims.scene.instances[i]
         rng = generator(self._seed, self._stage, self._claims.scene.name, instance.node)
-        looks = {look.phrase: look for look in self._claims.vocabulary.catalogue_looks(instance)}
-        about = About(self._claims, i, claims, looks, shown)
+        appearances = {one.phrase: one for one in self._claims.vocabulary.appearances_of(instance)}
+        about = About(self._claims, i, claims, appearances, shown)
         found: list[Text] = []
         for level, held_out in _orders(n, rng):
             text = self._write(about, level, held_out, found, rng)
@@ -101,7 +101,7 @@ class Writer:
             return None
         said = phrase.bare
         details = [
-            (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.telling(w.index))
+            (replace(w, details=fresh(w.details, said), clauses=fresh(w.clauses, said)), about.is_unique(w.index))
             for w in plan.details
         ]
         if not all(wording.details for wording, _ in details):

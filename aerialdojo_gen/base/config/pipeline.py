@@ -172,7 +172,7 @@ def with_overrides(pipeline: Pipeline, stage: str, **values: Any) -> Pipeline:
 def _disagreements(pipeline: Pipeline) -> list[str]:
     """Find what contradicts another section, so that no stage undoes another's work."""
     anchor, plan, kept, radius = pipeline.anchor_sample, pipeline.plan, pipeline.filter, pipeline.embodiment.radius_m
-    extra_m = [rung.extra_radius_m for rung in plan.ladder]
+    extra_m = [attempt.extra_radius_m for attempt in plan.ladder]
     thinnest, thickest = plan.margin_m + min(extra_m), radius + plan.margin_m + max(extra_m)
     rules = (
         (

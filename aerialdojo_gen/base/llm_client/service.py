@@ -1,4 +1,4 @@
-"""Talk to a service over HTTP within bounds of size, time and retries; tell its failures apart, and never its key."""
+"""Talk to a service over HTTP within bounds of size, time and retries; classify failures, never write its key."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import (
     MissingPackage,
     ServiceDown,
     UsageError,
-    lacks,
+    no_package,
 )
 from aerialdojo_gen.base.llm_client.http import BodyBoundError, Meter, bounded_client, refusal, retry_after_s
 from aerialdojo_gen.base.secrets import Secrets
@@ -77,7 +77,7 @@ class Connection:
         try:
             self._package = importlib.import_module(package)
         except ImportError:
-            raise MissingPackage(lacks(f"agent {package!r}", package, "llm")) from None
+            raise MissingPackage(no_package(f"agent {package!r}", package, "llm")) from None
         variable = f"{package.upper()}_BASE_URL"
         self.base_url = base_url or os.environ.get(variable) or None
         if self.base_url:

@@ -36,7 +36,7 @@ class Agent(Protocol):
     - ``usage() -> Usage or None``: what it has used since `reset`.
     - ``answer() -> str or None``: the words behind the last action, kept in `steps`.
     - ``check() -> str``: called once before a run, on an instance made for it: raises an `AerialDojoError` if
-      the agent cannot work (nobody listens, a wrong key), else returns what is worth telling.
+      the agent cannot work (nobody listens, a wrong key), else returns a message for the user.
     - ``settled() -> dict``: options that ``check`` has settled, given to the instances that fly.
     - ``used_options() -> dict``: its options with their defaults, JSON and no secrets, for the log.
     - ``suits(release: str)``: called once before it flies, with the fingerprint of the release's scenes; raises an

@@ -51,7 +51,7 @@ class ExplorerAgent(AgentBase):
         return self._headings * TURN_RAD
 
     def act(self, observation: Observation) -> int:
-        """Look, draw, choose."""
+        """Observe, update the map, choose."""
         self._reckon(observation)
         if observation.remaining_actions == 1 or self._found(observation):
             return STOP

@@ -1,4 +1,4 @@
-"""What an agent is told: the goal, the rules, and an observation before every action. There is nothing else."""
+"""What an agent is given: the goal, the rules, and an observation before every action. There is nothing else."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Sensors:
             if view not in VIEWS:
                 raise UsageError(unknown("no view", view, VIEWS))
         if len(set(self.views)) != len(self.views):
-            raise UsageError(f"a view stands twice in {', '.join(self.views)}")
+            raise UsageError(f"duplicate view in {', '.join(self.views)}")
         if self.light not in LIGHTS:
             raise UsageError(unknown("no light", self.light, LIGHTS))
         if self.max_depth_m <= 0.0:
@@ -83,7 +83,7 @@ BLIND = Sensors(views=(), rgb=False, depth=False)
 
 @dataclass(frozen=True)
 class Rules:
-    """What holds in every episode of a setting, and may be told to an agent (paper: embodiment, termination).
+    """What holds in every episode of a setting, and may be given to an agent (paper: embodiment, termination).
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Rules:
     sensors: Sensors = BLIND
 
 
-# What an agent may be told beside the paper's goal, where it is asked for.
+# What an agent may be given beside the paper's goal, on request.
 HINTS = ("heading",)
 
 
@@ -135,7 +135,7 @@ class Goal:
         not fit into the picture, from `image_distance_m` behind that viewpoint; read-only.
     rules : Rules
     heading : Heading or None
-        Of the start pose, where it is told (``--tell heading``); None in the paper's setting.
+        Of the start pose, where it is given (``--tell heading``); None in the paper's setting.
     image_distance_m : float or None
         For image goals: how far from the goal viewpoint the picture was taken, metres, straight back along the
         camera's axis. A Stop where it was taken fails if that is more than the success radius. None if unknown.

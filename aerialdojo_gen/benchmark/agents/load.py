@@ -19,7 +19,7 @@ from aerialdojo_gen.base.errors import (
     MissingPackage,
     UsageError,
     first_line,
-    lacks,
+    no_package,
 )
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import loads_json
@@ -61,12 +61,12 @@ def agent_class(name: str) -> Callable[..., Any]:
         module = importlib.import_module(module_name)
     except ImportError as error:
         if name in _EXTRAS:
-            raise MissingPackage(lacks(f"agent {name!r}", error.name, _EXTRAS[name])) from None
+            raise MissingPackage(no_package(f"agent {name!r}", error.name, _EXTRAS[name])) from None
         raise UsageError(f"cannot load agent {name!r}: {first_line(error)}") from None
     except AerialDojoError:
         raise
     except Exception as error:
-        raise keep_traceback(UsageError(f"cannot load agent {name!r}: {error_location(error)}"), error) from error
+        raise add_traceback(UsageError(f"cannot load agent {name!r}: {error_location(error)}"), error) from error
     cls = getattr(module, class_name, None)
     if cls is None:
         raise UsageError(f"cannot load agent {name!r}: module {module_name} has no {class_name}")
@@ -89,9 +89,9 @@ def load_agent(name: str, **options: Any) -> Agent:
     except AerialDojoError:
         raise
     except (TypeError, ValueError) as error:
-        raise keep_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
+        raise add_traceback(UsageError(f"agent {name!r}: {first_line(error)}"), error) from error
     except Exception as error:
-        raise keep_traceback(UsageError(f"agent {name!r} cannot be made: {error_location(error)}"), error) from error
+        raise add_traceback(UsageError(f"agent {name!r} cannot be made: {error_location(error)}"), error) from error
     if not isinstance(agent, Agent):
         raise UsageError(f"{name!r} is no agent: it needs reset(goal) and act(observation)")
     return agent
@@ -140,7 +140,7 @@ def error_location(error: BaseException) -> str:
     return f"{type(error).__name__}{where}: {first_line(error)}"
 
 
-def keep_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
+def add_traceback(error: AerialDojoError, cause: BaseException) -> AerialDojoError:
     """Set an agent's own traceback on the error that is made of it: unlike a cause, it is pickled with it."""
     at = cause.__traceback__
     while at is not None and at.tb_frame.f_code.co_filename.startswith(_LIBRARIES):

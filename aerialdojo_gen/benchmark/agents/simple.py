@@ -1,4 +1,4 @@
-"""Agents that look at nothing: a replayed reference or submission, random actions, the same flight, Stop at once."""
+"""Agents without observations: a replayed reference or submission, random actions, the same flight, Stop at once."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ SYMBOLS = f"0123456789abcdef{NO_ACTION}"
 
 
 class SubmittedAgent(_ListAgent):
-    """Replays the submitted actions of a JSON file, by task id; the runner tells it, and no other agent, the task."""
+    """Replays the submitted actions of a JSON file, by task id; the runner gives it, and no other agent, the id."""
 
     def __init__(self, file: str) -> None:
         self._by_task: dict[str, str] = read_json(Path(file))

@@ -33,7 +33,7 @@ _BY_KIND = {
 _STATUS = re.compile(r": HTTP (\d{3}): ")
 
 
-def _mend_of(error: UsageError, model: str, key_variable: str) -> str:
+def _remedy(error: UsageError, model: str, key_variable: str) -> str:
     status = _STATUS.search(str(error))
     code = status[1] if status else ""
     if code == "404":
@@ -48,7 +48,7 @@ def _mend_of(error: UsageError, model: str, key_variable: str) -> str:
 # An answer that is shown again for repair, or kept in the log: enough to see what is wrong with it.
 _KEPT_CHARACTERS = 4_000
 # More tokens than any request has: what a service counts beyond this it has not counted.
-_MOST_TOKENS = 1 << 40
+_MAX_TOKENS = 1 << 40
 # What a service answers that does not know structured outputs, or tool calls.
 _UNSUPPORTED = ("bad request", "not found", "malformed answer", "server error")
 # What may be over a moment later, and how long the check before a run waits for that, seconds.
@@ -78,7 +78,7 @@ class Reply:
 
 def token_count(value: Any) -> int | None:
     """Return a service's count of tokens; None where it is no count."""
-    return value if isinstance(value, int) and 0 <= value < _MOST_TOKENS and not isinstance(value, bool) else None
+    return value if isinstance(value, int) and 0 <= value < _MAX_TOKENS and not isinstance(value, bool) else None
 
 
 class LanguageModelAgent(AgentBase):
@@ -176,7 +176,7 @@ class LanguageModelAgent(AgentBase):
         except ServiceDown as error:
             raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
         except AgentUnavailable as error:
-            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
+            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try repair later')}"
             raise AerialDojoError(f"checked before the run, nothing flown: {error}{mend}") from None
         self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
         counted = "" if self.tells_tokens else ", tells no tokens"
@@ -201,7 +201,7 @@ class LanguageModelAgent(AgentBase):
         except UsageError as error:
             variable = self.options.key_env or f"{self.package.upper()}_API_KEY"
             # Not what was asked for is wrong, but what stands behind it: the exit code is 1.
-            raise ServiceDown(f"{error}: {_mend_of(error, self.options.model, variable)}") from None
+            raise ServiceDown(f"{error}: {_remedy(error, self.options.model, variable)}") from None
 
     def settled(self) -> dict[str, Any]:
         """Return options that `check` has settled, for the agents that fly."""
@@ -209,7 +209,7 @@ class LanguageModelAgent(AgentBase):
 
     @property
     def priced(self) -> bool:
-        """Whether the cost of an episode will be known, if the service tells tokens."""
+        """Whether the cost of an episode will be known, if the service reports tokens."""
         return self.options.priced
 
     def _readable(self, reply: Reply) -> bool:
@@ -249,8 +249,8 @@ class LanguageModelAgent(AgentBase):
                 answer = parse_answer(text, actions.names)
             except InvalidAnswer as error:
                 shown = text[:_KEPT_CHARACTERS].strip() or "(nothing)"
-                again = repair_text(str(error), actions)
-                messages += [Message("assistant", (shown,)), Message("user", (again,))]
+                repair = repair_text(str(error), actions)
+                messages += [Message("assistant", (shown,)), Message("user", (repair,))]
                 answer = parse_answer(self._ask(messages), actions.names)
         except InvalidAnswer:
             self._turns.append(Turn(observation.step, None))

@@ -29,7 +29,7 @@ _EFFECTS = {
 class ActionSet:
     """Names that a model answers with, and the actions that they mean."""
 
-    ids: Mapping[str, int]  # The action's id, 0 to 15, by the name that the model is told
+    ids: Mapping[str, int]  # The action's id, 0 to 15, by the name that the model is given
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,7 +85,7 @@ class Answer(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    action: str  # One of the names that were told
+    action: str  # One of the names that were given
     thought: str = ""  # What the model says of it
 
 
@@ -139,5 +139,5 @@ def _reject_constant(name: str) -> Any:
 def _reject_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     value = dict(pairs)
     if len(value) != len(pairs):
-        raise InvalidAnswer("a key stands twice in it")
+        raise InvalidAnswer("it has a duplicate key")
     return value

@@ -1,4 +1,4 @@
-"""What a language model is told: the role, the body, the actions, the rules, and a report before every action.
+"""The prompts of a language model: the role, the body, the actions, the rules, and a report before every action.
 
 After the paper's Appendix A: front-facing RGB-D with its encoding, the action list with magnitudes, embodiment,
 termination, remaining budget, and one action as JSON.
@@ -14,12 +14,12 @@ from aerialdojo_gen.base.constants import FOV_DEG
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet
 
-_LOOKS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
+_VIEW_DIRECTIONS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
 
 
 @dataclass(frozen=True)
 class Turn:
-    """An earlier step, as it is told again."""
+    """An earlier step, as it is repeated in a prompt."""
 
     step: int  # Its number, from 0
     action: str | None  # Name of the action; None where the answer could not be read
@@ -42,10 +42,10 @@ class Sight:
 def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
     """Write what holds for the whole episode (paper, Appendix A)."""
     rules = goal.rules
-    told = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
+    hint = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
     return f"""\
 You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
-the drone's cameras; there is no map, no GPS and no compass{told}. Find the target, fly up to it, and stop in front \
+the drone's cameras; there is no map, no GPS and no compass{hint}. Find the target, fly up to it, and stop in front \
 of it.
 
 BODY
@@ -74,7 +74,7 @@ ANSWER
 def _sensors(sight: Sight) -> str:
     if not sight.views:
         return "You see nothing."
-    cameras = ", ".join(f"{view} (looks {_LOOKS[view]})" for view in sight.views)
+    cameras = ", ".join(f"{view} (looks {_VIEW_DIRECTIONS[view]})" for view in sight.views)
     text = (
         f"Before every action you see a colour picture from each of these cameras: {cameras}. Each picture has "
         f"{sight.width} x {sight.height} pixels and a horizontal field of view of {sight.fov_deg:g}°."

@@ -37,7 +37,7 @@ class Row:
 
     name: str
     ours: tuple[Figure, ...]
-    paper: tuple[Figure, ...]
+    theirs: tuple[Figure, ...]
 
 
 @dataclass(frozen=True)
@@ -59,36 +59,36 @@ class Comparison:
     def compared(self) -> int:
         """How many figures that are to be the paper's there are."""
         return sum(
-            column.exact and paper is not None
+            column.exact and theirs is not None
             for row in self.rows
-            for column, paper in zip(self.columns, row.paper, strict=True)
+            for column, theirs in zip(self.columns, row.theirs, strict=True)
         )
 
     def _differing(self, row: Row) -> list[int]:
         return [
             k
-            for k, (column, ours, paper) in enumerate(zip(self.columns, row.ours, row.paper, strict=True))
-            if column.exact and paper is not None and ours != paper
+            for k, (column, ours, theirs) in enumerate(zip(self.columns, row.ours, row.theirs, strict=True))
+            if column.exact and theirs is not None and ours != theirs
         ]
 
-    def _beside(self, k: int) -> bool:
+    def _split(self, k: int) -> bool:
         """Whether the paper's figures of a column have a column of their own."""
-        return not self.columns[k].exact and any(row.paper[k] is not None for row in self.rows)
+        return not self.columns[k].exact and any(row.theirs[k] is not None for row in self.rows)
 
     def _heads(self) -> list[str]:
         heads = [self.key]
         for k, column in enumerate(self.columns):
-            heads += [column.name, _PAPERS] if self._beside(k) else [column.name]
+            heads += [column.name, _PAPERS] if self._split(k) else [column.name]
         return heads
 
     def _cells(self, row: Row, bracket: bool = False) -> list[str]:
         differing, cells = self._differing(row), [row.name]
-        for k, (ours, paper) in enumerate(zip(row.ours, row.paper, strict=True)):
+        for k, (ours, theirs) in enumerate(zip(row.ours, row.theirs, strict=True)):
             show = self.columns[k].show
-            if self._beside(k):
-                cells += [show(ours), show(paper)]
+            if self._split(k):
+                cells += [show(ours), show(theirs)]
             else:
-                cells.append(show(ours) + (f" (paper: {show(paper)})" if bracket and k in differing else ""))
+                cells.append(show(ours) + (f" (paper: {show(theirs)})" if bracket and k in differing else ""))
         return cells
 
     def terminal(self, width: int | None = None) -> list[str]:
@@ -98,8 +98,8 @@ class Comparison:
             rows.append(self._cells(row))
             if differing := self._differing(row):
                 below = ["  in the paper"]
-                for k, paper in enumerate(row.paper):
-                    below += ["", ""] if self._beside(k) else [self.columns[k].show(paper) if k in differing else ""]
+                for k, theirs in enumerate(row.theirs):
+                    below += ["", ""] if self._split(k) else [self.columns[k].show(theirs) if k in differing else ""]
                 rows.append(below)
         stub, *heads = self._heads()
         columns = [text_table.Column(head, joined=head == _PAPERS) for head in heads]
@@ -125,7 +125,7 @@ class Comparison:
         names = [column.name for column in self.columns]
         rows = [
             {"name": row.name, "ours": dict(zip(names, row.ours, strict=True)), "paper": None}
-            | ({} if set(row.paper) == {None} else {"paper": dict(zip(names, row.paper, strict=True))})
+            | ({} if set(row.theirs) == {None} else {"paper": dict(zip(names, row.theirs, strict=True))})
             for row in self.rows
         ]
         units = {column.name: column.unit for column in self.columns}
@@ -134,9 +134,9 @@ class Comparison:
     def records(self) -> list[list[str]]:
         """One record per figure: table, row, column, unit, ours, paper; empty if there is none."""
         return [
-            [self.title, row.name, column.name, column.unit, *("" if f is None else repr(f) for f in (ours, paper))]
+            [self.title, row.name, column.name, column.unit, *("" if f is None else repr(f) for f in (ours, theirs))]
             for row in self.rows
-            for column, ours, paper in zip(self.columns, row.ours, row.paper, strict=True)
+            for column, ours, theirs in zip(self.columns, row.ours, row.theirs, strict=True)
         ]
 
 

@@ -103,7 +103,7 @@ def scene_table(tasks: pd.DataFrame) -> Comparison:
     return _table("Difficulty by scene", "scene", _DIFFICULTY[:_OF_SCENES], groups)
 
 
-def seen_table(tasks: pd.DataFrame) -> Comparison:
+def novelty_table(tasks: pd.DataFrame) -> Comparison:
     """Say which test tasks of the split by tasks ask for what no training task of their partition has."""
     measures = (
         Measure("tasks", len),
@@ -141,16 +141,16 @@ def held_out_table(tasks: pd.DataFrame) -> Comparison:
     return _table("The split by objects", "target_split", measures, groups, notes)
 
 
-def tells_difficulty(tasks: pd.DataFrame) -> bool:
+def has_difficulty(tasks: pd.DataFrame) -> bool:
     """Whether the release says how hard its tasks are: one of an older version does not."""
     return bool(tasks["plan_detour"].notna().any())
 
 
 def difficulty_tables(tasks: pd.DataFrame) -> list[Comparison]:
-    """Make all tables of difficulty and of splits; none of a release that does not tell them."""
-    if not tells_difficulty(tasks):
+    """Make all tables of difficulty and of splits; none of a release that does not have them."""
+    if not has_difficulty(tasks):
         return []
-    splits = [seen_table, held_out_table] if (tasks["target_split"] != "").any() else []
+    splits = [novelty_table, held_out_table] if (tasks["target_split"] != "").any() else []
     return [make(tasks) for make in (setting_table, scene_table, *splits)]
 
 
@@ -204,6 +204,6 @@ def flight_table(tasks: pd.DataFrame) -> Comparison:
     return _table("How reference routes fly", "setting", measures, _by_setting(tasks), notes)
 
 
-def worth_tables(goals: pd.DataFrame, tasks: pd.DataFrame) -> list[Comparison]:
+def goal_tables(goals: pd.DataFrame, tasks: pd.DataFrame) -> list[Comparison]:
     """Say what goals show, and how reference routes fly."""
     return [goal_table(goals), flight_table(tasks)]

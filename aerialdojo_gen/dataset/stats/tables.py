@@ -30,7 +30,7 @@ class Made:
     categories: frozenset[str]  # Of the objects
     tasks: dict[tuple[str, str], int]  # Navigation tasks by subset (train, test) and setting
     path_m: float  # Summed length of their routes, metres
-    paper: PaperScene | None  # The paper's row
+    paper_scene: PaperScene | None  # The paper's row
     anchors: int = 0
 
     def of(self, setting: str, subset: str | None = None) -> int:
@@ -63,14 +63,14 @@ def made_of(data: Where, scene: str) -> Made:
         categories=frozenset(categories),
         tasks=dict(tasks),
         path_m=path,
-        paper=inventory().get(scene),
+        paper_scene=inventory().get(scene),
         anchors=sum(store.read_scene(root, "release/anchors", scene, ["selected"])["selected"].to_pylist()),
     )
 
 
 def _whole(made: Sequence[Made]) -> bool:
     """Whether all of the paper's scenes are there, and are to be held to its figures."""
-    return {m.scene for m in made if m.paper} >= set(inventory())
+    return {m.scene for m in made if m.paper_scene} >= set(inventory())
 
 
 def _figures(made: Sequence[Made]) -> tuple[int | float, ...]:
@@ -79,7 +79,7 @@ def _figures(made: Sequence[Made]) -> tuple[int | float, ...]:
 
 def _paper_figures(made: Sequence[Made]) -> tuple[int | float | None, ...]:
     """The paper's figures of these scenes; none where it does not have one of them."""
-    rows = [m.paper for m in made if m.paper]
+    rows = [m.paper_scene for m in made if m.paper_scene]
     if len(rows) < len(made):
         return (None,) * (len(_COUNTS) + 1)
     return _sums(rows, [2 * sum(row.tasks[s] for row in rows) for s in SETTINGS])
@@ -101,7 +101,7 @@ def scene_table(made: Sequence[Made]) -> Comparison:
     """Table of the scenes and the paper's Table 10; settings count instances."""
     rows = [Row(m.scene, _figures([m]), _paper_figures([m])) for m in made]
     rows.append(Row("all", _figures(made), _paper_figures(made)))
-    title = "Scenes (the paper's Table 10)" if any(m.paper for m in made) else "Scenes"
+    title = "Scenes (the paper's Table 10)" if any(m.paper_scene for m in made) else "Scenes"
     return Comparison(title, "scene", (*_COUNTS, _KM), tuple(rows))
 
 
@@ -113,17 +113,17 @@ def family_table(made: Sequence[Made]) -> Comparison:
     ]
     rows = []
     for name, group in [*(g for g in groups if g[1]), ("all", list(made))]:
-        ours, paper = _figures(group), _paper_figures(group)
-        known = len(group) if paper[0] is not None else None
+        ours, papers = _figures(group), _paper_figures(group)
+        known = len(group) if papers[0] is not None else None
         types, anchors = len({m.scene_type for m in group}), sum(m.anchors for m in group)
         # The paper counts these by family: of a part of a family's scenes it says nothing.
         named = [f for n, f in family_counts().items() if name in (n, "all")]
         whole = bool(named) and known == sum(int(f["scenes"]) for f in named)
         totals = [sum(int(f[column]) for f in named) if whole else None for column in ("types", "anchors")]
-        theirs = (totals[0], known, *paper[:2], totals[1], *paper[2:])
+        theirs = (totals[0], known, *papers[:2], totals[1], *papers[2:])
         rows.append(Row(name, (types, len(group), *ours[:2], anchors, *ours[2:]), theirs))
     columns = (Column("types"), Column("scenes"), *_COUNTS[:2], Column("anchors"), *_COUNTS[2:], _KM)
-    title = "Families (the paper's Table 2)" if any(m.paper for m in made) else "Families"
+    title = "Families (the paper's Table 2)" if any(m.paper_scene for m in made) else "Families"
     return Comparison(title, "family", columns, tuple(rows))
 
 
@@ -161,8 +161,8 @@ def mean_length_table(made: Sequence[Made]) -> Comparison:
         n = sum(m.instances for m in group) // 2
         if not n:
             continue
-        paper, whole = _paper_figures(group), _whole(made)
-        theirs = 1000.0 * paper[6] / (paper[5] / 2) if whole and paper[5] and paper[6] is not None else None
+        papers, whole = _paper_figures(group), _whole(made)
+        theirs = 1000.0 * papers[6] / (papers[5] / 2) if whole and papers[5] and papers[6] is not None else None
         rows.append(Row(name, (sum(m.path_m for m in group) / n,), (theirs,)))
     column = Column("m", "m", exact=False, digits=2)
     return Comparison("Mean length of the reference trajectories", "family", (column,), tuple(rows))
@@ -187,20 +187,20 @@ def split_table(made: Sequence[Made]) -> Comparison:
     for (partition, subset), cells in splits().items():
         group = [m for m in made if store.partition(m.scene).upper() == partition]
         ours = [2 * sum(m.of(s, subset) for m in group) for s in SETTINGS]
-        paper = [2 * cells[s] for s in SETTINGS]
-        known = (*paper, sum(paper)) if whole else (None,) * 4
+        papers = [2 * cells[s] for s in SETTINGS]
+        known = (*papers, sum(papers)) if whole else (None,) * 4
         rows.append(Row(f"{partition} {subset}", (*ours, sum(ours)), known))
     ours_all = tuple(sum(column) for column in zip(*(row.ours for row in rows), strict=True))
     paper_all = (
-        tuple(sum(column) for column in zip(*(row.paper for row in rows), strict=True)) if whole else (None,) * 4
+        tuple(sum(column) for column in zip(*(row.theirs for row in rows), strict=True)) if whole else (None,) * 4
     )
     return Comparison("Splits", "split", _COUNTS[2:], (*rows, Row("all", ours_all, paper_all)))
 
 
 def total_table(made: Sequence[Made]) -> Comparison:
     """Table of the whole benchmark; the paper's figures are the sums of its Table 10."""
-    ours, paper = _figures(made), _paper_figures(made)
-    known = paper[0] is not None
+    ours, papers = _figures(made), _paper_figures(made)
+    known = papers[0] is not None
     rows = [
         Row(name, (n,), (n if known else None,))
         for name, n in (
@@ -209,15 +209,15 @@ def total_table(made: Sequence[Made]) -> Comparison:
             ("scenes", len(made)),
         )
     ]
-    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, paper, strict=False)]
+    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, papers, strict=False)]
     rows.append(Row("object categories", (len(frozenset().union(*(m.categories for m in made))),), (None,)))
     names = ("instances, base", "instances, standard", "instances, long-horizon", "instances")
-    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], paper[2:6], strict=True)]
-    tasks = [None if n is None else int(n) // 2 for n in (ours[5], paper[5])]
+    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], papers[2:6], strict=True)]
+    tasks = [None if n is None else int(n) // 2 for n in (ours[5], papers[5])]
     rows.append(Row("navigation tasks", (tasks[0],), (tasks[1],)))
-    rows.append(Row("routes in all, km", (ours[6],), (paper[6],)))
+    rows.append(Row("routes in all, km", (ours[6],), (papers[6],)))
     means = [
-        1000 * km / n if km is not None and n else None for km, n in zip((ours[6], paper[6]), tasks, strict=True)
+        1000 * km / n if km is not None and n else None for km, n in zip((ours[6], papers[6]), tasks, strict=True)
     ]
     rows.append(Row("mean route, m", (means[0],), (means[1],)))
     return Comparison("The benchmark as a whole", "", (Column("figure", exact=False),), tuple(rows))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.foreign_keys import sound
+from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
@@ -15,7 +15,7 @@ from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.scoring.ensemble import SCORERS
 from aerialdojo_gen.pipeline.scoring.geometric import FACTORS, WEIGHTS
-from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, TELLS_WEIGHT, clarity_score
+from aerialdojo_gen.pipeline.scoring.recognisability import FRONT_WEIGHT, PARTS_WEIGHT, clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import SLACK_M
 
 _SAME_M = 1e-4
@@ -64,7 +64,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     known = rows.floats("part_tells", "part_front")
     for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
         yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
-    share = np.where(np.isnan(known), 0.0, [TELLS_WEIGHT, FRONT_WEIGHT])
+    share = np.where(np.isnan(known), 0.0, [PARTS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
@@ -163,7 +163,7 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     objects = data["objects"]
     item = objects.find("object_id", rows.column("object_id"))
     annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
-    fit = np.flatnonzero(sound(data, "objects", item) & ~annotated)
+    fit = np.flatnonzero(comparable(data, "objects", item) & ~annotated)
     centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
     off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))

@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 # plan; of the columns of the scene: those that meet ground.
 _ONE_LAYER, _UNDERMOST, _LEVEL, _COVER = 0.75, 0.55, 0.55, 0.55
 _PROBE_M = 1.0
-_LEAST_PROBES = 6
+_MIN_PROBES = 6
 _THIN_M = 0.01
 # Lattices of surveys are round numbers: rays stand between them.
 _ODD_M = (0.3183, 0.2718)
@@ -83,8 +83,8 @@ def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
     pose = np.repeat(np.arange(len(xyz)), n)
     share = (np.arange(len(pose)) - np.repeat(np.cumsum(n) - n, n)) / n[pose]
     points = xyz[pose] + share[:, None] * step[pose]
-    sound = np.isfinite(points).all(axis=1)
-    return points[sound], pose[sound]
+    finite = np.isfinite(points).all(axis=1)
+    return points[finite], pose[finite]
 
 
 def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
@@ -98,7 +98,7 @@ def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
 
 
 def _ground(data: SceneData) -> TriangleRayCaster | None:
-    return data.keep("ground", lambda: open_ground(scene_mesh(data).scene))
+    return data.cached("ground", lambda: open_ground(scene_mesh(data).scene))
 
 
 def open_ground(scene: Scene) -> TriangleRayCaster | None:
@@ -119,18 +119,18 @@ def open_ground(scene: Scene) -> TriangleRayCaster | None:
     met = np.isfinite(up)
     stored: list[trimesh.Trimesh] = []
     sheets, covered = [], np.zeros(len(plan), dtype=np.bool_)
-    for k in np.flatnonzero(np.bincount(owner[met], minlength=len(standing)) >= _LEAST_PROBES):
+    for k in np.flatnonzero(np.bincount(owner[met], minlength=len(standing)) >= _MIN_PROBES):
         for body in _open_bodies(standing[k]):
             box = body.bounds
             near = np.flatnonzero(((plan >= box[0, :2]) & (plan <= box[1, :2])).all(axis=1))
-            if len(near) < _LEAST_PROBES:
+            if len(near) < _MIN_PROBES:
                 continue
             alone = TriangleRayCaster(np.asarray(body.vertices), np.asarray(body.faces, dtype=np.int32))
             bottom, _ = alone.first_hit(under[near], upwards[near])
             top, _ = alone.first_hit(over[near], downwards[near])
             own = np.isfinite(bottom) & np.isfinite(top)
             thickness = (over[near, 2] - top) - (under[near, 2] + bottom)
-            if own.sum() < _LEAST_PROBES:
+            if own.sum() < _MIN_PROBES:
                 continue
             normal = body.triangles_cross
             level = np.abs(normal[:, 2]).sum() >= _LEVEL * np.linalg.norm(normal, axis=1).sum()

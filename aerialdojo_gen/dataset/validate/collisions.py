@@ -56,13 +56,13 @@ def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     cap = data.pipeline.plan.clearance_cap_m
     stored, paths = rows.floats("min_clearance_m"), data.paths
     for k, row in data.sampled_routes(*_FITS, "route_collision", "null_value", "not_finite"):
-        legs, told = corners(paths.xyz[paths.of(k)]), float(stored[row])
-        if told > cap + _CLEARANCE_M:
-            yield Finding(row, f"{told:.6g} m", f"{cap:g} m at most")
+        legs, stored_m = corners(paths.xyz[paths.of(k)]), float(stored[row])
+        if stored_m > cap + _CLEARANCE_M:
+            yield Finding(row, f"{stored_m:.6g} m", f"{cap:g} m at most")
             continue
-        passes = told <= _CLEARANCE_M or not world.route_in_collision(legs, told - _CLEARANCE_M)
-        if not passes or (told < cap and not world.route_in_collision(legs, max(told, 0.0) + _CLEARANCE_M)):
-            yield Finding(row, f"{told:.6g} m", f"{_clearance_m(world, legs, cap):.4f} m")
+        passes = stored_m <= _CLEARANCE_M or not world.route_in_collision(legs, stored_m - _CLEARANCE_M)
+        if not passes or (stored_m < cap and not world.route_in_collision(legs, max(stored_m, 0.0) + _CLEARANCE_M)):
+            yield Finding(row, f"{stored_m:.6g} m", f"{_clearance_m(world, legs, cap):.4f} m")
 
 
 def _hit(world: CollisionWorld, legs: Floats, radius: float) -> str:

@@ -21,7 +21,7 @@ _PATH_SHARE = 0.005
 
 
 @dataclass(frozen=True)
-class Tally:
+class SceneCounts:
     """What a scene of the release holds, for the counts of the whole."""
 
     scene: str  # Name
@@ -32,7 +32,7 @@ class Tally:
     complete: bool = False  # Whether all of its tables could be read
 
 
-def tally_of(data: SceneData, complete: bool) -> Tally:
+def count_scene(data: SceneData, complete: bool) -> SceneCounts:
     """Count what a scene holds."""
     routes: Counter[tuple[str, str]] = Counter()
     tasks: Counter[str] = Counter()
@@ -47,29 +47,29 @@ def tally_of(data: SceneData, complete: bool) -> Tally:
         tasks.update(rows.parts[k].split("/")[-2] for k in rows.part_of)
     if "objects" in data.tables:
         images = [text for text in data["objects"].texts("reference_image_id") if text]
-    return Tally(data.scene, routes, tasks, path, tuple(images), complete)
+    return SceneCounts(data.scene, routes, tasks, path, tuple(images), complete)
 
 
-def scene_counts(data: SceneData, tally: Tally) -> Outcome:
+def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
     """Hold a scene's landmarks, objects and tasks by setting and subset to the paper's, where the paper has it."""
     outcome = Outcome("scene_counts", "counts")
-    paper = inventory().get(data.scene)
-    if paper is None or not data.pipeline.split.paper_counts:
-        outcome.skipped = "no scene of the paper" if paper is None else "the pipeline has no paper_counts"
+    paper_scene = inventory().get(data.scene)
+    if paper_scene is None or not data.pipeline.split.paper_counts:
+        outcome.skipped = "no scene of the paper" if paper_scene is None else "the pipeline has no paper_counts"
         return outcome
-    if not tally.complete:
+    if not counts.complete:
         outcome.skipped = "the scene cannot be read"
         return outcome
     from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
 
     trains = train_quotas(data.scene, inventory(), splits())
     side = store.partition(data.scene)
-    expected = {"landmarks": paper.landmarks, "objects": paper.objects}
+    expected = {"landmarks": paper_scene.landmarks, "objects": paper_scene.objects}
     found = {"landmarks": len(data["landmarks"]), "objects": len(data["objects"])}
     for setting in SETTINGS:
-        for subset, n in (("train", trains[setting]), ("test", paper.tasks[setting] - trains[setting])):
+        for subset, n in (("train", trains[setting]), ("test", paper_scene.tasks[setting] - trains[setting])):
             expected[f"{subset} {setting} tasks"] = n
-            found[f"{subset} {setting} tasks"] = tally.routes[f"{side}_{subset}", setting]
+            found[f"{subset} {setting} tasks"] = counts.routes[f"{side}_{subset}", setting]
     for name, n in expected.items():
         outcome.rows += 1
         if found[name] != n:
@@ -77,14 +77,16 @@ def scene_counts(data: SceneData, tally: Tally) -> Outcome:
     return outcome
 
 
-def whole_counts(release: Release, tallies: Sequence[Tally], pipeline: Pipeline, every_scene: bool) -> list[Outcome]:
-    """Check what only all scenes together can tell."""
+def whole_counts(
+    release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline, every_scene: bool
+) -> list[Outcome]:
+    """Check what needs all scenes together."""
     outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
         partial = "" if every_scene else "only some scenes were selected"
-        if not partial and not all(tally.complete for tally in tallies):
+        if not partial and not all(counts.complete for counts in totals):
             partial = "a scene cannot be read"
-        outcome.skipped = partial or judge(outcome, release, tallies, pipeline)
+        outcome.skipped = partial or judge(outcome, release, totals, pipeline)
     return outcomes
 
 
@@ -96,23 +98,23 @@ WHOLE_CHECKS = {
 }
 
 
-def _splits(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
-    if why := _not_the_papers(tallies, pipeline):
+def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
+    if why := _not_the_papers(totals, pipeline):
         return why
     for (side, subset), settings in splits().items():
         folder = f"{side.lower()}_{subset}"
         for setting, n in settings.items():
             outcome.rows += 1
-            found = sum(tally.routes[folder, setting] for tally in tallies)
+            found = sum(counts.routes[folder, setting] for counts in totals)
             if found != n:
                 outcome.fault(f"{found:,}", f"{n:,}", part=f"routes/{folder}", key=f"{setting} tasks")
     return ""
 
 
-def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipeline: Pipeline) -> str:
-    if why := _not_the_papers(tallies, pipeline):
+def _path(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
+    if why := _not_the_papers(totals, pipeline):
         return why
-    found, expected = (sum(x) for x in ((t.path_m for t in tallies), (p.path_m for p in inventory().values())))
+    found, expected = (sum(x) for x in ((t.path_m for t in totals), (p.path_m for p in inventory().values())))
     outcome.rows = 1
     if abs(found - expected) > _PATH_SHARE * expected:
         stated = f"{found / 1000:,.1f} km", f"{expected / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
@@ -120,7 +122,7 @@ def _path(outcome: Outcome, _release: Release, tallies: Sequence[Tally], pipelin
     return ""
 
 
-def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+def _card(outcome: Outcome, release: Release, totals: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
     card = _text(release, "README.md")
     if card is None:
         outcome.rows = 1
@@ -136,9 +138,9 @@ def _card(outcome: Outcome, release: Release, tallies: Sequence[Tally], _pipelin
     for file, table, folder, n in stated:
         outcome.rows += 1
         if table == "tasks":
-            found = sum(tally.tasks[folder] for tally in tallies)
+            found = sum(counts.tasks[folder] for counts in totals)
         else:
-            found = sum(k for tally in tallies for (name, _), k in tally.routes.items() if name == folder)
+            found = sum(k for counts in totals for (name, _), k in counts.routes.items() if name == folder)
         if n != found:
             outcome.fault(f"{n:,} rows told", f"{found:,}", table=table, part=file, key=folder)
     return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
@@ -169,19 +171,19 @@ def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
     ]
 
 
-def _images(outcome: Outcome, _release: Release, tallies: Sequence[Tally], _pipeline: Pipeline) -> str:
+def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
     first: dict[str, str] = {}
-    for tally in tallies:
-        for image_id in tally.images:
+    for counts in totals:
+        for image_id in counts.images:
             outcome.rows += 1
-            if first.setdefault(image_id, tally.scene) != tally.scene:
+            if first.setdefault(image_id, counts.scene) != counts.scene:
                 key, found = f"reference_image_id={image_id}", f"of {first[image_id]} too"
-                outcome.fault(found, "one scene", scene=tally.scene, table="objects", key=key)
+                outcome.fault(found, "one scene", scene=counts.scene, table="objects", key=key)
     return ""
 
 
-def _not_the_papers(tallies: Sequence[Tally], pipeline: Pipeline) -> str:
+def _not_the_papers(totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
     if not pipeline.split.paper_counts:
         return "the pipeline has no paper_counts"
-    missing = len(set(inventory()) - {tally.scene for tally in tallies})
+    missing = len(set(inventory()) - {counts.scene for counts in totals})
     return f"{missing} of the paper's {len(inventory())} scenes are not in it" if missing else ""

@@ -50,7 +50,7 @@ _NO_PART = {*_COLOURS, "and", "dark", "light", "pale", "bright", "deep"}
 
 
 @dataclass(frozen=True)
-class _Words:
+class _SceneTexts:
     """What is said of a scene's things, and what texts are matched with."""
 
     claims: SceneClaims
@@ -60,7 +60,7 @@ class _Words:
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
 def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every claim about an object is so of the mesh, and of the very things that it names."""
-    words = _words(data)
+    words = _scene_texts(data)
     for row, i in _placed(words, rows):
         claims = _claims(rows, row)
         if claims is None:
@@ -73,7 +73,7 @@ def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
 def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and texts name their own thing, and say no value, relation or direction that is not so in the mesh."""
-    words = _words(data)
+    words = _scene_texts(data)
     instances = words.claims.scene.instances
     for row, i in _placed(words, rows):
         made = {one["text"] for one in _made(rows, row) if one["claims"]}
@@ -89,7 +89,7 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A text fits nothing else of its category in the same direction of the same landmark."""
-    words = _words(data)
+    words = _scene_texts(data)
     instances = words.claims.scene.instances
     for row, i in _placed(words, rows):
         own = _claims(rows, row) or []
@@ -103,7 +103,7 @@ def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 break
 
 
-def _placed(words: _Words, rows: Rows) -> Iterator[tuple[int, int]]:
+def _placed(words: _SceneTexts, rows: Rows) -> Iterator[tuple[int, int]]:
     """Rows whose node is in the mesh, and its index there."""
     index = words.claims.geometry.index
     yield from ((row, index[str(node)]) for row, node in enumerate(rows.texts("mesh_node")) if node in index)
@@ -132,7 +132,7 @@ def _claims(rows: Rows, row: int) -> list[Claim] | None:
         return None
 
 
-def _turned(words: _Words, i: int, text: str) -> str:
+def _turned(words: _SceneTexts, i: int, text: str) -> str:
     """Say which direction from the object's own landmark a text says, where the goal says another."""
     bearing = words.claims.bearings[i]
     if bearing is None:
@@ -165,7 +165,7 @@ def text_form(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("landmarks", needs=("mesh",), after=("landmark_node",))
 def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's name is one of a kind, names its own thing, and says no value that the mesh does not bear out."""
-    words = _words(data)
+    words = _scene_texts(data)
     first = dict[str, int]()
     for row, i in _placed(words, rows):
         text = rows.texts("name")[row] or ""
@@ -178,13 +178,13 @@ def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"name = {text!r}: {wrong}", f"what is so of {node}")
 
 
-def _words(data: SceneData) -> _Words:
-    return data.keep("words", lambda: _read_words(data))
+def _scene_texts(data: SceneData) -> _SceneTexts:
+    return data.cached("words", lambda: _read_scene_texts(data))
 
 
-def _read_words(data: SceneData) -> _Words:
+def _read_scene_texts(data: SceneData) -> _SceneTexts:
     scene = scene_mesh(data).scene
-    geometry = data.keep("relations", lambda: SceneGeometry(scene))
+    geometry = data.cached("relations", lambda: SceneGeometry(scene))
     marks = data["landmarks"]
     nodes = [str(node) for node in marks.texts("mesh_node")]
     if not nodes or len(set(nodes)) < len(nodes) or not all(node in scene for node in nodes):
@@ -197,7 +197,7 @@ def _read_words(data: SceneData) -> _Words:
         (Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named), key=lambda mark: mark.id
     )
     claims = SceneClaims(Vocabulary(scene, catalogue), landmarks, geometry)
-    return _Words(claims, Matcher(claims))
+    return _SceneTexts(claims, Matcher(claims))
 
 
 @lru_cache(maxsize=2)
@@ -230,7 +230,7 @@ def _recoloured(instance: Instance, text: str) -> str:
     return ""
 
 
-def _other_side(words: _Words, i: int, text: str) -> str:
+def _other_side(words: _SceneTexts, i: int, text: str) -> str:
     """Say which side a landmark is said to be on of its like, where it is on another."""
     geometry, marks = words.claims.geometry, words.claims.landmarks
     category = geometry.scene.instances[i].category

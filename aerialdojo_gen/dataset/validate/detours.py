@@ -107,7 +107,7 @@ def _flown_shorter(data: SceneData, k: int) -> float | None:
     """
     config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
     radius_m = data.pipeline.embodiment.radius_m
-    planner = data.keep("wide", lambda: Planner(scene_mesh(data).scene, config, radius_m))
+    planner = data.cached("wide", lambda: Planner(scene_mesh(data).scene, config, radius_m))
     paths = data.paths
     where = paths.of(k)
     poses = np.column_stack([paths.xyz[where], paths.yaw[where]])

@@ -243,7 +243,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _has_salt(data: SceneData, key: bytes) -> bool:
-    """Whether the release's ids were made with a key: told by one of them."""
+    """Whether the release's ids were made with a key, by one of them."""
     routes = data["routes"]
     pair = [routes.ints(name)[:1].tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
     pairs = [f"{s}_{a}__{t}" for s, a, t in zip(*pair, strict=True)]

@@ -27,7 +27,7 @@ _SAID_OF_ROUTE = (
 )  # fmt: skip
 
 
-def sound(data: SceneData, table: str, rows: Ints) -> Mask:
+def comparable(data: SceneData, table: str, rows: Ints) -> Mask:
     """Whether looked-up rows exist and are fit to compare with, (n,) bool."""
     good = ~data.flagged(table, (*ALWAYS_AFTER, "duplicate_key"))
     return (rows >= 0) & (np.append(good, False)[rows])
@@ -172,7 +172,7 @@ def task_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's setting is its route's."""
     routes = data["routes"]
     theirs = routes.column("setting").take(_at(data.route_of_task))
-    fit = sound(data, "routes", data.route_of_task)
+    fit = comparable(data, "routes", data.route_of_task)
     for row in np.flatnonzero(unequal(rows.column("setting"), theirs) & fit):
         yield Finding(int(row), rows.texts("setting")[row] or "", theirs[int(row)].as_py())
 
@@ -195,7 +195,7 @@ def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
     theirs = starts[data.route_of_task]
     own = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
     off = np.abs(own - theirs).max(axis=1)
-    fit = sound(data, "routes", data.route_of_task)
+    fit = comparable(data, "routes", data.route_of_task)
     for row in np.flatnonzero((off > _SAME_PLACE_M) & fit):
         yield Finding(int(row), pose_text(own[row]), pose_text(theirs[row]))
 
@@ -224,7 +224,7 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
         "image_distance_m": objects.column("step_back_m"),
         "shape_seen_in_train": pc.invert(objects.column("shape_held_out")),
     }
-    fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
+    fit = comparable(data, "objects", target) & comparable(data, "routes", data.route_of_task)
     for name, column in theirs.items():
         own, expected = rows.column(name), column.take(_at(target))
         # The other modality's goal is null, and `goal_of_modality` sees to that.
@@ -240,11 +240,11 @@ def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's description is one of its target's, and `frame_seen_in_train` says whether that is not held out."""
     target = np.append(data.target_of_route, -1)[data.route_of_task]
-    fit = sound(data, "objects", target) & sound(data, "routes", data.route_of_task)
+    fit = comparable(data, "objects", target) & comparable(data, "routes", data.route_of_task)
     objects = data["objects"]
     paraphrases, firsts = objects.column("paraphrases").to_pylist(), objects.texts("description")
     # A release of an older version has one description an object.
-    told = [
+    in_training = [
         {one["text"]: not one["held_out"] for one in texts or ()} or {first: True}
         for texts, first in zip(paraphrases, firsts, strict=True)
     ]
@@ -256,7 +256,7 @@ def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
         text = own[row] if own[row] is not None else said.get(name)
         if text is None or not fit[row]:
             continue
-        known = told[target[row]]
+        known = in_training[target[row]]
         if text not in known and own[row] is not None:
             yield Finding(row, f"description = {text!r}", "one of the target's paraphrases")
         elif text in known and seen[row] is not None and seen[row] != known[text]:

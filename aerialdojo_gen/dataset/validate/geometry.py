@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M
-from aerialdojo_gen.dataset.validate.foreign_keys import sound
+from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, list_lengths, place_text, pose_text
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
@@ -146,7 +146,7 @@ def start_anchor(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def goal_anchor(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The goal is the target's selected anchor."""
     anchors, goal = data["anchors"], data.goal_of_route
-    fit = np.flatnonzero(sound(data, "anchors", goal))
+    fit = np.flatnonzero(comparable(data, "anchors", goal))
     own = rows.floats("goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad")
     yield from _off(fit, own[fit], anchors.floats(*_POSE)[goal[fit]])
 
@@ -204,7 +204,7 @@ def stops_far(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _anchor_poses(data: SceneData, anchor_of_route: Ints) -> tuple[Ints, Floats]:
     """Routes with a sound anchor, as places in `paths`, and that anchor's pose, (n, 4)."""
     anchor = anchor_of_route[data.paths.rows]
-    fit = np.flatnonzero(sound(data, "anchors", anchor))
+    fit = np.flatnonzero(comparable(data, "anchors", anchor))
     return fit, data["anchors"].floats(*_POSE).reshape(-1, 4)[anchor[fit]]
 
 

@@ -132,7 +132,7 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def _document(data: SceneData) -> dict[str, Any]:
     """Return the glTF document, read once; `scene_mesh` raises if there is none."""
     scene_mesh(data)
-    document = data.keep("gltf", lambda: _parse(mesh_path(data).read_bytes()))
+    document = data.cached("gltf", lambda: _parse(mesh_path(data).read_bytes()))
     if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
     return document

@@ -25,11 +25,11 @@ _SHARE, _EDGE = 0.002, 0.03
 # Pixels around an object's box in which parts of it are looked for: the box is right to the step of the rays.
 _AROUND = 2 * _EVERY
 # Least number of pixels of a recognisable part: 7 x 7 of 320 x 320.
-_TELL_SHARE = 0.0005
+_MIN_PART_SHARE = 0.0005
 _SAME_PLACE = 1e-6
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # Chunks of a PNG that carry words, and could carry where the picture was taken.
-_TELLING = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
+_TEXT_CHUNKS = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
 
 
 @check("objects", needs=("routes",))
@@ -53,7 +53,7 @@ def image_damaged(_data: SceneData, rows: Rows) -> Iterator[Finding]:
         kinds = _chunks(png)
         if kinds[-1:] != ["IEND"] or decode_grey(png) is None:
             yield Finding(row, f"{len(png):,} bytes that are no whole PNG", "a PNG")
-        elif texts := _TELLING & set(kinds):
+        elif texts := _TEXT_CHUNKS & set(kinds):
             yield Finding(row, f"a PNG with words in it ({', '.join(sorted(texts))})", "pixels alone")
 
 
@@ -163,7 +163,7 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
             rays = rays[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
         hit = triangles.first_hit(pose[:3, 3], rays.reshape(-1, 3) @ pose[:3, :3].T)[1] - first[str(nodes[row])]
         counts = {tell: int(np.isin(hit, mesh.scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
-        least = _TELL_SHARE * picture.size
+        least = _MIN_PART_SHARE * picture.size
         stored = [word for word in (missing[row] or "").split(", ") if word]
         wrong = [t for t, n in counts.items() if (t in stored) != (n < least) and abs(n - least) > _EDGE * least + 2]
         if wrong:

@@ -25,9 +25,9 @@ _SAME_M = 1e-9
 # Digits with a decimal point: no description of the project's has any, a coordinate always does.
 _DECIMAL = re.compile(r"\d[.,]\d")
 _DIGITS = 12
-# Standard deviations from chance beyond which digits tell something, and drawings that chance is measured by.
+# Standard deviations from chance beyond which digits leak something, and drawings that chance is measured by.
 _DEVIATIONS, _DRAWINGS = 7.0, 24
-# Fewer ids than this tell nothing about chance.
+# Fewer ids than this are no evidence.
 _FEW = 40
 _LENGTH_BINS = 8
 # A route whose ends are not its own has been named: its id is another pair's for that reason.

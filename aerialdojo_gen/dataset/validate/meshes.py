@@ -11,7 +11,7 @@ import numpy as np
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import mesh_path, mesh_place, scene_mesh, want_meshes
+from aerialdojo_gen.dataset.validate.scene_mesh import mesh_path, mesh_place, require_meshes, scene_mesh
 from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.store.root import LocalRoot
 
@@ -21,7 +21,7 @@ _SAME_M = 1e-4
 @check("scenes", needs=("mesh",))
 def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
-    want_meshes(data)
+    require_meshes(data)
     stored_path = str(rows.texts("mesh_path")[0])
     away = Path(stored_path).is_absolute() or ".." in Path(stored_path).parts
     # A folder that the user names may be a link to anywhere, the release's own path may not.
@@ -35,7 +35,7 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("scenes", needs=("mesh",), after=("mesh_outside",))
 def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Every scene's mesh is there."""
-    want_meshes(data)
+    require_meshes(data)
     if data.flagged("scenes", ("mesh_outside",)).any():
         return
     try:
@@ -49,7 +49,7 @@ def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 @check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing"))
 def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's bytes have the SHA-256 of its scene."""
-    want_meshes(data)
+    require_meshes(data)
     if data.flagged("scenes", ("mesh_outside", "mesh_missing")).any():
         return
     with mesh_path(data).open("rb") as file:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M, SUCCESS_RADIUS_M
-from aerialdojo_gen.dataset.episode import LEAST_SPL, Reference, fly, shortcoming
+from aerialdojo_gen.dataset.episode import MIN_SPL, Reference, fly, spl_fault
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
 from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
 from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
@@ -25,7 +25,7 @@ _ROUTE_FAULTS = (
     "replay_differs", "goal_anchor", "stops_far", "route_collision", "replay_collision",
 )  # fmt: skip
 _TASK_FAULTS = ("telling_number", "task_start", "task_budget", "task_setting", "instances_agree")
-_EXPECTED = f"a success at {SUCCESS_RADIUS_M:g} m, SPL {LEAST_SPL:g} or more"
+_EXPECTED = f"a success at {SUCCESS_RADIUS_M:g} m, SPL {MIN_SPL:g} or more"
 # A stored position is the replay's to this much; it may make of the metre a little more.
 _REPLAY_M = 1e-5
 
@@ -42,7 +42,7 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         if tasks.task_of_route[row] < 0:
             continue
         reference = tasks.reference(row, paths.action[paths.of(k)].tolist())
-        lack = shortcoming(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
+        lack = spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
         if lack:
             yield Finding(row, lack, _EXPECTED)
 
@@ -81,7 +81,7 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
             end = tuple(paths.xyz[where][-2 if own[-2] == APPROACH else -1].tolist())
         else:
             flown = fly(space, tasks.reference(row, actions))
-            lack = shortcoming(flown, 0.0, SUCCESS_RADIUS_M)
+            lack = spl_fault(flown, 0.0, SUCCESS_RADIUS_M)
             if lack:
                 yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
                 continue

@@ -20,7 +20,7 @@ from aerialdojo_gen.store.schemas import TableSpec
 from aerialdojo_gen.store.tables import content_digest
 
 # Other files of a release: cards, licence, files of a hub's client, pictures.
-_BESIDE = {
+_OTHER_FILES = {
     "README.md",
     "croissant.json",
     "pipeline.json",
@@ -90,7 +90,7 @@ def foreign_files(release: Release, scenes: list[str]) -> Outcome:
         if name in folders or _is_empty_folder(release.root, name):
             continue
         outcome.rows += 1
-        if relative.as_posix() in expected or relative.parts[0] in _BESIDE:
+        if relative.as_posix() in expected or relative.parts[0] in _OTHER_FILES:
             continue
         outcome.fault("a file that is no part of a release", "none", part=relative.as_posix())
     return outcome

@@ -2,7 +2,7 @@
 
 Two machines do not draw the same bytes, and two renderers less so. Pictures are therefore compared as averages of
 blocks, and not with a limit alone: a picture that is like another object's, or like its own with channels
-changed or sides turned, is told as that, however alike the two may be. Between OpenGL and TinyRenderer a picture's
+changed or sides turned, is named as that, however alike the two may be. Between OpenGL and TinyRenderer a picture's
 mean difference was 1.0 of 255 at most over five scenes, between two look-alike objects 4.7 at least.
 """
 

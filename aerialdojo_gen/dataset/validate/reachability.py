@@ -24,7 +24,7 @@ _SHARES = (0.25, 0.5, 0.75, 0.97)
 _AZIMUTHS, _RISES_DEG = 24, (-15.0, 5.0, 25.0, 50.0)
 _SAME_M = 1e-6
 _STEP_M = 0.5
-_MOST_NODES = 1_000_000
+_MAX_NODES = 1_000_000
 
 
 # Positions in a wall or below ground are reported by other checks.
@@ -99,7 +99,7 @@ def _by_routes(data: SceneData, rays: RayCaster, places: Floats) -> Mask:
 def over_lattice(rays: RayCaster, bounds: Floats, places: Floats) -> Mask:
     """Whether places (n, 3) see a lattice point that hangs together with one in the open."""
     size = bounds[1] - bounds[0]
-    step = max(_STEP_M, float(np.prod(size) / _MOST_NODES) ** (1 / 3))
+    step = max(_STEP_M, float(np.prod(size) / _MAX_NODES) ** (1 / 3))
     shape = np.maximum(1, (size / step).astype(np.int64))
     index = np.arange(int(np.prod(shape))).reshape(shape)
     points = (

@@ -89,7 +89,7 @@ class Report:
                 by_check.setdefault(fault.check, []).append(fault)
             for name, faults in by_check.items():
                 lines.append(f"{name}: {len(faults):,} {word}")
-                lines += [f"  {line(fault)}" for fault in faults[:limit]]
+                lines += [f"  {fault_text(fault)}" for fault in faults[:limit]]
                 if len(faults) > limit:
                     more = "--report FILE has them all" if word == "at fault" else "--max-faults N names more"
                     lines.append(f"  and {len(faults) - limit:,} more ({more})")
@@ -124,7 +124,7 @@ class Report:
         return f"{what}: {f'{faults:,} at fault' if faults else 'no fault'}{rest}"
 
 
-def line(fault: Fault) -> str:
+def fault_text(fault: Fault) -> str:
     """Write a fault as one line."""
     where = " ".join(word for word in (fault.table, fault.scene, fault.key) if word)
     part = f" [{fault.part}]" if fault.part else ""

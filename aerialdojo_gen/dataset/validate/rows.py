@@ -157,14 +157,14 @@ def list_lengths(routes: Rows) -> NDArray[np.int64]:
 def paths_of(routes: Rows) -> Paths:
     """Lay out the poses of a scene's routes."""
     lengths = list_lengths(routes)
-    sound = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
-    table = routes.table.filter(pa.array(sound)) if not sound.all() else routes.table
+    comparable = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
+    table = routes.table.filter(pa.array(comparable)) if not comparable.all() else routes.table
     flat = {}
     for name in LISTS:
         values = pc.list_flatten(table.column(name))
         flat[name] = values.to_numpy(zero_copy_only=False) if len(values) else np.empty(0)
-    rows = np.flatnonzero(sound).astype(np.int64)
-    first = np.concatenate([[0], np.cumsum(lengths[sound, 0])]).astype(np.int64)
+    rows = np.flatnonzero(comparable).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(lengths[comparable, 0])]).astype(np.int64)
     xyz = np.column_stack([flat[name] for name in LISTS[:3]]).astype(np.float64)
     action = np.nan_to_num(flat["action"], nan=-1).astype(np.int64)
     return Paths(rows, first, xyz, flat["yaw_rad"].astype(np.float64), action)
@@ -183,7 +183,7 @@ class SceneData:
     sample: int | None = None  # How many routes FCL checks; None for all
     pictures: int | None = None  # How many reference images are rendered again; None for all
     faulty: dict[tuple[str, str], Mask] = field(default_factory=dict)
-    kept: dict[str, Any] = field(default_factory=dict)
+    cache: dict[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Rows:
         """Return a table's rows."""
@@ -202,12 +202,12 @@ class SceneData:
                 mask |= self.faulty[table, name]
         return mask
 
-    def keep(self, name: str, make: Callable[[], T]) -> T:
+    def cached(self, name: str, make: Callable[[], T]) -> T:
         """Return what one check has made for all others, made now where none has."""
-        if name not in self.kept:
-            self.kept[name] = make()
-        kept: T = self.kept[name]
-        return kept
+        if name not in self.cache:
+            self.cache[name] = make()
+        value: T = self.cache[name]
+        return value
 
     def sampled_routes(self, *faults: str) -> Iterator[tuple[int, int]]:
         """Sampled routes without any of these faults: their places in `paths`, and their rows."""

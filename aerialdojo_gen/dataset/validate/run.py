@@ -12,7 +12,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.dataset.contents import release_scenes
-from aerialdojo_gen.dataset.validate.counts import Tally, scene_counts, tally_of, whole_counts
+from aerialdojo_gen.dataset.validate.counts import SceneCounts, count_scene, scene_counts, whole_counts
 from aerialdojo_gen.dataset.validate.parts import (
     Release,
     foreign_files,
@@ -82,7 +82,7 @@ def validate(
     options = replace(options, release=release)
     every = release_scenes(release.root, release.folder)
     chosen = choose_scenes(options.scenes, every)
-    by_scene: dict[str, tuple[list[Outcome], Tally]] = {}
+    by_scene: dict[str, tuple[list[Outcome], SceneCounts]] = {}
     shared = on_disk(release.root, *([options.meshes] if options.meshes else []))
     assets = options.pipeline.scene_assets
     executor_of_run = make_executor(
@@ -98,24 +98,24 @@ def validate(
             bar.advance()
     outcomes = [foreign_files(release, every)]
     outcomes += [outcome for scene in chosen for outcome in by_scene[scene][0]]
-    tallies = [by_scene[scene][1] for scene in chosen]
-    outcomes += whole_counts(release, tallies, options.pipeline, len(chosen) == len(every))
+    totals = [by_scene[scene][1] for scene in chosen]
+    outcomes += whole_counts(release, totals, options.pipeline, len(chosen) == len(every))
     return Report(tuple(chosen), tuple(outcomes))
 
 
-def check_scene(options: ValidationOptions, scene: str) -> tuple[list[Outcome], Tally]:
+def check_scene(options: ValidationOptions, scene: str) -> tuple[list[Outcome], SceneCounts]:
     """Check one scene of a release."""
     release = release_of(options.release)
     found, outcomes = read_tables(release, scene)
     data = SceneData(scene, release, options.pipeline, found, options.meshes, options.use_meshes, options.sample,
                      options.pictures)  # fmt: skip
-    tally = tally_of(data, len(found) == len(release_tables()))
+    counts = count_scene(data, len(found) == len(release_tables()))
     outcomes += run_checks(data, SCENE_CHECKS)
-    outcomes.append(scene_counts(data, tally))
-    return outcomes, tally
+    outcomes.append(scene_counts(data, counts))
+    return outcomes, counts
 
 
-def _check(work: _Work) -> tuple[list[Outcome], Tally]:
+def _check(work: _Work) -> tuple[list[Outcome], SceneCounts]:
     return check_scene(work.options, work.scene)
 
 

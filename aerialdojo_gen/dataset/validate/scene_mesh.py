@@ -49,7 +49,7 @@ def mesh_path(data: SceneData) -> Path:
     return LocalRoot(data.meshes).local_copy(Path(stored_path).name)
 
 
-def want_meshes(data: SceneData) -> None:
+def require_meshes(data: SceneData) -> None:
     """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
     if not data.use_meshes:
         raise UncheckedError("--no-meshes was given")
@@ -61,8 +61,8 @@ def want_meshes(data: SceneData) -> None:
 
 def scene_mesh(data: SceneData) -> SceneMesh:
     """Return the scene's mesh, read once."""
-    want_meshes(data)
+    require_meshes(data)
     if data.flagged("scenes", MESH_CHECKS).any():
         raise UncheckedError("no mesh")
     digest = str(data["scenes"].texts("mesh_sha256")[0])
-    return data.keep("mesh", lambda: SceneMesh(open_scene(mesh_path(data), digest).scene))
+    return data.cached("mesh", lambda: SceneMesh(open_scene(mesh_path(data), digest).scene))

@@ -170,7 +170,7 @@ class TaskQueue(Generic[T]):
         if scene not in self._scenes:
             others = {at for other, at in self._at.items() if other != lane}
             free = [name for name in self._scenes if name not in others]
-            names = free or [name for name in self._scenes if self._worth_joining(name)]
+            names = free or [name for name in self._scenes if self._should_join(name)]
             if not names:
                 return None
             scene = max(names, key=self._weight)
@@ -187,7 +187,7 @@ class TaskQueue(Generic[T]):
     def on_done(self, task: T, outcome: Any) -> None:
         """Record a task's result or expected error."""
 
-    def put_back(self, task: T) -> None:
+    def requeue(self, task: T) -> None:
         """Queue a task again whose process is gone, as the first of its scene."""
         self._scenes.setdefault(self._scene_of(task), deque()).appendleft(task)
 
@@ -209,6 +209,6 @@ class TaskQueue(Generic[T]):
         """Work left for a scene: the heaviest goes first."""
         return len(self._scenes[scene])
 
-    def _worth_joining(self, _scene: str) -> bool:
+    def _should_join(self, _scene: str) -> bool:
         """Whether a second process should work on a scene."""
         return True

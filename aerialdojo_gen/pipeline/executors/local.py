@@ -24,9 +24,9 @@ from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, T
 from aerialdojo_gen.pipeline.executors.channels import InProcessChannel, RateLimiter, end
 
 # How often the parent checks whether workers must stop, seconds.
-_LOOK_EVERY_S = 0.2
+_POLL_S = 0.2
 # Time from termination to a kill, seconds.
-_END_WITHIN_S = 5.0
+_STOP_TIMEOUT_S = 5.0
 # spawn: FCL, PyBullet and numba hold state that does not survive a fork.
 _CONTEXT = multiprocessing.get_context("spawn")
 
@@ -69,14 +69,14 @@ class LocalExecutor(Executor):
             lane.process.terminate()
             lane.pipe.close()
         try:
-            until = time.monotonic() + _END_WITHIN_S
+            until = time.monotonic() + _STOP_TIMEOUT_S
             for lane in lanes:
                 lane.process.join(max(0.0, until - time.monotonic()))
         finally:
             for lane in lanes:
                 lane.process.kill()
             for lane in lanes:
-                lane.process.join(_END_WITHIN_S)
+                lane.process.join(_STOP_TIMEOUT_S)
         end()
 
     def run(
@@ -104,7 +104,7 @@ class LocalExecutor(Executor):
                     stopping.discard(number)
                     self._lane(number).send((work, task, channel is not None))
                 pipes = {self._lanes[number].pipe: number for number in running}
-                ready = wait([*pipes], _LOOK_EVERY_S if channel else None)
+                ready = wait([*pipes], _POLL_S if channel else None)
                 if channel and channel.stopped():
                     for number in running.keys() - stopping:
                         stopping.add(number)

@@ -23,7 +23,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, first_line, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, first_line, no_package
 from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, SharedPaths, T, TaskQueue
 from aerialdojo_gen.pipeline.executors.bundled import pack
 from aerialdojo_gen.pipeline.executors.local import own_cores
@@ -34,7 +34,7 @@ from aerialdojo_gen.store.staging import scratch_folder, staged
 _TRIES = 4
 # Consecutive processes that may end before any has started.
 _FALSE_STARTS = 6
-_LOOK_EVERY_S, _SAY_AFTER_S, _END_WITHIN_S = 0.3, 30.0, 20.0
+_POLL_S, _WARN_AFTER_S, _STOP_TIMEOUT_S = 0.3, 30.0, 20.0
 _FORWARDED = re.compile(r"(AWS|AERIALDOJO)_\w+|\w+_API_KEY|(OPENAI|ANTHROPIC)_BASE_URL|HF_TOKEN")
 
 
@@ -49,7 +49,7 @@ def _import_ray(own: bool) -> Any:
     try:
         import ray
     except ImportError:
-        raise MissingPackage(lacks("--executor ray", "ray", "cluster")) from None
+        raise MissingPackage(no_package("--executor ray", "ray", "cluster")) from None
     return ray
 
 
@@ -112,7 +112,7 @@ class RayExecutor(Executor):
                 running[lane.actor.do.remote(work, task, channel is not None)] = (lane, task)
             if not running and not waiting:
                 return
-            done, _ = self._ray.wait([*running, *self._refs], timeout=_LOOK_EVERY_S)
+            done, _ = self._ray.wait([*running, *self._refs], timeout=_POLL_S)
             if channel:
                 self._pass_messages(channel)
             for reference in done:
@@ -130,7 +130,7 @@ class RayExecutor(Executor):
                             f"{task.label}: its process was lost {_TRIES} times (out of memory, or "
                             "lost nodes): run again, finished shards are kept"
                         ) from None
-                    waiting.put_back(task)
+                    waiting.requeue(task)
                 except self._ray.exceptions.RayTaskError as error:
                     raise error.cause from error
                 else:
@@ -138,7 +138,7 @@ class RayExecutor(Executor):
                         self._pass_messages(channel)
                     waiting.on_done(task, outcome)
                     yield outcome
-            if not running and time.monotonic() - begun_s > _SAY_AFTER_S:
+            if not running and time.monotonic() - begun_s > _WARN_AFTER_S:
                 begun_s = float("inf")
                 self._folders.say(f"no process of the cluster has started yet: {self._free_resources()}")
 
@@ -147,7 +147,7 @@ class RayExecutor(Executor):
         with contextlib.suppress(Exception):
             ends = [lane.actor.end.remote() for lane in self._lanes if lane.ready]
             if ends:
-                self._ray.wait(ends, num_returns=len(ends), timeout=_END_WITHIN_S)
+                self._ray.wait(ends, num_returns=len(ends), timeout=_STOP_TIMEOUT_S)
         self.cancel()
 
     def cancel(self) -> None:
@@ -291,7 +291,7 @@ class RayExecutor(Executor):
                 for lane in self._lanes:
                     self._ray.kill(lane.actor, no_restart=True)
                 if last:
-                    self._ray.wait(last, num_returns=len(last), timeout=_END_WITHIN_S)
+                    self._ray.wait(last, num_returns=len(last), timeout=_STOP_TIMEOUT_S)
         self._lanes.clear()
         self._refs.clear()
 

@@ -20,7 +20,7 @@ class AnchorView:
     visible: NDArray[np.bool_]  # (H, W) bool; pixels that show the object
     alone: NDArray[np.bool_]  # Pixels that would show it if nothing else were there; a superset of `visible`
     sky: NDArray[np.bool_]  # (H, W) bool; pixels that show no surface at all
-    shown: float  # Share of the object that the picture tells, in [0, 1] (`aerialdojo_gen.geometry.viewpoints.Views`)
+    shown: float  # Share of the object that the picture shows, in [0, 1] (`aerialdojo_gen.geometry.viewpoints.Views`)
     elevation_deg: float  # Of the viewpoint, seen from the object's centroid
     clearance_m: float  # From the viewpoint to the nearest surface
     part_visibility: tuple[float, ...] = ()
@@ -35,7 +35,7 @@ class AnchorView:
 
 
 @dataclass(frozen=True)
-class Known:
+class CandidateMeasures:
     """Measurements of a candidate anchor before it is pictured."""
 
     shown: float  # See `AnchorView`
@@ -44,7 +44,7 @@ class Known:
     part_visibility: tuple[float, ...]  # By ray casts: at least what the picture's would be
     off_front_rad: float | None
     framed: float  # See `AnchorView`: from here, and from behind, None if there is no picture from there
-    framed_behind: float | None
+    framed_behind: float | None = None
 
 
 class Scorer(Protocol):

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import AssetError, MissingPackage, lacks
+from aerialdojo_gen.base.errors import AssetError, MissingPackage, no_package
 from aerialdojo_gen.pipeline.scoring.base import AnchorView
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class ClipScorer:
             import onnxruntime
             import tokenizers
         except ImportError as error:
-            raise MissingPackage(lacks("the scorer clip", error.name, "clip")) from None
+            raise MissingPackage(no_package("the scorer clip", error.name, "clip")) from None
         self._vision = _session(onnxruntime, config.vision)
         self._text = _session(onnxruntime, config.text)
         pictures = [i for i in self._vision.get_inputs() if len(i.shape) == 4]

@@ -13,7 +13,7 @@ import numpy as np
 
 from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.geometry.viewpoints import level_marks
-from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
+from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score, front_score, part_score, recognisability
 
 WEIGHTS = {
@@ -55,8 +55,8 @@ class Parts:
     @property
     def score(self) -> float:
         """The weighted mean of the terms, times what the picture is worth for what hides or cuts off the object."""
-        terms = asdict(self)
-        silhouette = sum(weight * terms[name] for name, weight in WEIGHTS.items())
+        marks = asdict(self)
+        silhouette = sum(weight * marks[name] for name, weight in WEIGHTS.items())
         known = [None if mark is None else np.array([mark]) for mark in (self.tells, self.front)]
         clear = clarity_score(*np.array([[self.unoccluded], [self.framed], [1.0 - self.open], [self.level]]))
         return float((recognisability(np.array([silhouette]), *known) * clear)[0])
@@ -69,30 +69,30 @@ class Parts:
 
 def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     """Take a view's terms, those of the picture rather from the picture behind it, where there is one."""
-    terms = _pictured(view)
+    marks = _pictured(view)
     if view.behind is not None:
         behind = _pictured(view.behind)
-        terms = {name: _mixed(term, behind[name]) for name, term in terms.items()}
-    return _parts(view, terms, radius_m, standoff_m)
+        marks = {name: _mixed(term, behind[name]) for name, term in marks.items()}
+    return _parts(view, marks, radius_m, standoff_m)
 
 
-def most(known: Known, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
+def most(known: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
     """Bound the score of every picture from a viewpoint from above, by what is known of the viewpoint without one."""
-    terms = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
-    terms["framed"] = known.framed
+    marks = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
+    marks["framed"] = known.framed
     if behind is not None:
         seen = _pictured(behind)
-        terms = {name: _mixed(term, seen[name]) for name, term in terms.items()}
+        marks = {name: _mixed(term, seen[name]) for name, term in marks.items()}
     elif known.framed_behind is not None:
-        terms["framed"] = _mixed(known.framed, known.framed_behind)
-    return _parts(known, terms, radius_m, standoff_m).score + _ROUNDING
+        marks["framed"] = _mixed(known.framed, known.framed_behind)
+    return _parts(known, marks, radius_m, standoff_m).score + _ROUNDING
 
 
 def _mixed(here: float, behind: float) -> float:
     return (1.0 - _BEHIND) * here + _BEHIND * behind
 
 
-def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
+def _parts(known: AnchorView | CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
     level = float(level_marks(known.elevation_deg))
     room = standoff_m - radius_m
     clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
@@ -104,7 +104,7 @@ def _parts(known: AnchorView | Known, terms: dict[str, Any], radius_m: float, st
         clear=clear,
         tells=tells,
         front=None if off is None else float(off[0]),
-        **terms,
+        **marks,
     )
 
 
@@ -112,11 +112,11 @@ def _pictured(view: AnchorView) -> dict[str, Any]:
     """Take the terms that the picture itself decides; they are taken once a view."""
     with contextlib.suppress(KeyError):
         return _TAKEN[view]
-    terms = _TAKEN[view] = _terms(view)
-    return terms
+    marks = _TAKEN[view] = _picture_marks(view)
+    return marks
 
 
-def _terms(view: AnchorView) -> dict[str, Any]:
+def _picture_marks(view: AnchorView) -> dict[str, Any]:
     names = ("unoccluded", "size", "centred", "contrast", "sky", *FACTORS)
     if not view.visible.any():
         return dict.fromkeys(names, 0.0)
@@ -138,7 +138,7 @@ def _terms(view: AnchorView) -> dict[str, Any]:
         rows, columns = np.nonzero(view.alone)
         own = view.nearer[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
         foreground = max(float(view.nearer.mean()), float(own.mean()))
-    terms = (
+    marks = (
         float(view.visible.sum() / max(int(view.alone.sum()), 1)),
         min(float(edge) / _FULL_SIZE, 1.0),
         1.0 - min(float(away), 1.0),
@@ -147,7 +147,7 @@ def _terms(view: AnchorView) -> dict[str, Any]:
         view.framed,
         1.0 - foreground,
     )
-    return dict(zip(names, terms, strict=True))
+    return dict(zip(names, marks, strict=True))
 
 
 class GeometricScorer:

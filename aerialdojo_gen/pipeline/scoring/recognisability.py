@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-TELLS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
+PARTS_WEIGHT, FRONT_WEIGHT = 0.35, 0.3
 _ANGLES_RAD, _MARKS = np.radians([0.0, 25.0, 60.0, 60.001, 120.0]), (1.0, 1.0, 0.5, 0.15, 0.0)
 
 
@@ -31,11 +31,11 @@ def clarity_score(unoccluded: Floats, framed: Floats, foreground: Floats, level:
     )
 
 
-def recognisability(score: Floats, tells: Floats | None, front: Floats | None) -> Floats:
+def recognisability(score: Floats, parts: Floats | None, front: Floats | None) -> Floats:
     """Combine the silhouette's score with those of identifying parts and front, (n,) in [0, 1].
 
     None leaves its weight to the silhouette.
     """
-    known = [(weight, mark) for weight, mark in ((TELLS_WEIGHT, tells), (FRONT_WEIGHT, front)) if mark is not None]
+    known = [(weight, mark) for weight, mark in ((PARTS_WEIGHT, parts), (FRONT_WEIGHT, front)) if mark is not None]
     rest = 1.0 - sum(weight for weight, _ in known)
     return np.asarray(rest * score + sum(weight * mark for weight, mark in known))

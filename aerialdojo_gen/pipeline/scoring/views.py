@@ -1,4 +1,4 @@
-"""Take the pictures that scorers look at."""
+"""Render the pictures that scorers judge."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import Body
-from aerialdojo_gen.pipeline.scoring.base import AnchorView
+from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.rendering.raycast import RayRenderer, pixel_rays
 
 Floats = NDArray[np.float64]
@@ -23,7 +23,7 @@ _LARGE = 0.005
 # What is nearer than the object's nearest part stands before it; a surface this level is a floor, seen from above.
 _NEARER, _FLOOR = 0.95, 0.8
 _IN_FRONT_M = 0.05
-# Of the pixels, one in so many rows and columns is asked first.
+# Of the pixels, one in so many rows and columns is tested first.
 _EVERY = 4
 
 
@@ -35,14 +35,8 @@ def take_view(
     camera: Camera,
     position_m: Floats,
     yaw_rad: float,
-    *,
-    shown: float,
-    elevation_deg: float,
-    clearance_m: float,
-    part_visibility: Sequence[float] = (),
-    tells: Sequence[NDArray[np.int64]] = (),
-    off_front_rad: float | None = None,
-    framed: float = 1.0,
+    known: CandidateMeasures,
+    parts: Sequence[NDArray[np.int64]],
 ) -> AnchorView:
     """Take the front view of an object from a candidate anchor (world metres, radians).
 
@@ -58,21 +52,21 @@ def take_view(
     directions = product(pixel_rays(camera)[0][hidden], pose[:3, :3].T)
     if len(hidden):
         silhouette.flat[hidden] = alone.first_hit(position_m, directions)[1] >= 0
-    shares = part_shares(alone, thing, tells, camera, pose, visible)
+    shares = part_shares(alone, thing, parts, camera, pose, visible)
     marks = tuple(
-        seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(part_visibility, shares, strict=True)
+        seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(known.part_visibility, shares, strict=True)
     )
     return AnchorView(
         picture.rgb,
         visible,
         silhouette,
         picture.instance < 0,
-        shown,
-        elevation_deg,
-        clearance_m,
+        known.shown,
+        known.elevation_deg,
+        known.clearance_m,
         marks,
-        off_front_rad,
-        framed,
+        known.off_front_rad,
+        known.framed,
         standing_nearer(
             picture.depth_m, visible, (picture.instance >= 0) & renderer.wide[picture.instance], camera, pose
         ),
@@ -186,7 +180,7 @@ def part_shares(
     coarse = np.zeros_like(visible)
     if math.isfinite(enough):
         coarse[::_EVERY, ::_EVERY] = True
-    # A few pixels tell that a large part is shown; the others are asked for the rest alone.
+    # A few pixels prove that a large part is shown; the others are tested for the rest alone.
     for some in (coarse, ~coarse):
         left = [k for k in range(len(parts)) if counts[k] < enough * visible.size]
         pixels = np.flatnonzero(np.any([around[k] for k in left], axis=0) & some) if left else np.zeros(0, np.int64)

@@ -13,7 +13,7 @@ from aerialdojo_gen.scenes.catalogue import placed, single
 from aerialdojo_gen.scenes.horizon.border import border_of
 from aerialdojo_gen.scenes.horizon.kinds import kind_of
 from aerialdojo_gen.scenes.horizon.land import Land, Noise, make_land
-from aerialdojo_gen.scenes.horizon.things import Thing, things_on
+from aerialdojo_gen.scenes.horizon.scenery import SceneryItem, scatter_scenery
 from aerialdojo_gen.scenes.materials import MaterialLibrary
 from aerialdojo_gen.scenes.mesh import to_part
 from aerialdojo_gen.scenes.model import HORIZON, Instance, Part
@@ -36,13 +36,13 @@ def make_horizon(
         return ()
     noise, rng = Noise(head.seed, scene), generator(head.seed, "horizon-things", scene)
     land = make_land(border, kind, float(bounds[1, 2]) + _ABOVE_M, noise)
-    things = things_on(land, kind, bounds, noise, rng, MAX_TRIANGLES - len(land.faces))
-    parts = _merged([*_land_parts(land, materials), *_thing_parts(scene, things, materials)])
+    scenery = scatter_scenery(land, kind, bounds, noise, rng, MAX_TRIANGLES - len(land.faces))
+    parts = _merged([*_land_parts(land, materials), *_scenery_parts(scene, scenery, materials)])
     return (Instance(HORIZON, HORIZON, "", {}, parts, surface=HORIZON),)
 
 
 def _land_parts(land: Land, materials: MaterialLibrary) -> Iterable[Part]:
-    names = np.array([_known(name, materials) for name in land.material])
+    names = np.array([_resolve_material(name, materials) for name in land.material])
     for name in sorted(set(names.tolist())):
         used, faces = np.unique(land.faces[names == name], return_inverse=True)
         vertices = single(land.vertices[used])
@@ -50,16 +50,16 @@ def _land_parts(land: Land, materials: MaterialLibrary) -> Iterable[Part]:
         yield Part(vertices, faces.reshape(-1, 3).astype(np.int32), uv, name)
 
 
-def _thing_parts(scene: str, things: Iterable[Thing], materials: MaterialLibrary) -> Iterable[Part]:
-    for k, (bodies, at, turn) in enumerate(things):
+def _scenery_parts(scene: str, scenery: Iterable[SceneryItem], materials: MaterialLibrary) -> Iterable[Part]:
+    for k, (bodies, at, turn) in enumerate(scenery):
         # Two layouts of each façade: what is far away is worth no more pictures.
         draw = rank(0, "horizon-facade", scene, k % 2)
-        named = [(materials.laid_out(_known(name, materials), draw), body) for name, body in bodies]
+        named = [(materials.laid_out(_resolve_material(name, materials), draw), body) for name, body in bodies]
         parts = [to_part(body, name, materials.tile_m(name)) for name, body in named]
         yield from placed(parts, tuple(at), float(np.degrees(turn)))
 
 
-def _known(spec: str, materials: MaterialLibrary) -> str:
+def _resolve_material(spec: str, materials: MaterialLibrary) -> str:
     """Give a material, or its colour alone where the catalogue has no such surface."""
     name, _, colour = spec.partition(":")
     return spec if spec.startswith("#") or name in materials.names else colour or _PLAIN

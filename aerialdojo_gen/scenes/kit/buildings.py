@@ -25,13 +25,13 @@ def building(
 ) -> float:  # fmt: skip
     """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
     if not isinstance(outline, Polygon):
-        raise AssetError("outline: an area in one piece is wanted")
+        raise AssetError("outline: must be an area in one piece")
     z = min(site.ground_z(x, y) for x, y in outline.exterior.coords) if on is None else on
+    height_m, form = storeys * storey_m, grammar_buildings.Roof(roof, roof_kind, roof_m, parapet_m, overhang_m)
     grammar_buildings.building(
-        site, outline, wall=wall, roof=roof, storeys=storeys, storey_m=storey_m, roof_kind=roof_kind, roof_m=roof_m,
-        parapet_m=parapet_m, overhang_m=overhang_m, z=z, category=category, attributes=attributes, extra=extra,
-    )  # fmt: skip
-    return z + storeys * storey_m
+        site, outline, wall, form, height_m, z=z, category=category, attributes=attributes, extra=extra
+    )
+    return z + height_m
 
 
 @dataclass(frozen=True)

@@ -54,11 +54,9 @@ def gable_cabins(site: Site, *, cabins: list[Cabin], roof: Material = "snow") ->
     """Put up cabins with a steep gable roof, each on its lowest corner's ground."""
     for cabin in cabins:
         (depth, width, height), z = cabin.size_m, min(cabin.ground_m(site))
-        grammar_buildings.building(
-            site, cabin.plan(), wall=cabin.wall, roof=roof, storeys=1, storey_m=height, roof_kind="gable",
-            roof_m=0.32 * min(depth, width), overhang_m=0.7, z=z, category="hut",
-            extra=cabin.frame.parts(_front(depth, width), z),
-        )  # fmt: skip
+        form = grammar_buildings.Roof(roof, "gable", 0.32 * min(depth, width), overhang_m=0.7)
+        extra = cabin.frame.parts(_front(depth, width), z)
+        grammar_buildings.building(site, cabin.plan(), cabin.wall, form, height, z=z, category="hut", extra=extra)
 
 
 @site_builder

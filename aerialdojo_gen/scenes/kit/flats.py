@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerialdojo_gen.scenes.grammar_buildings import building
+from aerialdojo_gen.scenes.grammar_buildings import Roof, building
 from aerialdojo_gen.scenes.grammar_frames import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
@@ -56,8 +56,8 @@ def flats(
     sign: Parts = [("marking", letters(name.split()[-1], 1.8, (d + 0.02, half - 2.4, top - 2.6), 0.0, 0.08))]
     node = site.node("flats")
     building(
-        site, frame.area(rectangle(-d, -half, d, half)), wall=site.laid_out(wall, node, flush=True), roof=roof,
-        storeys=storeys - 1, storey_m=_STOREY_M, z=_STOREY_M, node=node, category="flats", attributes={"place": name},
+        site, frame.area(rectangle(-d, -half, d, half)), site.laid_out(wall, node, flush=True), Roof(roof),
+        (storeys - 1) * _STOREY_M, z=_STOREY_M, node=node, category="flats", attributes={"place": name},
         extra=[*frame.parts(sign), *frame.parts(_balconies(size_m[0], d, storeys, band))],
     )  # fmt: skip
     return top

@@ -58,7 +58,7 @@ def growth(
         zone = next((one for one in zones if one.area is None or contains_xy(one.area, x, y)), None)
         if count >= limit or zone is None:
             continue
-        z = site.settled_z(x, y, settle_m)
+        z = site.foot_z(x, y, settle_m)
         steep = abs(site.ground_z(x + 1.0, y) - site.ground_z(x - 1.0, y))
         if steep <= zone.steepest_m and site.is_free(x, y, room_m, z=z):
             plant = Placement(zone.of[count % len(zone.of)], *pose, DRAWN, z)

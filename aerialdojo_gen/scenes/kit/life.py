@@ -116,14 +116,14 @@ def _people(
             posture = _SIT
         first = spot
         for k in range(size):
-            look = dressed[int(order[placed % len(order)])]
-            if look.split("_")[0] in _AT_WORK and rng.random() < 0.35:
+            chosen = dressed[int(order[placed % len(order)])]
+            if chosen.split("_")[0] in _AT_WORK and rng.random() < 0.35:
                 posture = _WORK
-            pose = first if k == 0 else _beside(first, posture, k)
+            pose = first if k == 0 else _group_pose(first, posture, k)
             if k and not _walkable(site, pose.x, pose.y, ground, _NEXT_M):
                 continue
             yaw = pose.yaw_deg + float(rng.uniform(-14.0, 14.0))
-            person = Placement("person", pose.x, pose.y, yaw, look, params={"posture": posture})
+            person = Placement("person", pose.x, pose.y, yaw, chosen, params={"posture": posture})
             placed += site.place(person, "skip", settle_m=0.2) is not None
 
 
@@ -134,8 +134,8 @@ def _on_decks(site: Site, number: int, dressed: Sequence[str], decks: Sequence[s
     for k in rng.permutation(len(spots)):
         pose, z = spots[int(k)]
         if placed < number and site.is_free(pose.x, pose.y, _ROOM_M, z + 0.05):
-            look, posture = dressed[int(rng.integers(len(dressed)))], int(rng.choice([_STAND, _STAND, _WALK, _CALL]))
-            site.place(Placement("person", *pose, look, z=z, params={"posture": posture}))
+            dress, posture = dressed[int(rng.integers(len(dressed)))], int(rng.choice([_STAND, _STAND, _WALK, _CALL]))
+            site.place(Placement("person", *pose, dress, z=z, params={"posture": posture}))
             placed += 1
     return placed
 
@@ -153,7 +153,7 @@ def _deck_spots(thing: Instance, rng: np.random.Generator) -> list[tuple[Pose, f
     return [(pose, float(heights[k])) for pose in poisson_disc(top.buffer(-_EDGE_M), _APART_M, rng, limit=200)]
 
 
-def _beside(first: Pose, posture: int, k: int) -> Pose:
+def _group_pose(first: Pose, posture: int, k: int) -> Pose:
     """Where another one of a group stands: in step beside those who walk or sit, else before them, turned to them."""
     turn = math.radians(first.yaw_deg)
     if posture in (_WALK, _SIT):
@@ -182,8 +182,8 @@ def _herd(
         yaw = middle.yaw_deg + float(rng.normal(scale=50.0))
         if _walkable(site, x, y, ground, _ROOM_M):
             variants = site.catalogue[category].variants
-            look = variants[int(rng.integers(len(variants)))].name
-            placed += site.place(Placement(category, x, y, yaw, look or None), "skip", settle_m=0.3) is not None
+            chosen = variants[int(rng.integers(len(variants)))].name
+            placed += site.place(Placement(category, x, y, yaw, chosen or None), "skip", settle_m=0.3) is not None
 
 
 def _perch(site: Site, category: str, number: int, rng: np.random.Generator) -> None:

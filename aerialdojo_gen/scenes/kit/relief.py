@@ -31,7 +31,7 @@ def strew_things(
         for pose in spots:
             if not site.is_free(pose.x, pose.y, 0.6 + clear_m):
                 continue
-            z = site.settled_z(pose.x, pose.y)
+            z = site.foot_z(pose.x, pose.y)
             thing = site.place(Placement(category, *pose, z=z, place=place), "skip")
             if thing is not None:
                 (x0, y0, _), (x1, y1, _) = thing.bounds
@@ -46,7 +46,7 @@ def strew_things(
 def leaning_poles(site: Site, poles: list[tuple[Number, Number, Number, Number]], height_m: Number = 8.0) -> None:
     """Put up a line of poles that lean by degrees towards a direction (x, y, lean, yaw), with slack wires between.
 
-    They are structure: poles that stand askew are told apart by nobody.
+    They are structure: nobody can distinguish poles that stand askew.
     """
     wood: Parts = []
     heads: list[tuple[np.ndarray, np.ndarray]] = []

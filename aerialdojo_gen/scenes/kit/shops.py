@@ -25,7 +25,7 @@ def shopping_hall(
     It takes its ground, but for the passages, which are left open of the ground storey; the soffit is their ceiling.
     """
     if not isinstance(outline, Polygon):
-        raise AssetError("outline: an area in one piece is wanted")
+        raise AssetError("outline: must be an area in one piece")
     tile = site.catalogue.materials.tile_m
     low, top = outline.difference(passages), 2 * storey_m
     edge = outline.buffer(0.18, join_style="mitre").difference(outline)

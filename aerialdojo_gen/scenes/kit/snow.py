@@ -83,7 +83,7 @@ def ice_ridges(
 def rink_boards(site: Site, *, rink: Area, boards: Material = "#eef2f6", cap: Material = "#2f5f9e") -> None:
     """Put boards round a level rink, with a gap to step in by."""
     if not isinstance(rink, Polygon):
-        raise AssetError("rink: an area in one piece is wanted")
+        raise AssetError("rink: must be an area in one piece")
     z = site.ground_z(rink.centroid.x, rink.centroid.y)
     ring = shapely.get_coordinates(shapely.segmentize(rink.exterior, 3.0))
     gate = len(ring) // 8

@@ -21,8 +21,8 @@ from aerialdojo_gen.scenes.site import Site
 
 _SHOP_M = 4.0
 # A shop window wants storeys above it, or it is the whole house.
-_LEAST_ABOVE_M = 2.8
-_SUNK_M, _LEAST_M2 = 0.3, 0.5
+_MIN_ABOVE_M = 2.8
+_SUNK_M, _MIN_M2 = 0.3, 0.5
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Body:
     @property
     def plan(self) -> Polygon:
         """Its outline, in one piece."""
-        if not isinstance(self.outline, Polygon) or self.outline.area < _LEAST_M2:
-            raise AssetError(f"outline: an area in one piece of {_LEAST_M2:g} square metres or more is wanted")
+        if not isinstance(self.outline, Polygon) or self.outline.area < _MIN_M2:
+            raise AssetError(f"outline: must be an area in one piece, of {_MIN_M2:g} square metres or more")
         return self.outline
 
 
@@ -94,7 +94,7 @@ def _body(site: Site, body: Body, plan: Polygon, base: float, building: Building
         parts.append(("stone", facade(plan, foot - _SUNK_M, foot, tile("stone"))))
     else:
         parts += [(building.wall, slab(p, foot, foot + 0.2)) for p in polygons_of(plan.buffer(-0.01))]
-    if building.shops and body.base_m <= 0.0 and eaves - foot >= _SHOP_M + _LEAST_ABOVE_M:
+    if building.shops and body.base_m <= 0.0 and eaves - foot >= _SHOP_M + _MIN_ABOVE_M:
         parts.append(("shopfront", facade(plan, foot, foot + _SHOP_M, tile("shopfront"))))
         foot += _SHOP_M
     parts.append((building.wall, facade(plan, foot, eaves, tile(building.wall))))

@@ -82,8 +82,8 @@ def _placed(
         aside = max(lane_m / 2 - _AT_KERB_M, 0.0) if kind == "cyclist" else 0.0
         pose = _pose(line, spot[0] - long / 2, long, aside)
         if pose is not None and _has_room(site, k, pose, (long, wide), clear_m, taken):
-            look = site.catalogue[kind].variants
-            choice = look[int(rng.integers(len(look)))].name
+            variants = site.catalogue[kind].variants
+            choice = variants[int(rng.integers(len(variants)))].name
             return site.place(Placement(kind, *pose, choice), "skip") is not None
     return False
 

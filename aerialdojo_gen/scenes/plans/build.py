@@ -261,7 +261,7 @@ class _Building:
         z, above_m = thing.on if thing.on is not None else entry.on, thing.above_ground_m or entry.above_ground_m
         settles = z is None and entry.settle_m is not None and not above_m and entry.sunk is None
         if z is None and entry.settle_m is not None and not settles:
-            z = self._site.settled_z(x, y, entry.settle_m) + above_m
+            z = self._site.foot_z(x, y, entry.settle_m) + above_m
         elif z is None and above_m:
             z = self._site.ground_z(x, y) + above_m
         if entry.sunk is not None:

@@ -13,9 +13,9 @@ from aerialdojo_gen.scenes.site import Site
 
 def prop_height(site: Site, category: str, variant: str | None, x: float, y: float) -> float:
     """Height of a thing that stands at z = 0, metres, in the variant that it would have."""
-    look = variant if variant is not None else site.next_variant(category)
+    chosen = variant if variant is not None else site.next_variant(category)
     return float(
-        site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, look).bounds[1, 2]
+        site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, chosen).bounds[1, 2]
     )
 
 

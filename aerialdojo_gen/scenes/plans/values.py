@@ -55,7 +55,7 @@ class PlanNames:
             except ShapeError as error:
                 raise ValueError(str(error)) from None
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError(f"a number or an expression is wanted, got {value!r}")
+            raise ValueError(f"expected a number or an expression, got {value!r}")
         if abs(value) > _MAX_M:
             raise ValueError(f"must lie within {_MAX_M:,.0f}, got {value:g}")
         return float(value)
@@ -68,7 +68,7 @@ class PlanNames:
     def point(self, value: Any) -> Point:
         """Resolve ``[x, y]``, metres."""
         if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError(f"a point [x, y] is wanted, got {value!r}")
+            raise ValueError(f"expected a point [x, y], got {value!r}")
         return self.number(value[0]), self.number(value[1])
 
     def frame(self, value: Any) -> Frame:
@@ -144,7 +144,7 @@ class PlanNames:
     def bodies(self, value: Any) -> Parts:
         """Make a list of parts, each a shape or by a part builder."""
         if not isinstance(value, list) or not all(isinstance(one, dict) for one in value):
-            raise ValueError(f"a list of parts is wanted, got {value!r}")
+            raise ValueError(f"expected a list of parts, got {value!r}")
         try:
             return self.make_parts(value)
         except AssetError as error:
@@ -159,7 +159,7 @@ class PlanNames:
     def material(self, value: Any) -> str:
         """Resolve a name of the palette, or a material."""
         if not isinstance(value, str):
-            raise ValueError(f"a material is wanted, got {value!r}")
+            raise ValueError(f"expected a material, got {value!r}")
         spec = self.palette.get(value, value)
         base = spec.partition(":")[0]
         if not spec.startswith("#") and base not in self.materials.names:

@@ -114,7 +114,7 @@ class Draft:
             knob = self.kind.knobs[name]
             if not knob.low <= value <= knob.high or (knob.whole and value != int(value)):
                 form = "an integer" if knob.whole else "a number"
-                raise AssetError(f"--knob {name}={value:g}: {form} from {knob.low:g} to {knob.high:g} is wanted")
+                raise AssetError(f"--knob {name}={value:g}: must be {form} from {knob.low:g} to {knob.high:g}")
 
     def _one_of(self, held_out: Mapping[str, bool], key: str) -> str:
         return self.pick([name for name, held in held_out.items() if held == self.world.held_out], key)
@@ -131,7 +131,7 @@ class Draft:
         return head
 
     def _sun(self, latitude_deg: tuple[float, float], weather: str) -> Entry:
-        """Draw when and where it is; both hemispheres and all hours, so that light tells no compass direction."""
+        """Draw when and where it is; both hemispheres and all hours, so that light reveals no compass direction."""
         rng = self.rng("light")
         low, high = (0.06, 0.14) if weather == "dusk" else (0.3, 0.92)  # Sine of the sun's elevation
         light: Entry = {}
@@ -234,7 +234,7 @@ class Draft:
             slots.sort(key=lambda s: rank(self.world.seed, STAGE, self._trial, kind, s.x, s.y, s.on))
             share = self.number(*self.kind.slots[kind].share, "share", kind) if slots else 0.0
             for slot in slots[: round(share * len(slots))]:
-                what = self._dealt(self.kind.slots[kind], slot, used)
+                what = self._draw_category(self.kind.slots[kind], slot, used)
                 if what is not None:
                     rows.setdefault((kind, slot.on, slot.settle_m), []).append(self._thing(what, slot))
         unknown_kinds = {slot.kind for slot in self._slots} - set(self.kind.slots)
@@ -251,7 +251,7 @@ class Draft:
     def _levelled(self, on: float | str | None) -> Entry:
         return {"level": True} if self.level_things and on is None else {}
 
-    def _dealt(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
+    def _draw_category(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
         """Draw what stands at a slot; None where nothing that is left has room."""
         weights = {
             what: weight for what, weight in slots.of.items()

@@ -34,7 +34,7 @@ class Isle(NamedTuple):
     cliffs: BaseGeometry = shapely.Point()  # Where the shore is no beach
 
 
-def settle(draft: Draft, isle: Isle) -> None:
+def build_village(draft: Draft, isle: Isle) -> None:
     """Found a village with landings, lookouts, paths between them, beaches, boats and woods."""
     w, d = draft.width_m / 2, draft.depth_m / 2
     draft.take(isle.shut)

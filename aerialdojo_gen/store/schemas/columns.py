@@ -74,7 +74,7 @@ PAIR = [
 ]
 EUCLIDEAN = column("euclidean_m", pa.float64(), "straight distance from start to goal, d_E", "m")
 DETOUR = "length_m / euclidean_m, κ"
-# What `plan` tells of a route's difficulty, null where there is no route.
+# What `plan` says of a route's difficulty, null where there is no route.
 DIFFICULTY = [
     column("free_length_m", pa.float64(), "shortest length_m from start to goal were there no obstacles", "m", True),
     column("plan_detour", pa.float64(), "length_m / free_length_m", nullable=True),

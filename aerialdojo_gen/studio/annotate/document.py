@@ -15,7 +15,7 @@ from aerialdojo_gen.base.errors import AerialDojoError
 
 Kind = Literal["landmarks", "objects"]
 Entry = Landmark | Object
-MOST_ENTRIES = 5000
+MAX_ENTRIES = 5000
 
 
 class ConflictError(AerialDojoError):
@@ -108,7 +108,7 @@ def edits_of(operation: Operation, annotations: Annotations, next_id: int) -> li
     model: type[Entry] = Landmark if operation.kind == "landmarks" else Object
     entries: Sequence[Entry] = getattr(annotations, operation.kind)
     if isinstance(operation, Add):
-        if len(entries) >= MOST_ENTRIES:
+        if len(entries) >= MAX_ENTRIES:
             raise AerialDojoError(f"there are {len(entries)} {operation.kind} already, the maximum")
         empty = {key: "" for key in model.model_fields if key not in ("id", "anchor")}
         after = _entry(model, empty | {"id": next_id} | operation.fields.set_values())

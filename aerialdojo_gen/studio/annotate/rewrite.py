@@ -98,9 +98,9 @@ class Rewriting:
     def lines(self) -> Iterator[str]:
         """What was done, for the terminal."""
         dropped = "; ".join(f"{n:,} {why}" for why, n in self.dropped.most_common())
-        told = f", {self.tokens[0]:,} tokens in, {self.tokens[1]:,} out" if any(self.tokens) else ""
+        usage = f", {self.tokens[0]:,} tokens in, {self.tokens[1]:,} out" if any(self.tokens) else ""
         lost = self.dropped.total()
-        yield f"rewritten: {self.kept:,} texts kept, {lost:,} dropped ({self.requests:,} requests{told})"
+        yield f"rewritten: {self.kept:,} texts kept, {lost:,} dropped ({self.requests:,} requests{usage})"
         if dropped:
             yield f"dropped, the program's text stays: {dropped}"
         if self.left:
@@ -113,7 +113,7 @@ class Rewriter:
     def __init__(self, agent: LanguageModelAgent, claims: SceneClaims) -> None:
         self._agent, self._claims, self._matcher = agent, claims, Matcher(claims)
         self._index = claims.geometry.index
-        looks = (look for i in claims.scene.instances for look in claims.vocabulary.catalogue_looks(i))
+        looks = (look for i in claims.scene.instances for look in claims.vocabulary.appearances_of(i))
         self._adjectives = {adjective for look in looks for adjective in look.adjectives}
 
     def estimate(self, objects: Sequence[Object]) -> str:
@@ -164,8 +164,8 @@ class Rewriter:
             text = read_as(_Written, self._ask(WRITE, question, WRITE_SCHEMA, done)).text
             if why := form_fault(text):
                 return "", why
-            asked = json.dumps(json.loads(question) | {"text": text}, ensure_ascii=False)
-            read = read_as(_Read, self._ask(READ, asked, READ_SCHEMA, done))
+            prompt = json.dumps(json.loads(question) | {"text": text}, ensure_ascii=False)
+            read = read_as(_Read, self._ask(READ, prompt, READ_SCHEMA, done))
         except InvalidAnswer:
             return "", "whose answer cannot be read"
         return text, self._fault(entry, facts, text, read)

@@ -43,8 +43,8 @@ from aerialdojo_gen.studio.web.serving import (
 
 COOKIE = "aerialdojo-annotate"
 # Wrong tokens per address: this many at once, then one per interval.
-MOST_GUESSES, SECONDS_A_GUESS = 10, 6.0
-_MOST_ADDRESSES = 4096
+MAX_FAILED_LOGINS, SECONDS_PER_FAILED_LOGIN = 10, 6.0
+_MAX_ADDRESSES = 4096
 
 
 class TokenGate:
@@ -52,13 +52,13 @@ class TokenGate:
 
     The printed address contains the token; the response stores it in an HttpOnly, SameSite cookie and redirects to
     the address without it. Requests whose ``Origin`` does not match their ``Host`` are rejected. An address that sent
-    `MOST_GUESSES` wrong tokens is blocked for a while, unless it has logged in before: a neighbour behind the same
-    router must not lock it out.
+    `MAX_FAILED_LOGINS` wrong tokens is blocked for a while, unless it has logged in before: a neighbour behind the
+    same router must not lock it out.
     """
 
     def __init__(self, app: Asgi, token: str) -> None:
         self._app, self._token = app, token
-        self._guesses: OrderedDict[str, _Guesses] = OrderedDict()
+        self._failed_logins: OrderedDict[str, _FailedLogins] = OrderedDict()
         self._known: set[str] = set()
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
@@ -68,8 +68,8 @@ class TokenGate:
             return
         headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
         address = (scope.get("client") or ("", 0))[0]
-        guesses = self._guesses.get(address)
-        wait = 0.0 if guesses is None else guesses.wait(time.monotonic())
+        failed = self._failed_logins.get(address)
+        wait = 0.0 if failed is None else failed.wait(time.monotonic())
         if wait > 0.0 and address not in self._known:
             after = [(b"retry-after", str(int(wait) + 1).encode())]
             await _respond(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
@@ -88,7 +88,7 @@ class TokenGate:
             return
         if not self._is_token(cookie):
             for given in filter(None, (token, cookie)):
-                self._record_guess(address, given)
+                self._record_failed_login(address, given)
             await _respond(send, 401, "open the address that the command printed; it contains the token")
             return
         origin = headers.get(b"origin")
@@ -100,17 +100,17 @@ class TokenGate:
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
 
-    def _record_guess(self, address: str, given: str) -> None:
-        guesses = self._guesses.pop(address, None) or _Guesses()
-        guesses.add(given, time.monotonic())
-        self._guesses[address] = guesses
-        while len(self._guesses) > _MOST_ADDRESSES:
-            self._guesses.popitem(last=False)
+    def _record_failed_login(self, address: str, given: str) -> None:
+        failed = self._failed_logins.pop(address, None) or _FailedLogins()
+        failed.add(given, time.monotonic())
+        self._failed_logins[address] = failed
+        while len(self._failed_logins) > _MAX_ADDRESSES:
+            self._failed_logins.popitem(last=False)
 
 
 @dataclass
-class _Guesses:
-    """An address's wrong tokens: a bucket that drains one every `SECONDS_A_GUESS`."""
+class _FailedLogins:
+    """An address's wrong tokens: a bucket that drains one every `SECONDS_PER_FAILED_LOGIN`."""
 
     level: float = 0.0
     since: float = 0.0
@@ -118,11 +118,11 @@ class _Guesses:
     seen: set[str] = field(default_factory=set)
 
     def wait(self, now: float) -> float:
-        return (self.level - MOST_GUESSES + 1) * SECONDS_A_GUESS - (now - self.since)
+        return (self.level - MAX_FAILED_LOGINS + 1) * SECONDS_PER_FAILED_LOGIN - (now - self.since)
 
     def add(self, given: str, now: float) -> None:
         digest = hashlib.sha256(given.encode("utf-8", "replace")).hexdigest()
-        left = max(0.0, self.level - (now - self.since) / SECONDS_A_GUESS)
+        left = max(0.0, self.level - (now - self.since) / SECONDS_PER_FAILED_LOGIN)
         self.seen = self.seen if left > 0.0 else set()
         self.level, self.since = left + (digest not in self.seen), now
         self.seen.add(digest)
@@ -135,7 +135,7 @@ async def _respond(send: Send, status: int, text: str, headers: Sequence[tuple[b
 
 
 STATIC = Path(__file__).resolve().parent / "static"
-MOST_BYTES = 8 << 20
+MAX_BYTES = 8 << 20
 
 _Metres = Annotated[StrictFloat, Field(allow_inf_nan=False, ge=-1e5, le=1e5)]
 _Triple = tuple[_Metres, _Metres, _Metres]
@@ -226,7 +226,7 @@ def serve_session(
 
 def make_app(session: AnnotationSession, *, any_host: bool = False) -> FastAPI:
     """Make the tool's web application."""
-    app = local_app(str(STATIC / "index.html"), f"annotate {session.scene.name}", MOST_BYTES, any_host=any_host)
+    app = local_app(str(STATIC / "index.html"), f"annotate {session.scene.name}", MAX_BYTES, any_host=any_host)
 
     @app.exception_handler(ConflictError)
     def conflict(request: Request, error: Exception) -> JSONResponse:

@@ -30,7 +30,7 @@ from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, 
 from aerialdojo_gen.studio.annotate.storage import Author, Record, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
-_MOST_CHANGES = 200
+_MAX_CHANGES = 200
 
 
 class AnnotationSession:
@@ -133,7 +133,7 @@ class AnnotationSession:
         """Return the last changes, newest first."""
         with self._lock:
             self.storage.history.refresh()
-            last = reversed(self.storage.history.records[-_MOST_CHANGES:])
+            last = reversed(self.storage.history.records[-_MAX_CHANGES:])
             return [record.model_dump(mode="json") for record in last]
 
     # Picking, and anchors.

@@ -58,7 +58,7 @@ class Session(AgentBase):
         self._run = RunLog(self._data, log, self._folder, evaluation, self._rows)
         self.sensors = evaluation.sensors or Sensors()
         self._flight = Flight(self._data, self.sensors, embodiment=evaluation.embodiment,
-                              renderer=evaluation.renderer, tell=evaluation.tell)  # fmt: skip
+                              renderer=evaluation.renderer, hints=evaluation.hints)  # fmt: skip
         self._goal: Goal | None = None
         self._observation: Observation | None = None
         self._next_scene = ""
@@ -119,7 +119,7 @@ class Session(AgentBase):
         assert self._goal is not None
         self._observation = observation
         if not observation.step:
-            self._flight.look_ahead(self._next_scene)
+            self._flight.prefetch_scene(self._next_scene)
             self._set(last=None, result=None, goal=_goal_state(self._goal))
         chosen = int(self._wait("flying", step=observation.step, remaining_actions=observation.remaining_actions,
                                 refused=observation.refused))  # fmt: skip
@@ -225,9 +225,9 @@ def _spread(scenes: list[str], task_ids: list[str], seed: int) -> pa.Array:
 
 
 def _goal_state(goal: Goal) -> dict[str, Any]:
-    rules, told = goal.rules, ("target_name", "landmark", "direction", "description")
+    rules, names = goal.rules, ("target_name", "landmark", "direction", "description")
     return {
-        **{name: getattr(goal, name) for name in told},
+        **{name: getattr(goal, name) for name in names},
         "has_image": goal.image is not None,
         "image_distance_m": goal.image_distance_m,
         "heading": goal.heading and asdict(goal.heading),

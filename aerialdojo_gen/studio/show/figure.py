@@ -19,8 +19,8 @@ from aerialdojo_gen.base.pictures import PAGE_JPEG, data_url, encode_jpeg, encod
 from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.atomic import atomic_file
-from aerialdojo_gen.studio.show import drawing
-from aerialdojo_gen.studio.show.drawing import (
+from aerialdojo_gen.studio.show import charts
+from aerialdojo_gen.studio.show.charts import (
     CLEARANCE_COLOURS,
     CLEARANCE_SCALE,
     draw_map,
@@ -89,9 +89,9 @@ def task_figure(task: PicturedTask) -> Figure:
     figure.text(0.45 / _WIDTH_IN, 1 - 0.42 / top, plain(task.title), fontsize=size, weight="bold", va="center")
     figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, plain(task.place), fontsize=11, color="#475569", va="center")
 
-    drawing.draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
+    charts.draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
     side = sheet.axes(0.85, strip + 0.3, 7.9, 1.95)
-    drawing.draw_side(side, task, 7.9 / 1.95)
+    charts.draw_side(side, task, 7.9 / 1.95)
 
     if task.reference is not None:
         image = sheet.axes(9.05, top - 3.35, 2.3, 2.3)
@@ -111,9 +111,9 @@ def task_figure(task: PicturedTask) -> Figure:
         bbox={"facecolor": "#e8eefc", "edgecolor": "none", "boxstyle": "square,pad=0.5"},
     )  # fmt: skip
     under_words = top - 4.25 - 0.19 * (words.count("\n") + 1)
-    drawing.draw_profile(sheet.axes(9.5, strip + 1.2, 4.2, min(2.9, under_words - strip - 1.2)), task)
+    charts.draw_profile(sheet.axes(9.5, strip + 1.2, 4.2, min(2.9, under_words - strip - 1.2)), task)
     bar = figure.colorbar(
-        ScalarMappable(drawing.CLEARANCE_SCALE, drawing.CLEARANCE_COLOURS),
+        ScalarMappable(charts.CLEARANCE_SCALE, charts.CLEARANCE_COLOURS),
         cax=sheet.axes(9.5, strip + 0.5, 4.2, 0.1),
         orientation="horizontal", ticks=[0.25, 0.5, 1, 2, 5], format="%g",
     )  # fmt: skip

@@ -17,7 +17,7 @@ from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import Goal, Rules
 from aerialdojo_gen.benchmark.llm.prompt import goal_text
-from aerialdojo_gen.dataset.lookup import FoundTask
+from aerialdojo_gen.dataset.lookup import TaskRecord
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.geometry.motion import sampled
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
@@ -38,7 +38,7 @@ class Frame:
     recorded: bool  # Whether it comes from a recording
 
 
-def frames_along(task: FoundTask, count: int) -> list[Frame]:
+def frames_along(task: TaskRecord, count: int) -> list[Frame]:
     """Return front views at evenly spaced poses of a route, including start and goal."""
     if count == 0:
         return []
@@ -55,7 +55,7 @@ def frames_along(task: FoundTask, count: int) -> list[Frame]:
     ]
 
 
-def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
+def _rendered(task: TaskRecord, poses: NDArray[np.float64]) -> list[NDArray[np.uint8]]:
     from aerialdojo_gen.rendering.backend import open_renderer
 
     camera = Camera(SIZE_PX, SIZE_PX, 90.0)
@@ -63,7 +63,7 @@ def _rendered(task: FoundTask, poses: NDArray[np.float64]) -> list[NDArray[np.ui
         return [world.render(camera, view_pose(pose[:3], pose[3], "front")).rgb for pose in poses]
 
 
-def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | None:
+def _recorded(task: TaskRecord, steps: list[int]) -> list[NDArray[np.uint8]] | None:
     """Return recorded frames at the poses; None if the task was not recorded."""
     root, scene = task.scene.root, task.scene.name
     if not store.shards(root, "recordings", scene):
@@ -91,7 +91,7 @@ def _recorded(task: FoundTask, steps: list[int]) -> list[NDArray[np.uint8]] | No
 
 def _local_video(root: DataRoot, path: str) -> Path:
     if is_outside(root, path):
-        raise StoreError(f"recordings: path {path!r} leads out of {root}")
+        raise StoreError(f"recordings: path {path!r} points outside {root}")
     try:
         return root.local_copy(path)
     except FileNotFoundError:
@@ -99,14 +99,14 @@ def _local_video(root: DataRoot, path: str) -> Path:
 
 
 Floats = NDArray[np.float64]
-_TOLD = ("modality", "target_name", "landmark", "direction", "description")
+_GOAL_FIELDS = ("modality", "target_name", "landmark", "direction", "description")
 
 
 @dataclass(frozen=True, eq=False)
 class PicturedTask:
     """A task, ready to be drawn."""
 
-    task: FoundTask
+    task: TaskRecord
     instance: dict[str, Any]  # The row of `tasks` that is shown
     target: dict[str, Any]  # Rows of `objects` and `landmarks`
     start_object: dict[str, Any]
@@ -137,7 +137,7 @@ class PicturedTask:
     def goal(self) -> str:
         """The goal text that an agent gets."""
         row = self.instance
-        kind, name, landmark, direction, more = (row[key] for key in _TOLD)
+        kind, name, landmark, direction, more = (row[key] for key in _GOAL_FIELDS)
         image = self.reference if kind == "image" else None
         rules, distance_m = Rules(row["action_budget"]), row["image_distance_m"]
         return goal_text(Goal(kind, name, landmark, direction, more, image, rules, image_distance_m=distance_m))
@@ -177,7 +177,7 @@ class PicturedTask:
         return [(schemas.ACTION_NAMES[a], len(list(run))) for a, run in groupby(self.task.route["action"])]
 
 
-def picture_task(task: FoundTask, modality: str = "semantic", frames: int = 5) -> PicturedTask:
+def picture_task(task: TaskRecord, modality: str = "semantic", frames: int = 5) -> PicturedTask:
     """Collect what is drawn of a task."""
     scene, route = task.scene, task.route
     rows = sorted(task.instances, key=lambda row: row["modality"] != modality)

@@ -23,7 +23,7 @@ class WatchedPlan:
     def __init__(self, path: Path, assets: Path) -> None:
         self.path, self._assets = path, assets
         self._lock = threading.Lock()
-        self._seen: object = None
+        self._last_version: object = None
         self._payload, self._state = b"", dict[str, Any]()
         self._version = 0
 
@@ -36,8 +36,8 @@ class WatchedPlan:
                 with contextlib.suppress(OSError):
                     stat = file.stat()
                     seen.append((file, stat.st_mtime_ns, stat.st_size))
-            if seen != self._seen:
-                self._seen = seen
+            if seen != self._last_version:
+                self._last_version = seen
                 self._version += 1
                 self._build()
             return self._payload, self._state

@@ -16,7 +16,7 @@ from aerialdojo_gen.studio.view.scenes import SceneCache, route_detail
 from aerialdojo_gen.studio.view.tasks import TaskList
 from aerialdojo_gen.studio.web.serving import STATIC, local_app
 
-_MOST_TASKS = 200
+_MAX_TASKS = 200
 
 
 def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
@@ -43,7 +43,7 @@ def view_app(data: Where, scenes: str | Sequence[str] | None = None) -> FastAPI:
     def get_tasks(
         scene: Annotated[list[str] | None, Query()] = None, setting: str = "", split: str = "", words: str = "",
         order: str = "nav_id", descending: bool = False, offset: Annotated[int, Query(ge=0, le=10**7)] = 0,
-        most: Annotated[int, Query(ge=0, le=_MOST_TASKS)] = 48,
+        most: Annotated[int, Query(ge=0, le=_MAX_TASKS)] = 48,
     ) -> dict[str, Any]:  # fmt: skip
         for name in scene or ():
             cache.require(name)

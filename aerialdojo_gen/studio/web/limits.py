@@ -18,8 +18,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 HEAD_S, BODY_S = 10.0, 60.0
 # A response that the client stops reading is aborted after this time.
 STALL_S = 30.0
-MOST_CONNECTIONS, MOST_PER_CLIENT = 256, 64
-MOST_LINES, WINDOW_S = 20, 60.0
+MAX_CONNECTIONS, MAX_PER_CLIENT = 256, 64
+MAX_LINES, WINDOW_S = 20, 60.0
 
 _TOO_LATE = b"HTTP/1.1 408 Request Timeout\r\nconnection: close\r\ncontent-length: 0\r\n\r\n"
 
@@ -44,7 +44,7 @@ class LimitedProtocol(H11Protocol):
         # Connections closed in the same batch are still in the set.
         others = [c for c in self.connections if isinstance(c, LimitedProtocol) and not c.transport.is_closing()]
         mine = [c for c in others if c.host == self.host]
-        if len(mine) > MOST_PER_CLIENT:
+        if len(mine) > MAX_PER_CLIENT:
             self._make_room(mine)
         elif len(others) > most_connections():
             self._make_room(others)
@@ -124,7 +124,7 @@ class LimitedProtocol(H11Protocol):
 def most_connections() -> int:
     """Maximum open connections: at most half the process's file limit."""
     files = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    return MOST_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, min(MOST_CONNECTIONS, files // 2))
+    return MAX_CONNECTIONS if files == resource.RLIM_INFINITY else max(8, min(MAX_CONNECTIONS, files // 2))
 
 
 class BoundedLog(logging.Filter):
@@ -142,7 +142,7 @@ class BoundedLog(logging.Filter):
                 record.msg = f"({self._kept} messages left out) {record.getMessage()}"
                 record.args = None
             self._since, self._passed, self._kept = now, 0, 0
-        if self._passed >= MOST_LINES:
+        if self._passed >= MAX_LINES:
             self._kept += 1
             return False
         self._passed += 1

@@ -26,7 +26,7 @@ _LARGEST_PX = 4096
 # Larger textures, in bytes of pixels, are sent as JPEG.
 _PNG_BYTES = 4 << 20
 _NOTHING = np.zeros((0, 3), dtype=np.int64)
-_Look = tuple[int, int, bool, bool, bool, str]
+_Key = tuple[int, int, bool, bool, bool, str]
 
 
 class _Body:
@@ -45,12 +45,12 @@ def scene_payload(scene: Scene) -> bytes:
     """Pack a scene for ``static/scene.js``: float32 world metres, the same bytes for the same scene."""
     light = light_of(scene)
     body = _Body()
-    groups: dict[_Look, list[tuple[int, Part]]] = {}
+    groups: dict[_Key, list[tuple[int, Part]]] = {}
     for backdrop, instances in ((False, scene.instances), (True, scene.backdrop)):
         for k, instance in enumerate(instances):
             kind = instance.surface if backdrop else ""
             for part in instance.parts:
-                groups.setdefault(_look(scene.materials[part.material], kind), []).append((k, part))
+                groups.setdefault(_group_key(scene.materials[part.material], kind), []).append((k, part))
     boxes = [i.bounds for i in scene.instances]
     header = {
         "version": VERSION,
@@ -69,14 +69,14 @@ def scene_payload(scene: Scene) -> bytes:
             for i in scene.instances
         ],
         "boxes": body.add(np.asarray(boxes, dtype="<f4").tobytes()),
-        "groups": [_group(body, look, groups[look], scene.materials) for look in sorted(groups)],
+        "groups": [_group(body, key, groups[key], scene.materials) for key in sorted(groups)],
     }
     head = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
     head += b" " * (-len(head) % 4)
     return struct.pack("<I", len(head)) + head + bytes(body.data)
 
 
-def _look(material: Material, kind: str) -> _Look:
+def _group_key(material: Material, kind: str) -> _Key:
     """Return the key by which parts are merged into one draw call; `kind` is that of a backdrop."""
     texture = _texture(material)
     size = _FLAT if texture is None else (texture.shape[0], texture.shape[1])
@@ -90,11 +90,11 @@ def _texture(material: Material) -> NDArray[np.uint8] | None:
     return downscale(material.texture, _LARGEST_PX)
 
 
-def _group(body: _Body, look: _Look, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
+def _group(body: _Body, key: _Key, parts: list[tuple[int, Part]], materials: dict[str, Material]) -> dict[str, Any]:
     """Merge parts into one draw call, in the order of the scene's instances."""
     vertices, index = soup([p for _, p in parts])
     counts = [len(p.vertices) for _, p in parts]
-    size, (holes, both_sides, unlit, kind) = look[:2], look[2:]
+    size, (holes, both_sides, unlit, kind) = key[:2], key[2:]
     flags = {
         "holes": holes, "both_sides": both_sides, "unlit": unlit, "behind": kind == "dome", "beyond": kind == HORIZON
     }  # fmt: skip

@@ -18,7 +18,7 @@ from collections.abc import Awaitable, Callable, Iterator, MutableMapping, Seque
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, lacks
+from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, no_package
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -100,7 +100,7 @@ def require_web() -> None:
         import fastapi  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        raise MissingPackage(lacks("the page", error.name, "web")) from None
+        raise MissingPackage(no_package("the page", error.name, "web")) from None
 
 
 def one_line(text: str) -> str:

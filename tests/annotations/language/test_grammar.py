@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from aerialdojo_gen.annotations.language.grammar import SLOTS, expand, frames
 from aerialdojo_gen.annotations.language.locations import Location
 from aerialdojo_gen.annotations.language.nouns import Name, NounPhrase, name_of, noun_phrase
-from aerialdojo_gen.annotations.language.relation_words import relation_words
+from aerialdojo_gen.annotations.language.relation_phrases import relation_phrases
 from aerialdojo_gen.annotations.language.sentences import Content, compose
 from aerialdojo_gen.annotations.language.subject import Wording, phrase_of
 from aerialdojo_gen.annotations.language.writer import LENGTHS
@@ -84,7 +84,7 @@ def test_a_noun_phrase_says_no_word_twice_and_all_that_can_only_stand_after_it()
 
 
 def test_relations_have_words_whatever_their_conditions():
-    words = relation_words()
+    words = relation_phrases()
     for table in ("relation", "pronoun"):
         for key, some in words[table].items():
             assert any(not one.conditions for one in some), (table, key)

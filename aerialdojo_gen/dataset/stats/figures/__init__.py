@@ -10,7 +10,7 @@ from aerialdojo_gen.dataset.stats.figures.maps import maps
 from aerialdojo_gen.dataset.stats.figures.ranking import categories, names
 from aerialdojo_gen.dataset.stats.figures.style import save
 from aerialdojo_gen.dataset.stats.frames import read_tasks
-from aerialdojo_gen.dataset.stats.measures import tells_difficulty
+from aerialdojo_gen.dataset.stats.measures import has_difficulty
 from aerialdojo_gen.store.root import Where, open_root
 
 __all__ = ["draw_figures"]
@@ -25,7 +25,7 @@ def draw_figures(data: Where, scenes: Sequence[str], folder: Path) -> list[Path]
         "shares": shares(tasks),
         "lengths": lengths(tasks),
         "detours": detours(tasks),
-        **({"difficulty": difficulty(tasks)} if tells_difficulty(tasks) else {}),
+        **({"difficulty": difficulty(tasks)} if has_difficulty(tasks) else {}),
         "categories": categories(root, scenes),
         "names": names(root, scenes),
         "maps": maps(root, scenes),

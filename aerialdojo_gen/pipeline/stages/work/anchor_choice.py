@@ -74,7 +74,7 @@ def judge_anchor(
     if seen <= 0 or seen < config.min_visible_fraction:
         faults.append(f"it does not see the object: {seen:.0%} of what it faces, {config.min_visible_fraction:.0%} "
                       "is the least")  # fmt: skip
-    candidate_views = CandidateViews.of(found, np.zeros(1, np.int64), radius, config)
+    candidate_views = CandidateViews.of(found, np.zeros(1, np.int64), config)
     (picture,) = candidate_views.pictures(np.zeros(1, np.int64), config.picture_px, config.fov_deg)
     parts = judge(picture, radius, config.standoff_m)
     row = {

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.geometry.viewpoints import level_marks, shortlist
-from aerialdojo_gen.pipeline.scoring.base import AnchorView, Known
+from aerialdojo_gen.pipeline.scoring.base import AnchorView
 from aerialdojo_gen.pipeline.scoring.ensemble import Verdict, scorer_ensemble
 from aerialdojo_gen.pipeline.scoring.geometric import most
 from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import steps_back_m, telling_m
+from aerialdojo_gen.pipeline.stages.work.camera_pullback import part_limit_m, steps_back_m
 
 Floats = NDArray[np.float64]
 
 # Least picture size for models.
-_LOOKED_AT_PX = 320
+_MODEL_PX = 320
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,17 @@ class CandidateViews:
     rank: Floats  # (k,) float64; ray-cast score of both positions
 
     @classmethod
-    def of(
-        cls, found: Candidates, which: NDArray[np.int64], radius_m: float, config: AnchorSampleConfig
-    ) -> CandidateViews:
+    def of(cls, found: Candidates, which: NDArray[np.int64], config: AnchorSampleConfig) -> CandidateViews:
         """Look from behind the candidates `which` (k,)."""
         places, yaws = found.positions_m[which], found.yaw_rad[which]
-        telling = [
-            telling_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
+        limits_m = [
+            part_limit_m(found.patches, found.seen[k], places[n], float(yaws[n]), config.fov_deg)
             for n, k in enumerate(which)
         ]
-        most = np.minimum(config.step_back_m, telling)
+        most = np.minimum(config.step_back_m, limits_m)
         backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
-        behind = found.moved(which, places - away, radius_m, config)
+        behind = found.moved(which, places - away, config.fov_deg)
         views, elevation = behind.views, found.elevation_deg[which]
         clear = clarity_score(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
         rank = (found.rank[which] + behind.rank) / 2.0 * clear
@@ -75,22 +73,13 @@ class CandidateViews:
 
         Where there is one from behind it already, the bound is that much tighter.
         """
-        k, found, behind = int(self.which[n]), self.found, self.behind
-        shown, part_visibility = float(found.views.shown[k]), tuple(found.part_visibility[k].tolist())
+        known, behind = self.found.measures(int(self.which[n])), self.behind
         if self.has_back(n):
-            shown = (shown + float(behind.views.shown[n])) / 2.0
-            part_visibility = _mean(
-                part_visibility, behind.part_visibility[n].tolist() if back is None else back.part_visibility
-            )
-        known = Known(
-            shown,
-            float(found.elevation_deg[k]),
-            float(found.clearance_m[k]),
-            part_visibility,
-            None if found.off_front_rad is None else float(found.off_front_rad[k]),
-            float(found.views.framed[k]),
-            float(behind.views.framed[n]) if self.has_back(n) else None,
-        )
+            seen = behind.part_visibility[n].tolist() if back is None else back.part_visibility
+            known = replace(
+                known, shown=(known.shown + float(behind.views.shown[n])) / 2.0,
+                part_visibility=_mean(known.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
+            )  # fmt: skip
         return most(known, radius_m, standoff_m, back)
 
 
@@ -110,7 +99,7 @@ def best_pictured(
     scorers, separation_rad = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
     weights = config.weights
     if weights.clip or weights.vlm:
-        views = candidate_views.pictures(few, max(config.picture_px, _LOOKED_AT_PX), config.fov_deg)
+        views = candidate_views.pictures(few, max(config.picture_px, _MODEL_PX), config.fov_deg)
         found = dict(enumerate(zip(views, scorers.judge(name, views), strict=True)))
         score = np.array([verdict.score for _, verdict in found.values()])
     else:

@@ -23,7 +23,7 @@ from aerialdojo_gen.pipeline.scoring.geometric import judge
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.anchor_choice import with_choice
 from aerialdojo_gen.pipeline.stages.work.anchor_pictures import CandidateViews, best_pictured
-from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World, tells_of
+from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates, World, part_faces
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.store.schemas import ANCHORS, VIEWPOINTS
 from aerialdojo_gen.store.tables import from_rows
@@ -31,10 +31,10 @@ from aerialdojo_gen.store.tables import from_rows
 Floats = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
-# So many times what is pictured is looked at by ray casts from where its reference picture would be taken.
-_LOOKED_AT = 4
+# So many times what is pictured is ray cast from where its reference picture would be taken.
+_RAY_CAST_FACTOR = 4
 # More parts than that get no candidates of their own.
-_MOST_TELLS = 4
+_MAX_PARTS = 4
 REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
 
 
@@ -78,12 +78,12 @@ def run(job: Job, config: AnchorSampleConfig) -> Output:
             bare += 1
             why = ", ".join(f"{reason} {n}" for reason, n in rejected.items() if n)
             log.warning("%s: object %d (%s) has no anchor: %s", job.scene, item["object_id"], item["name"], why)
-    tally = {reason: counts[reason] for reason in REASONS}
+    by_reason = {reason: counts[reason] for reason in REASONS}
     return Output(
         {"anchors": from_rows(ANCHORS, rows), "viewpoints": from_rows(VIEWPOINTS, viewpoints)},
-        rows_in=len(rows) + sum(tally.values()),
+        rows_in=len(rows) + sum(by_reason.values()),
         rows_out=len(rows),
-        counts=tally | {"no_anchor": bare},
+        counts=by_reason | {"no_anchor": bare},
     )
 
 
@@ -120,14 +120,14 @@ def shortlisted(
     separation_rad = math.radians(config.separation_deg)
     pictured = max(config.pictured, config.shortlist)
     # Several a side: what stands before the object from one place does not from the next.
-    looked_at = seen[np.argsort(-found.rank[seen], kind="stable")[: _LOOKED_AT * pictured]]
+    ray_cast = seen[np.argsort(-found.rank[seen], kind="stable")[: _RAY_CAST_FACTOR * pictured]]
     of_sides = seen[shortlist(found.rank[seen], azimuth[seen], pictured, separation_rad, front[seen])]
-    candidate_views = CandidateViews.of(found, np.union1d(looked_at, of_sides), radius, config)
-    of_looked = shortlist(
+    candidate_views = CandidateViews.of(found, np.union1d(ray_cast, of_sides), config)
+    of_ray_cast = shortlist(
         candidate_views.rank, azimuth[candidate_views.which], pictured, separation_rad, front[candidate_views.which]
     )
-    few, backs = candidate_views.which[of_looked], candidate_views.step_back_m[of_looked].tolist()
-    best, shown = best_pictured(item["name"], candidate_views, of_looked, azimuth[few], front[few], radius, config)
+    few, backs = candidate_views.which[of_ray_cast], candidate_views.step_back_m[of_ray_cast].tolist()
+    best, shown = best_pictured(item["name"], candidate_views, of_ray_cast, azimuth[few], front[few], radius, config)
     own_distance = Surface.of(world.scene.instances[found.instance]).distance_m(found.positions_m[few[best]])
     why = None
     if len(best) and front[seen].any() and not front[few[best[0]]]:
@@ -170,7 +170,7 @@ def candidates_of(
         surface, instance.bounds, config.standoff_m, config.azimuths, config.elevations_deg, config.level_heights
     )
     triangles = instance.vertices[instance.faces]
-    for faces in tells_of(instance)[:_MOST_TELLS]:
+    for faces in part_faces(instance)[:_MAX_PARTS]:
         box = np.stack([triangles[faces].min(axis=(0, 1)), triangles[faces].max(axis=(0, 1))])
         places = np.concatenate(
             [places, ring(surface, box, config.standoff_m, config.azimuths, config.tell_elevations_deg, ())]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from aerialdojo_gen.geometry.portable import atan2
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster, instance_caster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.geometry.viewpoints import PointVisibility, Views, informativeness
-from aerialdojo_gen.pipeline.scoring.base import AnchorView
+from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
 from aerialdojo_gen.planning.clearance import ClearanceGrid
@@ -68,17 +69,14 @@ class Candidates:
     instance: int  # The object's index in the scene
     alone: TriangleRayCaster  # The object by itself
     positions_m: Floats  # (n, 3) float64; the body's centres, world frame
-    yaw_rad: Floats  # (n,) float64; yaw; elevation seen from the object's centroid; distance to the nearest surface
-    elevation_deg: Floats
-    clearance_m: Floats
+    yaw_rad: Floats  # (n,) float64
+    clearance_m: Floats  # (n,) float64; distance to the nearest surface
     sight: PointVisibility  # Which points of the object's surface they see
-    views: Views  # What they see of the object
     points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
     patches: tuple[Patch, ...]  # Points of each of the object's identifying parts
     seen: Floats  # Share that they see of each of those parts (`part_visibility.visible_shares`)
-    part_visibility: Floats  # (n, t) float64
-    off_front_rad: Floats | None  # (n,) float64 or None
-    rank: Floats  # (n,) float64; score of the ray casts alone, which decides what is pictured at all
+    radius_m: float  # Of the body
+    standoff_m: float
 
     @classmethod
     def of(
@@ -91,48 +89,53 @@ class Candidates:
         clearance = np.array([world.clearance_m(p) for p in positions_m])
         patches = patches_of(world, instance, points)
         seen = visible_shares(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
-        return cls._judged(
-            world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m, config
-        )
-
-    @classmethod
-    def _judged(
-        cls, world: World, instance: int, alone: TriangleRayCaster, positions_m: Floats, yaw_rad: Floats,
-        clearance: Floats, sight: PointVisibility, points: Floats, patches: tuple[Patch, ...], seen: Floats,
-        radius_m: float, config: AnchorSampleConfig,
-    ) -> Candidates:  # fmt: skip
-        thing = world.scene.instances[instance]
-        views = sight.views()
-        away = positions_m - thing.centroid
-        elevation = np.degrees(atan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
-        rank = informativeness(views, elevation, clearance, radius_m, config.standoff_m)
-        part_visibility = seen / np.maximum(seen.max(axis=0, initial=0.0), 1e-9)
-        off_front = None
-        if thing.anatomy is not None and thing.anatomy.fronts_rad:
-            off_front = off_front_rad(positions_m, thing.centroid, thing.anatomy.fronts_rad)
-        rank = recognisability(
-            rank, part_score(part_visibility) if part_visibility.shape[1] else None, front_score(off_front)
-        )
         return cls(
-            world, instance, alone, positions_m, yaw_rad, elevation, clearance, sight, views, points, patches, seen,
-            part_visibility, off_front, rank,
+            world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m,
+            config.standoff_m,
         )  # fmt: skip
 
-    def moved(
-        self, which: NDArray[np.int64], positions_m: Floats, radius_m: float, config: AnchorSampleConfig
-    ) -> Candidates:
+    @cached_property
+    def views(self) -> Views:
+        """What they see of the object."""
+        return self.sight.views()
+
+    @cached_property
+    def elevation_deg(self) -> Floats:
+        """Their elevation seen from the object's centroid, (n,) float64."""
+        away = self.positions_m - self.world.scene.instances[self.instance].centroid
+        return np.degrees(atan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+
+    @cached_property
+    def part_visibility(self) -> Floats:
+        """How much of each identifying part they see beside the best of them, (n, t) float64."""
+        return np.asarray(self.seen / np.maximum(self.seen.max(axis=0, initial=0.0), 1e-9))
+
+    @cached_property
+    def off_front_rad(self) -> Floats | None:
+        """How far they are off the object's nearest front, (n,) float64; None where it has no front."""
+        thing = self.world.scene.instances[self.instance]
+        if thing.anatomy is None or not thing.anatomy.fronts_rad:
+            return None
+        return off_front_rad(self.positions_m, thing.centroid, thing.anatomy.fronts_rad)
+
+    @cached_property
+    def rank(self) -> Floats:
+        """Score of the ray casts alone, (n,) float64, which decides what is pictured at all."""
+        rank = informativeness(self.views, self.elevation_deg, self.clearance_m, self.radius_m, self.standoff_m)
+        parts = part_score(self.part_visibility) if self.part_visibility.shape[1] else None
+        return recognisability(rank, parts, front_score(self.off_front_rad))
+
+    def moved(self, which: NDArray[np.int64], positions_m: Floats, fov_deg: float) -> Candidates:
         """Look from other places (k, 3), facing the same way; places that stay are not looked from again."""
         world, yaws = self.world, self.yaw_rad[which]
         new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
         places, turned = positions_m[new], yaws[new]
-        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, config.fov_deg)
+        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, fov_deg)
         clearance, seen = self.clearance_m[which], self.seen[which]
         clearance[new] = [world.clearance_m(p) for p in places]
-        seen[new] = visible_shares(places, turned, self.patches, world.rays, config.fov_deg)
-        return self._judged(
-            world, self.instance, self.alone, positions_m, yaws, clearance, self.sight.with_rows(which, new, sight),
-            self.points, self.patches, seen, radius_m, config,
-        )  # fmt: skip
+        seen[new] = visible_shares(places, turned, self.patches, world.rays, fov_deg)
+        sight = self.sight.with_rows(which, new, sight)
+        return replace(self, positions_m=positions_m, yaw_rad=yaws, clearance_m=clearance, sight=sight, seen=seen)
 
     def seeing(self, least: float) -> NDArray[np.int64]:
         """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
@@ -159,24 +162,21 @@ class Candidates:
             for n, k in enumerate(which)
         ]
 
+    def measures(self, k: int) -> CandidateMeasures:
+        """What is known of the view from the k-th viewpoint before it is pictured."""
+        return CandidateMeasures(
+            float(self.views.shown[k]), float(self.elevation_deg[k]), float(self.clearance_m[k]),
+            tuple(self.part_visibility[k].tolist()),
+            None if self.off_front_rad is None else float(self.off_front_rad[k]), float(self.views.framed[k]),
+        )  # fmt: skip
+
     def picture(self, k: int, size_px: int, fov_deg: float) -> AnchorView:
         """Take the front view from the k-th viewpoint."""
+        thing, camera = self.world.scene.instances[self.instance], Camera(size_px, size_px, fov_deg)
         return take_view(
-            ray_renderer(self.world.scene),
-            self.alone,
-            self.world.scene.instances[self.instance],
-            self.instance,
-            Camera(size_px, size_px, fov_deg),
-            self.positions_m[k],
-            float(self.yaw_rad[k]),
-            shown=float(self.views.shown[k]),
-            elevation_deg=float(self.elevation_deg[k]),
-            clearance_m=float(self.clearance_m[k]),
-            part_visibility=tuple(float(share) for share in self.part_visibility[k]),
-            tells=tells_of(self.world.scene.instances[self.instance]),
-            off_front_rad=None if self.off_front_rad is None else float(self.off_front_rad[k]),
-            framed=float(self.views.framed[k]),
-        )
+            ray_renderer(self.world.scene), self.alone, thing, self.instance, camera, self.positions_m[k],
+            float(self.yaw_rad[k]), self.measures(k), part_faces(thing),
+        )  # fmt: skip
 
     def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:
         """What a row of ``anchors`` says of where the k-th viewpoint is and what it sees."""
@@ -190,19 +190,19 @@ class Candidates:
         }
 
 
-def tells_of(instance: Instance) -> list[NDArray[np.int64]]:
-    """The faces of each of an instance's telling parts that it has."""
+def part_faces(instance: Instance) -> list[NDArray[np.int64]]:
+    """The faces of each of an instance's identifying parts that it has."""
     names = () if instance.anatomy is None else instance.anatomy.identifying_parts
     return [faces for faces in map(instance.faces_of, names) if len(faces)]
 
 
 def patches_of(world: World, instance: int, points: Floats) -> tuple[Patch, ...]:
-    """Points of each of an instance's telling parts, drawn by the number of its surface's points."""
+    """Points of each of an instance's identifying parts, drawn by the number of its surface's points."""
     thing = world.scene.instances[instance]
     # The draw depends on scene and node only.
     rng = generator(0, "anchor-sample", world.scene.name, thing.node)
     n = max(_LEAST_POINTS, len(points) // 4)
     return tuple(
         Patch.of(Surface(thing.vertices, thing.faces[faces]), n, rng, world.rays, world.scene.sun)
-        for faces in tells_of(thing)
+        for faces in part_faces(thing)
     )

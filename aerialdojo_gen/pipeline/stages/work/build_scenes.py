@@ -11,7 +11,7 @@ from aerialdojo_gen.base.config.sections import BuildScenesConfig
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.context import keep_scene
+from aerialdojo_gen.scenes.context import cache_scene
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.layout import check_scene_name
@@ -31,7 +31,7 @@ def run(job: Job, config: BuildScenesConfig) -> Output:
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
     if not scene.imported:
         # The next stage mostly follows in this process.
-        keep_scene(scene, digest)
+        cache_scene(scene, digest)
     table = pa.Table.from_pylist([scene_row(scene, relative, digest)], schema=SCENES.schema)
     return Output(tables={"scenes": table}, rows_in=1, rows_out=1, counts={"triangles": scene.n_triangles})
 

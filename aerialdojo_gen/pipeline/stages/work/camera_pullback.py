@@ -22,9 +22,9 @@ _CAMERA_M, _KEPT_M = 0.15, 0.3
 # What comes between counts this much against what comes into the picture: a rail hides little, and spoils it.
 _HIDDEN = 2.0
 _TRIED = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
-_WORTH_M = 0.25
-# Of the picture, what a telling part keeps if it had it: 12 x 12 pixels of 320 x 320; and what it needs to be told.
-_TOLD, _BARELY_TOLD = 0.0014, 0.0007
+_MIN_STEP_M = 0.25
+# Share of the picture that an identifying part keeps if it had it, 12 x 12 pixels of 320 x 320, and the least of it.
+_PART_SHARE, _MIN_PART_SHARE = 0.0014, 0.0007
 
 
 def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
@@ -46,7 +46,7 @@ def _fitting(vertices: Floats, x: float, y: float, z: float, cos: float, sin: fl
     return most
 
 
-def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
+def part_limit_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
     """How far, metres, a camera may go back before an identifying part gets too small; inf where none is seen."""
     most = math.inf
     ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
@@ -54,7 +54,7 @@ def telling_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw_ra
         away = max(float(dot(patch.points - position_m, ahead).mean()), 0.1)
         taken = patch.area_m2 * share / (2.0 * away * math.tan(math.radians(fov_deg) / 2.0)) ** 2
         if taken > 0.0:
-            floor = min(_TOLD, max(_BARELY_TOLD, taken / 2.0))
+            floor = min(_PART_SHARE, max(_MIN_PART_SHARE, taken / 2.0))
             most = min(most, max(0.0, away * (math.sqrt(taken / floor) - 1.0)))
     return most
 
@@ -75,7 +75,7 @@ def steps_back_m(
     vertices = world.scene.instances[instance].vertices
     fitting = [fitting_m(vertices, p, yaw, fov_deg) for p, yaw in zip(positions_m, yaw_rad.tolist(), strict=True)]
     distance_m = np.minimum(fitting, most_m)
-    some = np.flatnonzero(distance_m >= _WORTH_M)
+    some = np.flatnonzero(distance_m >= _MIN_STEP_M)
     if not len(some):
         return steps
     distance_m, places, yaws = distance_m[some], positions_m[some], yaw_rad[some]
@@ -85,11 +85,11 @@ def steps_back_m(
     with np.errstate(divide="ignore", invalid="ignore"):
         edges = np.where(back != 0.0, (np.where(back > 0, high, low) - places) / back, np.inf)
     distance_m = np.minimum(np.minimum(distance_m, free), edges.min(axis=1) - _CAMERA_M)
-    far = distance_m >= _WORTH_M
+    far = distance_m >= _MIN_STEP_M
     some, distance_m, places, yaws, back = some[far], distance_m[far], places[far], yaws[far], back[far]
     best, chosen = np.full(len(some), -np.inf), np.zeros(len(some))
     # From the farthest on, so that of equals the farthest is taken, which leaves room around it; the anchor's own
-    # place is asked last, and taken only where it is the better one.
+    # place is tried last, and taken only where it is the better one.
     for share in (*_TRIED, 0.0):
         tried = np.floor(100.0 * share * distance_m) / 100.0
         # What sees all of the points cannot be bettered, and casts no more rays.

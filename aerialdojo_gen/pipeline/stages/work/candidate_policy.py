@@ -22,7 +22,7 @@ from aerialdojo_gen.base.constants import DETOUR, SETTINGS
 from aerialdojo_gen.base.paper_figures import PaperScene, inventory, splits
 from aerialdojo_gen.geometry.portable import exp
 from aerialdojo_gen.pipeline.stages.work.quota import (
-    Kept,
+    Accepted,
     difficulty_level,
     rank_candidates,
     sampling_key,
@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Least margin of kept routes: `filter` rejects a few more by rules that only it can check.
-_LEAST_SPARE = 0.02
+_MIN_SPARE = 0.02
 # Tolerance of the summed length, relative to the paper's.
 _ON_PATH = 2e-3
 # Width of the logistic error of predicted detours (283,000 routes of 42 scenes): of routes with a predicted detour of
@@ -83,10 +83,10 @@ class CandidatePolicy(Protocol):
     def next_batch(self, routes: Sequence[Route | None]) -> Integers:
         """Rows to search next, (m,) int64, ascending; empty if enough are kept. `routes` has a row a candidate."""
 
-    def enough(self, kept: Kept) -> bool:
+    def enough(self, kept: Accepted) -> bool:
         """Whether what is released can be drawn from these."""
 
-    def release(self, kept: Kept) -> NDArray[np.bool_]:
+    def release(self, kept: Accepted) -> NDArray[np.bool_]:
         """Draw what is released, (n,) bool."""
 
     def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
@@ -106,11 +106,11 @@ class AllCandidates:
         """None: all were in the first batch."""
         return np.empty(0, np.int64)
 
-    def enough(self, kept: Kept) -> bool:
+    def enough(self, kept: Accepted) -> bool:
         """Whatever there is."""
         return True
 
-    def release(self, kept: Kept) -> NDArray[np.bool_]:
+    def release(self, kept: Accepted) -> NDArray[np.bool_]:
         """Release all."""
         return np.ones(len(kept.settings), dtype=bool)
 
@@ -124,9 +124,9 @@ class PaperQuota:
 
     compares = True
 
-    def __init__(self, paper: PaperScene, config: QuotaConfig, seed: int) -> None:
-        self._paper, self._config = paper, config
-        self._rules = paper.tasks, paper.path_m, seed, config.prefer_harder
+    def __init__(self, paper_scene: PaperScene, config: QuotaConfig, seed: int) -> None:
+        self._paper_scene, self._config = paper_scene, config
+        self._rules = paper_scene.tasks, paper_scene.path_m, seed, config.prefer_harder
         self._margin = config.search_margin
         self._taken = dict.fromkeys(SETTINGS, 0)
 
@@ -155,7 +155,7 @@ class PaperQuota:
         kept = reason == KEPT
         rows = done[kept]
         levels = difficulty_level(self._detour(rows, lengths[kept]), self._candidates.visible[rows])
-        kept_rows = self._kept(rows, setting[kept], lengths[kept], levels)
+        kept_rows = self._accepted(rows, setting[kept], lengths[kept], levels)
         while not self.enough(kept_rows):
             self._margin = max(2.0 * self._margin, 0.1)
             rows = self._within_margin()
@@ -169,7 +169,7 @@ class PaperQuota:
     def _within_margin(self) -> Integers:
         rows = [np.empty(0, np.int64)]
         for name in SETTINGS:
-            n = self._paper.tasks[name]
+            n = self._paper_scene.tasks[name]
             end = min(math.ceil(n * (1.0 + self._margin)), len(self._order[name]))
             rows.append(self._order[name][self._taken[name] : end])
             self._taken[name] = max(end, self._taken[name])
@@ -197,33 +197,37 @@ class PaperQuota:
         # A difficulty level counts by its probability.
         likely = 1.0 / (1.0 + exp(-(self._detour(rows, length_m) - DETOUR) / _DETOUR_SPREAD))
         levels = likely + (self._candidates.visible[rows] == 0.0)
-        kept = self._kept(rows, setting, length_m, levels)
+        kept = self._accepted(rows, setting, length_m, levels)
         return {name: rows[place] for name, place in rank_candidates(kept, *self._rules).items()}
 
-    def _kept(self, rows: Integers, setting: NDArray[np.str_], length_m: Floats, levels: Floats | Integers) -> Kept:
-        return Kept([self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, levels)
+    def _accepted(
+        self, rows: Integers, setting: NDArray[np.str_], length_m: Floats, levels: Floats | Integers
+    ) -> Accepted:
+        return Accepted(
+            [self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, levels
+        )
 
-    def enough(self, kept: Kept) -> bool:
+    def enough(self, kept: Accepted) -> bool:
         """Whether the paper's counts and total length can be selected from these."""
         setting = np.asarray(kept.settings)
-        for name, n in self._paper.tasks.items():
-            if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_LEAST_SPARE * n)):
+        for name, n in self._paper_scene.tasks.items():
+            if n and np.count_nonzero(setting == name) < n + max(2, math.ceil(_MIN_SPARE * n)):
                 return False
         # A few tasks cannot match the total length exactly: allow half a route.
-        half_a_route = self._paper.path_m / (2 * max(sum(self._paper.tasks.values()), 1))
+        half_a_route = self._paper_scene.path_m / (2 * max(sum(self._paper_scene.tasks.values()), 1))
         total = float(kept.length_m[self.release(kept)].sum())
-        return abs(total - self._paper.path_m) <= _ON_PATH * self._paper.path_m + half_a_route
+        return abs(total - self._paper_scene.path_m) <= _ON_PATH * self._paper_scene.path_m + half_a_route
 
-    def release(self, kept: Kept) -> NDArray[np.bool_]:
+    def release(self, kept: Accepted) -> NDArray[np.bool_]:
         """Draw the paper's counts, with lengths that sum to its metres."""
         return select_quota(kept, *self._rules)
 
     def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
         """Take the scene's share of the paper's training tasks."""
-        return train_quotas(self._paper.scene, inventory(), splits())
+        return train_quotas(self._paper_scene.scene, inventory(), splits())
 
 
 def policy_of(scene: str, quota: QuotaConfig | None, seed: int) -> CandidatePolicy:
     """Make a scene's policy: by the paper's counts if there is a quota and the paper has the scene."""
-    paper = inventory().get(scene) if quota else None
-    return AllCandidates() if quota is None or paper is None else PaperQuota(paper, quota, seed)
+    paper_scene = inventory().get(scene) if quota else None
+    return AllCandidates() if quota is None or paper_scene is None else PaperQuota(paper_scene, quota, seed)

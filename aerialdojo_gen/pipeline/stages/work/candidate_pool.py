@@ -24,21 +24,21 @@ class Pool:
     candidates: int
     judged: int
     kept: dict[str, int]  # Kept candidates by setting
-    paper: PaperScene | None  # The paper's row; None for a scene that the paper does not have
+    paper_row: PaperScene | None  # The paper's row; None for a scene that the paper does not have
     path_m: tuple[float, float] | None  # (float, float) or None
 
     @property
     def short(self) -> dict[str, int]:
         """Missing tasks per setting; settings with enough are left out."""
-        required = self.paper.tasks if self.paper else {}
+        required = self.paper_row.tasks if self.paper_row else {}
         return {s: n - self.kept[s] for s, n in required.items() if self.kept[s] < n}
 
     @property
     def reaches_path(self) -> bool:
         """Whether a selection can have the paper's total length to within 1 %."""
-        if self.paper is None or self.path_m is None:
+        if self.paper_row is None or self.path_m is None:
             return False
-        return self.path_m[0] <= 1.01 * self.paper.path_m and self.path_m[1] >= 0.99 * self.paper.path_m
+        return self.path_m[0] <= 1.01 * self.paper_row.path_m and self.path_m[1] >= 0.99 * self.paper_row.path_m
 
 
 def pool_of(root: Where, scene: str) -> Pool:
@@ -50,14 +50,14 @@ def pool_of(root: Where, scene: str) -> Pool:
     rows = pc.index_in(verdicts["pair_id"], value_set=plans["pair_id"].combine_chunks())
     length = plans["length_m"].take(rows).to_numpy()
     lengths = {s: np.sort(length[keep & (setting == s)]) for s in SETTINGS}
-    paper = inventory().get(scene)
+    paper_row = inventory().get(scene)
     path = None
-    if paper is not None and all(len(lengths[s]) >= n for s, n in paper.tasks.items()):
-        least = sum(float(lengths[s][:n].sum()) for s, n in paper.tasks.items())
-        most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper.tasks.items())
+    if paper_row is not None and all(len(lengths[s]) >= n for s, n in paper_row.tasks.items()):
+        least = sum(float(lengths[s][:n].sum()) for s, n in paper_row.tasks.items())
+        most = sum(float(lengths[s][len(lengths[s]) - n :].sum()) for s, n in paper_row.tasks.items())
         path = least, most
     judged = sum(reason != "not_needed" for reason in verdicts["reason"].to_pylist())
-    return Pool(scene, verdicts.num_rows, judged, {s: len(v) for s, v in lengths.items()}, paper, path)
+    return Pool(scene, verdicts.num_rows, judged, {s: len(v) for s, v in lengths.items()}, paper_row, path)
 
 
 def require_pools(root: Where, scenes: Sequence[str]) -> None:
@@ -80,10 +80,12 @@ def pool_lines(pools: Sequence[Pool], width: int | None = None) -> list[str]:
     for pool in pools:
         cells = [f"{pool.candidates}", f"{pool.judged}"]
         for s in SETTINGS:
-            required = f"/{pool.paper.tasks[s]}" if pool.paper else ""
+            required = f"/{pool.paper_row.tasks[s]}" if pool.paper_row else ""
             cells.append(f"{pool.kept[s]}{required}{'!' if s in pool.short else ' '}")
         reach = f"{pool.path_m[0] / 1000:.1f}-{pool.path_m[1] / 1000:.1f}" if pool.path_m else "-"
-        paper = f"/{pool.paper.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper else " "
-        cells.append(reach + paper)
+        paper_km = (
+            f"/{pool.paper_row.path_m / 1000:.1f}{' ' if pool.reaches_path else '!'}" if pool.paper_row else " "
+        )
+        cells.append(reach + paper_km)
         rows.append((pool.scene, cells))
     return TextTable("scene", [Column(head) for head in heads], rows).lines(width)

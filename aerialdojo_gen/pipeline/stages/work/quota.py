@@ -56,7 +56,7 @@ def difficulty_level(plan_detour: Floats, visible_at_start: Floats) -> NDArray[n
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Accepted:
     """n candidates that the rules keep."""
 
     sampling_keys: Sequence[str]  # Keys for random draws
@@ -66,7 +66,7 @@ class Kept:
 
 
 def select_quota(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
+    kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> NDArray[np.bool_]:
     """Weighted sample without replacement (Gumbel's trick), (n,) bool.
 
@@ -80,7 +80,7 @@ def select_quota(
 
 
 def rank_candidates(
-    kept: Kept, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
+    kept: Accepted, counts: Mapping[str, int], path_m: float, seed: int, preference: float = 0.0
 ) -> dict[str, NDArray[np.int64]]:
     """Rows of each setting's tasks in the order of selection by `select_quota`."""
     groups = _groups(kept, counts)
@@ -88,7 +88,7 @@ def rank_candidates(
     return {name: _best(scores, rows) for name, rows in groups.items()}
 
 
-def _groups(kept: Kept, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
+def _groups(kept: Accepted, counts: Mapping[str, int]) -> dict[str, NDArray[np.int64]]:
     """Rows of each setting, by key: ties are broken by it, not by row order."""
     by_key = np.argsort(np.asarray(kept.sampling_keys))
     settings = np.asarray(kept.settings)[by_key]
@@ -101,7 +101,7 @@ def _best(scores: Floats, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _score(
-    kept: Kept, counts: Mapping[str, int], groups: Mapping[str, NDArray[np.int64]], path_m: float, seed: int,
+    kept: Accepted, counts: Mapping[str, int], groups: Mapping[str, NDArray[np.int64]], path_m: float, seed: int,
     preference: float,
 ) -> Floats:  # fmt: skip
     """Gumbel scores (n,), tilted so that selected lengths sum to `path_m`."""

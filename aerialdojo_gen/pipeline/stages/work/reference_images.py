@@ -26,10 +26,10 @@ from aerialdojo_gen.store.tables import from_rows
 _BOX = ("box_u0_px", "box_v0_px", "box_u1_px", "box_v1_px")
 _POSE = ("reference_x_m", "reference_y_m", "reference_z_m", "reference_yaw_rad")
 # A patch of 7 x 7 pixels in a picture of 320 x 320.
-LEAST_SHARE = 0.0005
+MIN_SHARE = 0.0005
 # A rasteriser's edges are within a pixel of those that rays see; what it leaves out altogether is larger than that.
 _NEAR_PX, _EVERY_PX = 2, 4
-# Of the pixels, one in so many rows and columns is asked which part it shows.
+# Of the pixels, one in so many rows and columns is tested for the part that it shows.
 _SOME_PX = 3
 
 
@@ -37,8 +37,8 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
     """Take the front view from every object's selected anchor, or from further back along its viewing axis.
 
     How far back an object fits the picture is the anchor's to say (`step_back_m` of the table ``anchors``); the
-    configuration says how far back it may be taken. A part that tells what the object is counts as shown where it has
-    `LEAST_SHARE` of the picture's pixels.
+    configuration says how far back it may be taken. An identifying part counts as shown where it has
+    `MIN_SHARE` of the picture's pixels.
     """
     objects = job.read("objects").to_pylist()
     anchors = {row["object_id"]: row for row in job.read("anchors").to_pylist() if row["selected"]}
@@ -81,7 +81,7 @@ def run(job: Job, config: ReferenceImagesConfig) -> Output:
         alone = instance_caster(thing)
         at_anchor = view_pose(place, yaw, "front")
         row["parts_shown"] = _parts_shown(rays, alone, k, thing, camera, pose, mask, at_anchor)
-        missing = missing_tells(thing, camera, pose, mask, alone)
+        missing = missing_parts(thing, camera, pose, mask, alone)
         if thing.anatomy.identifying_parts:
             row["tells_shown"] = 1.0 - len(missing) / len(thing.anatomy.identifying_parts)
             row["tells_missing"] = ", ".join(missing) or None
@@ -104,7 +104,7 @@ def _parts_shown(
         own = np.zeros_like(mask)
         own.flat[pixels] = rays.first_hit(at_anchor[:3, 3], directions)[1] == k
         seen = np.stack([seen, _seen_faces(alone, len(thing.faces), camera, at_anchor, own)])
-    least = LEAST_SHARE * mask.size / _SOME_PX**2
+    least = MIN_SHARE * mask.size / _SOME_PX**2
     names = sorted(thing.anatomy.runs)
     return [name for name in names if (seen[..., thing.faces_of(name)].sum(axis=-1) >= least).all()]
 
@@ -117,17 +117,17 @@ def _seen_faces(
     return np.bincount(hit[hit >= 0], minlength=faces)
 
 
-def missing_tells(
+def missing_parts(
     instance: Instance, camera: Camera, world_from_camera: NDArray[np.float64], mask: NDArray[np.bool_],
     alone: TriangleRayCaster,
 ) -> list[str]:  # fmt: skip
-    """Names of the identifying parts with less than `LEAST_SHARE` of a picture's pixels; mask is (H, W) bool."""
+    """Names of the identifying parts with less than `MIN_SHARE` of a picture's pixels; mask is (H, W) bool."""
     names = () if instance.anatomy is None else instance.anatomy.identifying_parts
     if not names:
         return []
     parts = [instance.faces_of(name) for name in names]
-    shares = part_shares(alone, instance, parts, camera, world_from_camera, mask, LEAST_SHARE)
-    return [name for name, share in zip(names, shares, strict=True) if share < LEAST_SHARE]
+    shares = part_shares(alone, instance, parts, camera, world_from_camera, mask, MIN_SHARE)
+    return [name for name, share in zip(names, shares, strict=True) if share < MIN_SHARE]
 
 
 def instance_map(rays: RayCaster, camera: Camera, world_from_camera: NDArray[np.float64]) -> NDArray[np.int32]:

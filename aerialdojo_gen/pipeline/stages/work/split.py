@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.sections import SplitConfig
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import policy_of
-from aerialdojo_gen.pipeline.stages.work.quota import Kept, difficulty_level, sampling_key, train_mask
+from aerialdojo_gen.pipeline.stages.work.quota import Accepted, difficulty_level, sampling_key, train_mask
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, nav_id, reference_id
 from aerialdojo_gen.scenes.worlds.world import is_world, world_of
 from aerialdojo_gen.store.schemas import RELEASE_ANCHORS, RELEASE_OBJECTS, ROUTES, TASKS
@@ -141,12 +141,12 @@ def _said(routes: pa.Table, train: NDArray[np.bool_], objects: pa.Table) -> tupl
     return pa.array(texts, pa.string()), pa.array(seen, pa.bool_())
 
 
-def _kept(routes: pa.Table) -> Kept:
+def _accepted(routes: pa.Table) -> Accepted:
     detour, visible = (
         routes.column(name).to_numpy(zero_copy_only=False).astype(np.float64)
         for name in ("plan_detour", "target_visible_at_start")
     )
-    return Kept(
+    return Accepted(
         routes.column("sampling_key").to_pylist(),
         routes.column("setting").to_pylist(),
         routes.column("length_m").to_numpy(),
@@ -179,7 +179,7 @@ def run(job: Job, config: SplitConfig) -> Output:
         "landmark", _take(landmarks, "landmark_id", objects.column("landmark_id")).column("name")
     )
     policy = policy_of(job.scene, config.quota, job.seed)
-    routes = routes.filter(pa.array(policy.release(_kept(routes))))
+    routes = routes.filter(pa.array(policy.release(_accepted(routes))))
     fraction = _train_fraction(job.scene, scene["partition"] == "OOD", config)
     trains = policy.train_counts(routes.column("setting").to_pylist(), fraction)
     train = train_mask(

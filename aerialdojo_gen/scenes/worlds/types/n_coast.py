@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.places import point
-from aerialdojo_gen.scenes.worlds.seaside import Isle, settle
+from aerialdojo_gen.scenes.worlds.seaside import Isle, build_village
 from aerialdojo_gen.scenes.worlds.shores import ahead, islands, landing
 from aerialdojo_gen.scenes.worlds.wilds import smoothed, winding
 
@@ -46,8 +46,8 @@ class _Shore(NamedTuple):
 
 
 def write(draft: Draft) -> None:
-    """Raise the land, and settle it."""
-    settle(draft, _TOPOLOGIES[draft.topology](draft, _shore(draft)))
+    """Raise the land, and build a village on it."""
+    build_village(draft, _TOPOLOGIES[draft.topology](draft, _shore(draft)))
 
 
 def _shore(draft: Draft) -> _Shore:

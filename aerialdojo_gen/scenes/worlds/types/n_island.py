@@ -8,7 +8,7 @@ from collections.abc import Callable
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.seaside import Isle, inside, settle
+from aerialdojo_gen.scenes.worlds.seaside import Isle, build_village, inside
 from aerialdojo_gen.scenes.worlds.shores import ahead, coast, islands, landing, towards
 from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, smoothed, step, winding
 
@@ -16,8 +16,8 @@ Point = tuple[float, float]
 
 
 def write(draft: Draft) -> None:
-    """Raise the island, and settle it."""
-    settle(draft, _TOPOLOGIES[draft.topology](draft, draft.width_m / 2, draft.depth_m / 2))
+    """Raise the island, and build a village on it."""
+    build_village(draft, _TOPOLOGIES[draft.topology](draft, draft.width_m / 2, draft.depth_m / 2))
 
 
 def _off_shore(draft: Draft, bay_deg: float) -> Point:

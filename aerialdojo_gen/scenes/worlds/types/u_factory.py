@@ -30,12 +30,12 @@ def write(draft: Draft) -> None:
     _wall(draft, site, gate)
     uses = list(_TOPOLOGIES[draft.topology][1])
     lots = sorted((lot.grown(-1.2) for lot in lots), key=lambda b: -b.width * b.depth)
-    dealt = [_use(lot, uses[k % len(uses)]) for k, lot in enumerate(lots)]
+    lot_uses = [_use(lot, uses[k % len(uses)]) for k, lot in enumerate(lots)]
     # Offices take their ground before landmarks do, or a chimney stands in one.
-    for lot in (lot for lot, use in zip(lots, dealt, strict=True) if use == "office"):
+    for lot in (lot for lot, use in zip(lots, lot_uses, strict=True) if use == "office"):
         draft.take(_office_box(lot).shape())
-    _landmarks(draft, [lot for lot, use in zip(lots, dealt, strict=True) if use in ("yard", "green", "office")])
-    for k, (lot, use) in enumerate(zip(lots, dealt, strict=True)):
+    _landmarks(draft, [lot for lot, use in zip(lots, lot_uses, strict=True) if use in ("yard", "green", "office")])
+    for k, (lot, use) in enumerate(zip(lots, lot_uses, strict=True)):
         draft.section(f"A lot: {use}")
         _USES[use](draft, lot, k)
     draft.fill_slots()

@@ -116,28 +116,30 @@ def _lot(
         "front_m": front, "back_m": back, "side_m": round(found.width_m / 2, 2),
         "front_fence": draft.pick(_FENCES, "front_fence", *key),
         "back_fence": draft.pick(["board", "board", "hedge"], "back_fence", *key),
-        "back": _deal(draft, "back garden", round(draft.knob("things")), key, used),
-        "front": _deal(draft, "front garden", draft.whole(2, 3, "front", *key), key, used),
+        "back": _draw_categories(draft, "back garden", round(draft.knob("things")), key, used),
+        "front": _draw_categories(draft, "front garden", draft.whole(2, 3, "front", *key), key, used),
         "trees": draft.material("trees", *key).split("+")[: draft.whole(0, 2, "trees", *key)],
     }  # fmt: skip
     if "porch_m" in style:
-        lot["porch"] = _deal(draft, "porch", 2, key, used)
+        lot["porch"] = _draw_categories(draft, "porch", 2, key, used)
     if style["garage"]:
-        lot["vehicle"] = (_deal(draft, "drive", 1, key, used) or [""])[0]
-        lot["garage_roof"] = (_deal(draft, "garage roof", 1, key, used) or [""])[0]
+        lot["vehicle"] = (_draw_categories(draft, "drive", 1, key, used) or [""])[0]
+        lot["garage_roof"] = (_draw_categories(draft, "garage roof", 1, key, used) or [""])[0]
     return {name: value for name, value in lot.items() if value not in ("", [])}
 
 
-def _deal(draft: Draft, kind: str, n: int, key: tuple[object, ...], used: Counter[tuple[str, str]]) -> list[str]:
+def _draw_categories(
+    draft: Draft, kind: str, n: int, key: tuple[object, ...], used: Counter[tuple[str, str]]
+) -> list[str]:
     """Draw different categories of a kind of slots, which a builder of the kit finds the places of."""
     slots = draft.kind.slots[kind]
     left = {
         what: weight for what, weight in slots.of.items()
         if used[kind, what] < slots.most and (what not in slots.held_out or draft.world.held_out)
     }  # fmt: skip
-    dealt = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
-    used.update((kind, what) for what in dealt)
-    return dealt
+    drawn = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
+    used.update((kind, what) for what in drawn)
+    return drawn
 
 
 def _mirrored(draft: Draft, *points: Point) -> list[Point]:
@@ -257,8 +259,8 @@ def _terrace(
         {
             "colour": role.removeprefix("house_").replace("_", " "), "wall": draft.material(role), "roof": roof,
             "door": draft.material("door", name, role), "storeys": storeys, "chimney": draft.chance(0.6, name, role),
-            "front": (_deal(draft, "front garden", 1, (name, k), used) or [""])[0],
-            "back": (_deal(draft, "back garden", 1, (name, k), used) or [""])[0],
+            "front": (_draw_categories(draft, "front garden", 1, (name, k), used) or [""])[0],
+            "back": (_draw_categories(draft, "back garden", 1, (name, k), used) or [""])[0],
         }
         for k, role in enumerate(roles)
     ]  # fmt: skip

@@ -51,7 +51,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """A phrase and its claims."""
 
     phrase: str  # Its first wording, which is its key in the catalogue
@@ -87,21 +87,21 @@ class Look:
         )
 
 
-def parse_looks(raw: Any, names: Sequence[str], materials: Sequence[str], where: str) -> tuple[Look, ...]:
+def parse_appearances(raw: Any, names: Sequence[str], materials: Sequence[str], where: str) -> tuple[Appearance, ...]:
     """Parse a category's looks."""
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
-    looks = tuple(_look(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
+    appearances = tuple(_appearance(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
     said: set[str] = set()
-    for k, look in enumerate(looks):
-        for wording in (*look.wordings, *look.adjectives):
+    for k, appearance in enumerate(appearances):
+        for wording in (*appearance.wordings, *appearance.adjectives):
             if wording in said:
                 raise AssetError(f"{where} looks[{k}]: duplicate phrase {wording!r}")
             said.add(wording)
-    return looks
+    return appearances
 
 
-def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Look:
+def _appearance(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Appearance:
     if not isinstance(entry, dict) or not {"say", "adjective"} & set(entry):
         raise AssetError(f"{where}: must be a table with say or adjective: its words, and what they claim")
     for key in entry:
@@ -120,7 +120,7 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
     if not set(entry) - set(_SAYS):
         claims = ", ".join(_KEYS[len(_SAYS) :])
         raise AssetError(f"{where}: {said[0]!r} claims nothing that can be checked: add {claims}")
-    look = Look(
+    appearance = Appearance(
         said[0],
         also,
         adjectives,
@@ -134,14 +134,14 @@ def _look(entry: Any, names: Sequence[str], materials: Sequence[str], where: str
         size=tuple(_comparison(text, where) for text in _words(entry, "size", where)),
         order=tuple(_order(text, where) for text in _words(entry, "order", where)),
     )
-    for name in (*look.parts, *look.lacks):
+    for name in (*appearance.parts, *appearance.lacks):
         for one in name.split("|"):
             if one not in names:
                 raise AssetError(f"{where}: no part {one!r}{nearest(one, names)}: parts are named by tag or role")
-    for form in look.form.values():
+    for form in appearance.form.values():
         if form not in FORMS:
             raise AssetError(f"{where}: unknown form {form!r}{nearest(form, FORMS)} (one of {', '.join(FORMS)})")
-    return look
+    return appearance
 
 
 def _table(entry: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.mesh import Mesh, mesh
 
 Floats = NDArray[np.float64]
 # A thing: its bodies with their materials, in its own frame, where it stands, its turn in radians.
-Thing = tuple[list[tuple[str, Mesh]], Floats, float]
+SceneryItem = tuple[list[tuple[str, Mesh]], Floats, float]
 
 # Distances from the edge between which things stand, and within which they have all their parts, metres.
 _TREES_M, _HOUSES_M, _NEAR_M, _GAP_M = 260.0, 380.0, 70.0, 5.0
@@ -64,9 +64,9 @@ class _Draws:
         return xy[(rng.uniform(size=len(xy)) < chance) & (away > _GAP_M)]
 
 
-def things_on(
+def scatter_scenery(
     land: Land, kind: Kind, bounds: Floats, noise: Noise, rng: np.random.Generator, budget: int
-) -> Iterator[Thing]:
+) -> Iterator[SceneryItem]:
     """Yield houses, then trees, until `budget` triangles are spent."""
     draws = _Draws(land, bounds, kind.wet)
     houses: list[tuple[Floats, float]] = []
@@ -85,7 +85,7 @@ def things_on(
         yield thing
 
 
-def _houses(draws: _Draws, kind: Kind, rng: np.random.Generator) -> Iterator[tuple[Thing, float]]:
+def _houses(draws: _Draws, kind: Kind, rng: np.random.Generator) -> Iterator[tuple[SceneryItem, float]]:
     if kind.houses == "none" or not kind.houses_ha:
         return
     size = {"blocks": 34.0, "sheds": 46.0, "terraces": 26.0}.get(kind.houses, 21.0)
@@ -182,7 +182,7 @@ def _turned(profile: list[tuple[float, float]], sides: int, tip: float | None, t
     return _rings(tuple(profile), sides, tip, twist)
 
 
-def _trees(draws: _Draws, kind: Kind, noise: Noise, rng: np.random.Generator, taken: Floats) -> Iterator[Thing]:
+def _trees(draws: _Draws, kind: Kind, noise: Noise, rng: np.random.Generator, taken: Floats) -> Iterator[SceneryItem]:
     if not kind.trees_ha:
         return
     step = 9.0 if kind.trees_ha < 60 else 6.0

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
 
 _LANDMARKS = ("summit_cross", "fire_tower", "radio_mast")
@@ -35,12 +35,12 @@ def place_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float
     placer.begin("Landmarks, and a resting place on level grass")
     _landmarks(placer, water_z_m)
     for k, (x, y) in enumerate(_level_places(placer, free["grass"])):
-        placer.place(_CAMP[k % len(_CAMP)], x, y, 37.0 * k)
+        placer.place(_CAMP[k % len(_CAMP)], Pose(x, y, 37.0 * k))
     placer.begin("Trees, bushes and stones")
     for category, spacing, most, kind in _GROWTH:
         area = free[kind].intersection(site.extent.buffer(-1.5))
         for x, y, yaw in poisson_disc(area, spacing, site.rng_for("grow", category, kind), limit=most):
-            placer.place(category, x, y, yaw, drawn=True)
+            placer.place(category, Pose(x, y, yaw), drawn=True)
 
 
 def _landmarks(placer: Placer, water_z_m: float | None) -> None:
@@ -52,7 +52,7 @@ def _landmarks(placer: Placer, water_z_m: float | None) -> None:
         if not len(dry):
             return
         x, y, _ = dry[int(np.argmax(dry[:, 2]))]
-        placer.place(category, float(x), float(y), 90.0 * k, settle_m=1.0, drawn=True)
+        placer.place(category, Pose(float(x), float(y), 90.0 * k), settle_m=1.0, drawn=True)
         # The next one stands far from it.
         spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.head.size_m)]
 

@@ -21,7 +21,7 @@ STRUCTURE = "structure"  # the kind of what is not in the catalogue
 
 
 @dataclass(frozen=True)
-class RelationWords:
+class RelationPhrase:
     """One wording: {} is the thing, {d} the direction."""
 
     say: str
@@ -56,7 +56,7 @@ _HOLDS: Mapping[str, Callable[[SceneClaims, int, int, Any], bool]] = {
 
 
 @cache
-def relation_words() -> Mapping[str, Mapping[str, tuple[RelationWords, ...]]]:
+def relation_phrases() -> Mapping[str, Mapping[str, tuple[RelationPhrase, ...]]]:
     """Read the wordings, by table and the claim's key."""
     path = FOLDER / "relations.toml"
     tables = read_toml(path, AnnotationError)
@@ -68,11 +68,11 @@ def relation_words() -> Mapping[str, Mapping[str, tuple[RelationWords, ...]]]:
     }
 
 
-def _words(entry: Any, where: str) -> RelationWords:
+def _words(entry: Any, where: str) -> RelationPhrase:
     if isinstance(entry, str):
-        return RelationWords(entry)
+        return RelationPhrase(entry)
     conditions = {name: value for name, value in entry.items() if name != "say"}
     for name in conditions:
         if name not in _HOLDS:
             raise AnnotationError(f"{where}: unknown condition {name!r}{nearest(name, tuple(_HOLDS))}")
-    return RelationWords(entry["say"], conditions)
+    return RelationPhrase(entry["say"], conditions)

@@ -46,7 +46,7 @@ _SHOPS = ("cafe", "restaurant", "bar", "pub", "fast_food", "bank", "pharmacy", "
 _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 
-def things(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
+def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
            built: BaseGeometry, summary: MapSummary) -> list[dict[str, Any]]:  # fmt: skip
     """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas.
 

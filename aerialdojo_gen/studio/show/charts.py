@@ -28,7 +28,7 @@ CLEARANCE_SCALE = LogNorm(TIGHT_M, OPEN_M, clip=True)
 _START, _GOAL, _TARGET = "#0284c7", "#16a34a", "#facc15"
 _HALO = (withStroke(linewidth=3, foreground="black"),)
 _HALO_OF_BAR = (withStroke(linewidth=5, foreground="black"),)
-_MARGIN_M, _LEAST_M, _ABOVE_M = 7.0, 26.0, 3.0
+_MARGIN_M, _MIN_M, _ABOVE_M = 7.0, 26.0, 3.0
 # Label width at a route's ends, as a share of the figure's width.
 _LABEL_SHARE = 0.09
 
@@ -127,7 +127,7 @@ def _box(row: dict[str, float]) -> Floats:
 
 
 def _frame(
-    points: Floats, aspect: float, around_m: float = _MARGIN_M, least_m: float = _LEAST_M
+    points: Floats, aspect: float, around_m: float = _MARGIN_M, least_m: float = _MIN_M
 ) -> tuple[float, float, float, float]:
     """Return an extent of the given aspect around points (n, 2), with a margin."""
     low, high = points.min(axis=0) - around_m, points.max(axis=0) + around_m
