@@ -80,11 +80,10 @@ class SceneGeometry:
                 # A line, because GEOS makes an object of every one of several points.
                 outline = shapely.convex_hull(shapely.linestrings(xy))
             else:
-                # Corners on the grid, not what edges meet at: to put that there, too, takes three times as long.
-                triangles = shapely.polygons((np.round(xy / _GRID_M) * _GRID_M)[instance.faces])
+                triangles = shapely.polygons(xy[instance.faces])
                 solid = shapely.area(triangles) > 1e-6
                 hull = shapely.convex_hull(shapely.linestrings(xy))
-                outline = shapely.union_all(triangles[solid]) if solid.any() else hull
+                outline = shapely.union_all(triangles[solid], grid_size=_GRID_M) if solid.any() else hull
             shapely.prepare(outline)
             self._outlines[i] = outline
         return self._outlines[i]
