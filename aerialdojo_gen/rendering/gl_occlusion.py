@@ -40,11 +40,10 @@ class BodyCulling:
         c = self._chunks
         if not self._hides:
             return c.visible_indices(clips, eye, Tiles.empty(len(clips), width, height), hides=False)
-        order, in_view = chunks_in_view(c.low, c.high, eye, clips)
         if len(self._out) < len(clips):
             self._out = np.empty((len(clips), len(c.vertices)), np.uint32)
         counts = _visible_triangles(
-            order, in_view, c.starts, self._planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
+            c.starts, self._planes, self._corners, clips, eye, c.low, c.high, nearness, self._out
         )
         return [self._out[v, :n] for v, n in enumerate(counts.tolist())]
 
@@ -59,13 +58,14 @@ def _blocks(rows: NDArray[Any], starts: NDArray[np.int64]) -> NDArray[Any]:
 
 @njit(cache=True, error_model="numpy")
 def _visible_triangles(
-    order: NDArray[np.int64], in_view: NDArray[np.bool_], starts: NDArray[np.int64], planes: Floats,
-    corners: NDArray[np.float32], clips: Floats, eye: Floats, low: Floats, high: Floats,
-    nearness: NDArray[np.float32], out: NDArray[np.uint32],
+    starts: NDArray[np.int64], planes: Floats, corners: NDArray[np.float32], clips: Floats, eye: Floats,
+    low: Floats, high: Floats, nearness: NDArray[np.float32], out: NDArray[np.uint32],
 ) -> NDArray[np.int64]:  # fmt: skip
     views, height, width = nearness.shape
+    order, in_view = chunks_in_view(low, high, eye, clips)
     counts = np.zeros(views, np.int64)
-    facing, places = np.empty(_SIZE), np.empty(12 * _SIZE)
+    facing, places, boxes = np.empty(_SIZE), np.empty(12 * _SIZE), np.empty(5 * _SIZE)
+    kept = np.empty(_SIZE, np.int64)
     for n in range(len(order)):
         chunk, faced = order[n], False
         first = starts[chunk]
@@ -78,28 +78,17 @@ def _visible_triangles(
             for corner in range(3):
                 _project(corners[chunk, 3 * corner * _SIZE :], clips[v], width, height, places[4 * corner * _SIZE :])
             at = counts[v]
-            for i in range(starts[chunk + 1] - first):
-                if facing[i] <= 0.0:
+            for k in range(_choose(starts[chunk + 1] - first, facing, places, width, height, boxes, kept)):
+                i = kept[k]
+                w0, w1, w2 = places[i], places[4 * _SIZE + i], places[8 * _SIZE + i]
+                if min(w0, min(w1, w2)) >= NEAR_W and not _covers(
+                    places[_SIZE + i], places[2 * _SIZE + i], places[3 * _SIZE + i],
+                    places[5 * _SIZE + i], places[6 * _SIZE + i], places[7 * _SIZE + i],
+                    places[9 * _SIZE + i], places[10 * _SIZE + i], places[11 * _SIZE + i],
+                    int(boxes[i]), int(boxes[_SIZE + i]), int(boxes[2 * _SIZE + i]), int(boxes[3 * _SIZE + i]),
+                    nearness[v],
+                ):  # fmt: skip
                     continue
-                near = 0
-                for corner in range(3):
-                    near += places[4 * corner * _SIZE + i] < NEAR_W
-                if near == 3:
-                    continue
-                if near == 0:
-                    u0, v0, w0 = places[_SIZE + i], places[2 * _SIZE + i], places[3 * _SIZE + i]
-                    u1, v1, w1 = places[5 * _SIZE + i], places[6 * _SIZE + i], places[7 * _SIZE + i]
-                    u2, v2, w2 = places[9 * _SIZE + i], places[10 * _SIZE + i], places[11 * _SIZE + i]
-                    left = max(math.ceil(min(u0, min(u1, u2)) - ROUNDING_PX), 0)
-                    right = min(math.floor(max(u0, max(u1, u2)) + ROUNDING_PX), width - 1)
-                    if left > right:
-                        continue
-                    top = max(math.ceil(min(v0, min(v1, v2)) - ROUNDING_PX), 0)
-                    bottom = min(math.floor(max(v0, max(v1, v2)) + ROUNDING_PX), height - 1)
-                    if top > bottom:
-                        continue
-                    if not _covers(u0, v0, w0, u1, v1, w1, u2, v2, w2, left, right, top, bottom, nearness[v]):
-                        continue
                 t = 3 * (first + i)
                 out[v, at], out[v, at + 1], out[v, at + 2] = t, t + 1, t + 2
                 at += 3
@@ -129,6 +118,34 @@ def _project(corners: NDArray[np.float32], m: Floats, width: int, height: int, p
         places[i + _SIZE] = ((a0 * x + a1 * y + a2 * z + a3) * inverse + 1.0) * half_w - 0.5
         places[i + 2 * _SIZE] = ((b0 * x + b1 * y + b2 * z + b3) * inverse + 1.0) * half_h - 0.5
         places[i + 3 * _SIZE] = inverse
+
+
+@njit(cache=True)
+def _choose(
+    n: int, facing: Floats, places: Floats, width: int, height: int, boxes: Floats, kept: NDArray[np.int64]
+) -> int:  # fmt: skip
+    """Write which triangles face the eye and could cover a pixel's centre, without a branch; return how many.
+
+    A triangle that reaches nearer than is projected is kept, one that lies there is not. The first and last column
+    and row of pixels that a triangle could cover go into the boxes.
+    """
+    for i in range(_SIZE):
+        u0, u1, u2 = places[_SIZE + i], places[5 * _SIZE + i], places[9 * _SIZE + i]
+        v0, v1, v2 = places[2 * _SIZE + i], places[6 * _SIZE + i], places[10 * _SIZE + i]
+        w0, w1, w2 = places[i], places[4 * _SIZE + i], places[8 * _SIZE + i]
+        left = max(np.ceil(min(u0, min(u1, u2)) - ROUNDING_PX), 0.0)
+        right = min(np.floor(max(u0, max(u1, u2)) + ROUNDING_PX), width - 1.0)
+        top = max(np.ceil(min(v0, min(v1, v2)) - ROUNDING_PX), 0.0)
+        bottom = min(np.floor(max(v0, max(v1, v2)) + ROUNDING_PX), height - 1.0)
+        boxes[i], boxes[_SIZE + i], boxes[2 * _SIZE + i], boxes[3 * _SIZE + i] = left, right, top, bottom
+        covers = ((left <= right) & (top <= bottom)) | (min(w0, min(w1, w2)) < NEAR_W)
+        keep = covers & (facing[i] > 0.0) & (max(w0, max(w1, w2)) >= NEAR_W)
+        boxes[4 * _SIZE + i] = 1.0 if keep else 0.0
+    k = 0
+    for i in range(n):
+        kept[k] = i
+        k += boxes[4 * _SIZE + i] > 0.0
+    return k
 
 
 @njit(cache=True, error_model="numpy")
