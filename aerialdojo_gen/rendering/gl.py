@@ -107,8 +107,7 @@ class GlRenderer(Closable):
         shared: dict[int, Any] = {}
         self._sets = [_DrawSet(kind, self, shared) for kind in kinds if len(kind.chunks.low)]
         self._backdrop = [_DrawSet(kind, self, shared) for kind in backdrop_kinds(scene)]
-        max_vertices = max(len(drawn.kind.chunks.vertices) for drawn in (*self._sets, *self._backdrop))
-        self._indices = self._own(self._gl.buffer(reserve=4 * max_vertices, dynamic=True))
+        self._indices = self._own(self._gl.buffer(reserve=4, dynamic=True))
         self._scene = scene
         self._clouds = self._own(gl_programs.table_texture(self._gl, cloud_map(scene.name)[..., None], "f1"))
         self._height_map = height_map(scene)
@@ -260,18 +259,23 @@ class GlRenderer(Closable):
             "focal_px": np.float32(camera.focal_px).tobytes(),
         }
 
-        def draw(drawn: _DrawSet, chosen: NDArray[np.uint32]) -> None:
+        def draw(drawn: _DrawSet, first: int, count: int) -> None:
             drawn.begin(self._gl)
             array, uniforms = self._array((*drawn.kind.tags, *tags), drawn.buffer)
             gl_programs.write(uniforms, place)
-            # As small as possible: Mesa clears all of it.
+            array.render(vertices=count, first=first)
+
+        far = [np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32) for drawn in self._backdrop]
+        # All indices at once, in a buffer as small as possible: Mesa clears all of it.
+        chosen = np.concatenate([*visible, *far])
+        if len(chosen):
             self._indices.orphan(chosen.nbytes)
             self._indices.write(chosen)
-            array.render(vertices=len(chosen))
-
-        for drawn, chosen in zip(self._sets, visible, strict=True):
-            if len(chosen):
-                draw(drawn, chosen)
+        first = 0
+        for drawn, of_kind in zip(self._sets, visible, strict=True):
+            if len(of_kind):
+                draw(drawn, first, len(of_kind))
+            first += len(of_kind)
         self._gl.disable(self._gl.CULL_FACE)
         sky, uniforms = self._array(("SKY", *tags), None)
         gl_programs.write(
@@ -280,8 +284,9 @@ class GlRenderer(Closable):
         )
         sky.render(vertices=3)
         # After the sky: depths near the far plane round to it, and the last one drawn wins.
-        for drawn in self._backdrop:
-            draw(drawn, np.arange(len(drawn.kind.chunks.vertices), dtype=np.uint32))
+        for drawn, of_kind in zip(self._backdrop, far, strict=True):
+            draw(drawn, first, len(of_kind))
+            first += len(of_kind)
         return target
 
     def _array(self, tags: tuple[str, ...], buffer: Any) -> tuple[Any, dict[str, Any]]:
