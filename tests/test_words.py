@@ -12,7 +12,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
 MAX_PARAMETERS, MAX_FUNCTION_LINES = 10, 80
 # Parameters of the kit's builders are the keys of a plan's entry; compiled kernels take plain numbers and arrays.
-EXEMPT_DECORATORS = re.compile(r"njit|(site|ground|part)_builder")
+EXEMPT_DECORATORS = re.compile(r"njit|intrinsic|(site|ground|part)_builder")
 # The environment's options, all by name and all public. Those of a command, in `cli/`, are free as well.
 MANY_PARAMETERS = {"benchmark/env.py __init__"}
 ROOMS = {

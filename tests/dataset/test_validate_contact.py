@@ -18,6 +18,6 @@ def test_a_thing_that_is_lifted_hovers(planted, up_m, found):
     bench = next(i for i in scene.instances if i.category == "bench")
     parts = tuple(replace(p, vertices=p.vertices + np.array([0.0, 0.0, up_m])) for p in bench.parts)
     lifted = tuple(replace(i, parts=parts) if i is bench else i for i in scene.instances)
-    data.kept["mesh"] = SceneMesh(replace(scene, instances=lifted))
+    data.cache["mesh"] = SceneMesh(replace(scene, instances=lifted))
     findings = list(thing_hovers(data, data["scenes"]))
     assert [bench.node in f.found for f in findings] == [True] * found
