@@ -125,10 +125,11 @@ def test_one_embree_scene_and_one_fcl_world_for_all(meshes):
                  orthographic_pictures(place)._rays):  # fmt: skip
         assert part is caster
     world = World.of(place, 0.25, 0.05)
-    assert world.rays is ray_caster(place)
+    renderer = ray_renderer(place)
     planner = _planner(place, PlanConfig(), 0.25)
-    # The planner casts no rays: it releases what does.
-    assert world.rays is not ray_caster(place)
+    # The planner releases what draws, not what casts rays.
+    assert world.rays is ray_caster(place)
+    assert ray_renderer(place) is not renderer
     assert world.collisions is planner.world is collision_world(place)
     # Two grids of other margins: each asks for its own, and the context keeps the one last made.
     assert (

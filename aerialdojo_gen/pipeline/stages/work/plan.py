@@ -29,7 +29,11 @@ Floats = NDArray[np.float64]
 # Megabytes of goals' cost-to-go fields kept between estimation and search, plain and compressed to a tenth; what
 # does not fit is expanded again. Plain ones save a fiftieth of the mall's time and cost 0.2 GB.
 _FIELDS_MB = 0.0, 250.0
-_PLANNERS_PARTS = "collision world", "clearance space", "clearance grid", "planner"
+# What the planner is made of, and what `filter` casts rays with.
+_NEEDED_PARTS = (
+    "collision world", "clearance space", "clearance grid", "planner",
+    "triangle caster", "ray caster", "points to see",
+)  # fmt: skip
 
 
 def targets_of_part(object_ids: list[int], part: int, config: PlanConfig) -> list[int]:
@@ -95,8 +99,8 @@ def _search(planner: Planner, pairs: pa.Table, goals: Floats, starts: Floats, po
 
 def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
     context = context_of(scene)
-    # What the stages before drew and cast rays with is not needed any more, and as large as the planner.
-    context.release(*_PLANNERS_PARTS)
+    # What the stages before drew with is not needed any more.
+    context.release(*_NEEDED_PARTS)
     return context.part("planner", lambda: Planner(scene, config, radius_m), config, radius_m)
 
 
