@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.triangles import segment_triangle_d2
 from aerialdojo_gen.planning.bvh import LEAF
+from aerialdojo_gen.planning.vectors import constant, data_of, floats, load, splat
 
 _WIDTH = 8
-_FLOATS, _INDEX = ir.VectorType(ir.FloatType(), _WIDTH), ir.IntType(64)
+_FLOATS, _INDEX = floats(_WIDTH), ir.IntType(64)
 # Added to the radius, and per metre of a coordinate: eight times float32's rounding.
 _PAD_M, _PAD_PER_M = 1e-3, 1e-6
 # A segment shorter than this along an axis counts as a point there, and this in place of its reciprocal length.
@@ -40,23 +41,19 @@ def _met(_: Any, groups: Any, node: Any, planes: Any, upper: Any) -> tuple[Any, 
     """Bits of the boxes of a node's group that a segment meets; `_along` makes `planes` and `upper`."""
 
     def emit(context: Any, b: Any, signature: Any, args: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, b, args[0]).data
+        (data,) = data_of(context, b, signature, args, 0)
         first = b.mul(args[1], ir.Constant(_INDEX, 6))
-        no_lanes = ir.Constant(ir.VectorType(ir.IntType(32), _WIDTH), [0] * _WIDTH)
 
         def number(k: int) -> Any:
             """One of `planes` in all lanes."""
-            undefined = ir.Constant(_FLOATS, ir.Undefined)
-            one = b.insert_element(undefined, b.extract_value(args[2], k), ir.Constant(ir.IntType(32), 0))
-            return b.shuffle_vector(one, undefined, no_lanes)
+            return splat(b, b.extract_value(args[2], k), _FLOATS)
 
         def crossed(row: Any, at: int, axis: int) -> Any:
             """Where the segment, 0 to 1, crosses a plane of every box."""
             place = b.mul(b.add(first, row), ir.Constant(_INDEX, _WIDTH))
-            coordinate = b.load(b.bitcast(b.gep(data, [place]), _FLOATS.as_pointer()), align=4)
-            return b.fmul(b.fsub(coordinate, number(at)), number(6 + axis))
+            return b.fmul(b.fsub(load(b, data, place, _FLOATS), number(at)), number(6 + axis))
 
-        begin, end = (ir.Constant(_FLOATS, [value] * _WIDTH) for value in (0.0, 1.0))
+        begin, end = constant(_FLOATS, 0.0), constant(_FLOATS, 1.0)
         for axis in range(3):
             enters = b.add(b.extract_value(args[3], axis), ir.Constant(_INDEX, axis))
             leaves = b.sub(ir.Constant(_INDEX, 3 + 2 * axis), enters)

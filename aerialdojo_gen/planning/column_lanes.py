@@ -19,40 +19,20 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.planning.column_kernels import DOWN, FLAT, KIND_OF, KINDS, UP
+from aerialdojo_gen.planning.vectors import INT32, constant, data_of, floats, load, pointer, splat
 
 LANES = 16
 # A column needs a cell more than a group has.
 MIN_CELLS = LANES + 1
 
-_INT64, _INT32, _INT16, _INT8 = (ir.IntType(bits) for bits in (64, 32, LANES, 8))
-_FLOATS, _INTS = ir.VectorType(ir.FloatType(), LANES), ir.VectorType(_INT32, LANES)
-
-
-def _constant(kind: ir.VectorType, value: float) -> ir.Constant:
-    return ir.Constant(kind, [value] * LANES)
-
-
-_INFINITE, _ZERO, _NO_BITS = _constant(_FLOATS, float("inf")), _constant(_FLOATS, 0.0), _constant(_INTS, 0)
-
-
-def _splat(b: Any, value: Any) -> Any:
-    """Vector with one float in all lanes."""
-    undefined = ir.Constant(_FLOATS, ir.Undefined)
-    return b.shuffle_vector(b.insert_element(undefined, value, ir.Constant(_INT32, 0)), undefined, _NO_BITS)
-
-
-def _group(b: Any, data: Any, index: Any, kind: ir.VectorType) -> Any:
-    """Pointer to the group of cells that begins at an index."""
-    return b.bitcast(b.gep(data, [index]), kind.as_pointer())
-
-
-def _load(b: Any, data: Any, index: Any, kind: ir.VectorType) -> Any:
-    return b.load(_group(b, data, index, kind), align=4)
+_INT64, _INT16, _INT8 = (ir.IntType(bits) for bits in (64, LANES, 8))
+_FLOATS, _INTS = floats(LANES), ir.VectorType(INT32, LANES)
+_INFINITE, _ZERO, _NO_BITS = constant(_FLOATS, float("inf")), constant(_FLOATS, 0.0), constant(_INTS, 0)
 
 
 def _passes(b: Any, moves: Any, move: int) -> Any:
     """Lanes in which a move is passable."""
-    return b.icmp_unsigned("!=", b.and_(moves, _constant(_INTS, 1 << move)), _NO_BITS)
+    return b.icmp_unsigned("!=", b.and_(moves, constant(_INTS, 1 << move)), _NO_BITS)
 
 
 def _any(b: Any, lanes: Any) -> Any:
@@ -61,12 +41,7 @@ def _any(b: Any, lanes: Any) -> Any:
 
 def _leaving_costs(b: Any, length: Any, coarse: Any, clearance: Any) -> Any:
     """Costs of a move: `length + coarse * clearance`, in this order of rounding."""
-    return b.fadd(_splat(b, length), b.fmul(_splat(b, coarse), clearance))
-
-
-def _data(context: Any, b: Any, signature: Any, args: Any, *places: int) -> list[Any]:
-    """Pointers to the first elements of some array arguments."""
-    return [context.make_array(signature.args[n])(context, b, args[n]).data for n in places]
+    return b.fadd(splat(b, length, _FLOATS), b.fmul(splat(b, coarse, _FLOATS), clearance))
 
 
 @intrinsic
@@ -81,12 +56,12 @@ def relax_flat(
     """
 
     def emit(context: Any, b: Any, signature: Any, args: Any) -> Any:
-        costs, passable, clearance, lengths, coarse, targets, limits, improved = _data(
+        costs, passable, clearance, lengths, coarse, targets, limits, improved = data_of(
             context, b, signature, args, 0, 1, 2, 5, 6, 7, 8, 9
         )
         at, k = args[3], args[4]
-        cost, moves = _load(b, costs, at, _FLOATS), _load(b, passable, at, _INTS)
-        near = _load(b, clearance, at, _FLOATS)
+        cost, moves = load(b, costs, at, _FLOATS), load(b, passable, at, _INTS)
+        near = load(b, clearance, at, _FLOATS)
         reached = []
         for move in KINDS.tolist():
             place = [ir.Constant(_INT64, move)]
@@ -96,9 +71,9 @@ def relax_flat(
             place, new = [ir.Constant(_INT64, number)], reached[KIND_OF[move]]
             target = b.load(b.gep(targets, place))
             with b.if_then(b.icmp_signed(">=", target, ir.Constant(_INT64, 0))):
-                there = _group(b, costs, b.add(target, k), _FLOATS)
+                there = pointer(b, costs, b.add(target, k), _FLOATS)
                 old = b.load(there, align=4)
-                limit = _splat(b, b.load(b.gep(limits, place)))
+                limit = splat(b, b.load(b.gep(limits, place)), _FLOATS)
                 better = b.and_(_passes(b, moves, move), b.fcmp_ordered("<", new, old))
                 better = b.and_(better, b.fcmp_ordered("<=", new, limit))
                 with b.if_then(_any(b, better)):
@@ -127,22 +102,22 @@ def _scan(move: int) -> Any:
         _: Any, costs: Any, passable: Any, clearance: Any, at: Any, length: Any, coarse: Any, before: Any
     ) -> tuple[Any, Callable[..., Any]]:
         def emit(context: Any, b: Any, signature: Any, args: Any) -> Any:
-            costs, passable, clearance = _data(context, b, signature, args, 0, 1, 2)
+            costs, passable, clearance = data_of(context, b, signature, args, 0, 1, 2)
             at, length, coarse, before = args[3:]
             neighbours = b.add(at, ir.Constant(_INT64, -1 if upward else 1))
-            moves = _load(b, passable, neighbours, _INTS)
-            leaving = _leaving_costs(b, length, coarse, _load(b, clearance, neighbours, _FLOATS))
-            old = _load(b, costs, at, _FLOATS)
+            moves = load(b, passable, neighbours, _INTS)
+            leaving = _leaving_costs(b, length, coarse, load(b, clearance, neighbours, _FLOATS))
+            old = load(b, costs, at, _FLOATS)
             # Minima over the nearest 2, 4, 8 and 16 cells, and the costs of as many steps.
             new, steps, n = old, b.select(_passes(b, moves, move), leaving, _INFINITE), 1
             while n < LANES:
                 new = least(b, b.fadd(shifted(b, new, n, _INFINITE), steps), new)
                 steps = b.fadd(steps, shifted(b, steps, n, _ZERO))
                 n *= 2
-            new = least(b, b.fadd(_splat(b, before), steps), new)
+            new = least(b, b.fadd(splat(b, before, _FLOATS), steps), new)
             with b.if_then(_any(b, b.fcmp_ordered("<", new, old))):
-                b.store(new, _group(b, costs, at, _FLOATS), align=4)
-            return b.extract_element(new, ir.Constant(_INT32, LANES - 1 if upward else 0))
+                b.store(new, pointer(b, costs, at, _FLOATS), align=4)
+            return b.extract_element(new, ir.Constant(INT32, LANES - 1 if upward else 0))
 
         cost = types.float32
         return cost(costs, passable, clearance, types.intp, cost, cost, cost), emit

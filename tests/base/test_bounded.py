@@ -186,3 +186,46 @@ def test_a_glance_is_enough_for_annotations_and_deep_is_beyond_it(project):
     for depth in range(MAX_DEPTH - 2, MAX_DEPTH + 3):
         for text in ("[" * depth + "]" * depth, '{"a":' * (depth - 1) + "{}" + "}" * (depth - 1)):
             assert depth <= MAX_DEPTH or not safe_parse._harmless(text)
+
+
+FRAGMENTS = (
+    "a = 1\n", "b.c = ", "[t]\n", "[[t]]\n", "[" * 40, "]" * 40, "{", "}", '"', "'", '"""', "'''", "\\", "\\\n", "#",
+    "1" * 999, "_1" * 500, "0x", "f" * 999, ".x" * 40, '"a".', "\n", " = ", ",", "x", '["]"]', "nan", "\0",
+)  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(FRAGMENTS), max_size=12).map("".join))
+def test_a_glance_at_toml_passes_nothing_that_the_scan_refuses(text):
+    if safe_parse._plain_toml(text):
+        safe_parse._scan(text, safe_parse._TOML_TOKEN)
+
+
+ATOMS = st.sampled_from(
+    [
+        0,
+        1.5,
+        True,
+        "x",
+        "é",
+        "\0",
+        "\ud800",
+        "y" * 30,
+        2**63,
+        -(2**63),
+        -(2**63) - 1,
+        float("nan"),
+        float("inf"),
+        None,
+    ]
+)
+
+
+@given(
+    st.recursive(ATOMS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner)),
+    st.integers(0, 70),
+)
+def test_a_glance_at_a_value_passes_nothing_that_the_search_finds(value, depth):
+    for _ in range(depth):
+        value = [value]
+    if safe_parse._sound(value, True, 20):
+        assert safe_parse.find_violation(value, longest=20) is None
