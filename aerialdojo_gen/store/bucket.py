@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
@@ -196,28 +196,22 @@ class Bucket:
         with self._location(prefix):
             yield from self._client.get_paginator(request).paginate(Bucket=self.name, **parameters)
 
-    def _location(self, key: str) -> _Location:
-        return _Location(f"s3://{self.name}/{key}", self.endpoint)
+    @contextmanager
+    def _location(self, key: str) -> Iterator[None]:
+        """Turn what the client raises into one line, FileNotFoundError or `Changed`."""
+        url = f"s3://{self.name}/{key}"
+        try:
+            yield
+        except (StoreError, FileNotFoundError, Changed, _UploadGone):
+            raise
+        except Exception as error:
+            if (translated := cloud_error(error, url, self.endpoint)) is not None:
+                raise translated from error
+            raise
 
 
 class _UploadGone(Exception):  # noqa: N818 - it says what happened
     pass
-
-
-class _Location:
-    """Turns what the client raises into one line, FileNotFoundError or `Changed`."""
-
-    def __init__(self, url: str, endpoint: str) -> None:
-        self._url, self._endpoint = url, endpoint
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: Any) -> None:
-        if isinstance(error, Exception) and not isinstance(error, StoreError | FileNotFoundError | Changed):
-            translated = cloud_error(error, self._url, self._endpoint)
-            if translated is not None:
-                raise translated from error
 
 
 def _age_s(answer: Mapping[str, Any]) -> float:

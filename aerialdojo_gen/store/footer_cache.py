@@ -15,7 +15,6 @@ import json
 import os
 from collections.abc import Iterator
 from contextvars import ContextVar
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +51,13 @@ class FooterCache:
             return None
         self._used.add(name)
         fields = entry["facts"]
-        return ShardInfo(
-            **fields | {"files": {file: ShardFile(**file_fields) for file, file_fields in fields["files"].items()}}
-        )
+        return ShardInfo(**fields | {"files": {file: ShardFile(*pair) for file, pair in fields["files"].items()}})
 
     def record(self, root: DataRoot, name: str, version: str, read_ns: int, info: ShardInfo) -> None:
         """Keep what the footer of a shard says; `read_ns` is when its version was read."""
         if root == self._root and read_ns - changed_ns(version) > _TIME_RESOLUTION_NS:
             self._used.add(name)
-            self._entries[name] = {"version": version, "facts": asdict(info)}
+            self._entries[name] = {"version": version, "facts": vars(info)}
             self._changed = True
 
     def save(self) -> None:

@@ -19,7 +19,7 @@ SCENE = "U_Test_0"
 INFO = ShardInfo(
     "f" * 64, "c" * 64, {"scene": "0" * 32, "x_m": "1" * 32}, 3, 2,
     {"rows_in": 3, "rows_out": 2, "counts": {"no_path": 1}},
-    {"meshes/a.glb": ShardFile(7, "a" * 64), "b": ShardFile(8)},
+    {"meshes/a.glb": ShardFile(7, "a" * 64), "b": ShardFile(8, "")},
 )  # fmt: skip
 DIGITS = b'{"rows": ' + b"9" * 5000 + b"}"
 NESTED = b"[" * 100_000
@@ -92,7 +92,7 @@ def test_a_footer_of_an_earlier_version_is_read():
     facts = json.loads(encode(INFO))
     facts = {key: facts[key] for key in facts if key not in ("checksum", "columns")} | {"files": {"b": 8}}
     read = decode(json.dumps(facts).encode())
-    assert (read.fingerprint, read.files, read.columns) == (INFO.fingerprint, {"b": ShardFile(8)}, {})
+    assert (read.fingerprint, read.files, read.columns) == (INFO.fingerprint, {"b": ShardFile(8, "")}, {})
     for damaged in flips(json.dumps(facts).encode()):
         try:
             assert isinstance(decode(damaged), ShardInfo)
