@@ -24,11 +24,12 @@ import hashlib
 import io
 import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from fnmatch import translate
+from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.store.bucket import Bucket, Entry
@@ -41,6 +42,7 @@ from aerialdojo_gen.store.root import DataRoot, inside
 
 LOCK = ".aerialdojo-lock.json"
 _DIGEST = "sha256"
+_T = TypeVar("_T")
 # Readers of what somebody replaces ask again so often.
 _TRIES = 5
 
@@ -79,41 +81,38 @@ class ObjectRoot(DataRoot):
 
     def local_copy(self, relative: str) -> Path:
         """Return a copy in the cache (`aerialdojo_gen.store.cache`)."""
+        return self._of_one_version(relative, self._copied)
+
+    def _of_one_version(self, relative: str, read: Callable[[str], _T]) -> _T:
+        """Read a file or folder, anew where it was replaced meanwhile."""
         for _ in range(_TRIES):
             try:
-                return self._copied(relative)
+                return read(relative)
             except Changed:
                 self._state.forget()
         raise StoreError(f"{self.at(relative)} is being replaced repeatedly: run the command again")
 
     def _copied(self, relative: str) -> Path:
-        files = self._files(relative)
-        state = self._state
-        name = PurePosixPath(relative).name
-        if files.keys() == {""}:
-            key, entry = files[""]
-            while True:
-                path = state.cache.make(self._item(files), lambda f: self._download(key, entry, f / name)) / name
-                if path.stat().st_size == entry.size:
-                    return path
-                path.unlink()  # a copy that a power failure cut off
-                path.parent.rmdir()
+        files, name = self._files(relative), PurePosixPath(relative).name
 
         def fill(folder: Path) -> None:
             for inner, (key, entry) in files.items():
-                (folder / name / inner).parent.mkdir(parents=True, exist_ok=True)
-                self._download(key, entry, folder / name / inner)
+                path = folder / name / inner
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("wb") as file:
+                    self._state.bucket.download(key, file, entry)
 
-        return state.cache.make(self._item(files), fill) / name
+        while True:
+            path: Path = self._state.cache.make(self._item(files), fill) / name
+            if files.keys() != {""} or path.stat().st_size == files[""][1].size:
+                return path
+            path.unlink()  # a copy that a power failure cut off
+            path.parent.rmdir()
 
     def _item(self, files: dict[str, tuple[str, Entry]]) -> str:
         named = [self._state.bucket.endpoint, self._name]
         named += [f"{inner}\0{key}\0{entry.etag}\0{entry.size}" for inner, (key, entry) in sorted(files.items())]
         return hashlib.sha256("\n".join(named).encode("utf-8", "surrogateescape")).hexdigest()
-
-    def _download(self, key: str, entry: Entry, path: Path) -> None:
-        with path.open("wb") as file:
-            self._state.bucket.download(key, file, entry)
 
     def size(self, relative: str) -> int:
         """Bytes of an object, or of those under a prefix."""
@@ -121,14 +120,9 @@ class ObjectRoot(DataRoot):
 
     def digest(self, relative: str, *, reread: bool = False) -> str:
         """SHA-256 of a file's bytes: what was said when it was put, or read from the store."""
-        for _ in range(_TRIES):
-            try:
-                return self._digest(relative, reread)
-            except Changed:
-                self._state.forget()
-        raise StoreError(f"{self.at(relative)} is being replaced repeatedly: run the command again")
+        return self._of_one_version(relative, partial(self._digest, reread=reread))
 
-    def _digest(self, relative: str, reread: bool) -> str:
+    def _digest(self, relative: str, *, reread: bool) -> str:
         files, state = self._files(relative), self._state
         if not reread and files.keys() == {""}:
             key, entry = files[""]
@@ -147,18 +141,12 @@ class ObjectRoot(DataRoot):
 
     def version(self, relative: str) -> str:
         """Return the object's tag."""
-        files = self._files(relative)
-        if files.keys() != {""}:
-            raise FileNotFoundError(2, "is a folder", self.at(relative))
-        return files[""][1].etag
+        return self._file(relative)[1].etag
 
     def open(self, relative: str) -> BinaryIO:
         """Read ranges of the object; what is open stays the same version, or fails."""
-        files = self._files(relative)
-        if files.keys() != {""}:
-            raise FileNotFoundError(2, "is a folder", self.at(relative))
-        key, entry = files[""]
-        if (folder := self._state.cache.find(self._item(files))) is not None:
+        key, entry = self._file(relative)
+        if (folder := self._state.cache.find(self._item({"": (key, entry)}))) is not None:
             return (folder / PurePosixPath(relative).name).open("rb")
         return io.BufferedReader(_Ranges(self._state.bucket, key, entry, self.at(relative)), 1 << 16)
 
@@ -258,6 +246,13 @@ class ObjectRoot(DataRoot):
         parts = PurePosixPath(relative).parts
         depth = 1 if not parts or parts[0] != "media" else 2 if self._epoch else 3
         return self._key("".join(f"{part}/" for part in parts[:depth]))
+
+    def _file(self, relative: str) -> tuple[str, Entry]:
+        """Find a file: its key and entry."""
+        files = self._files(relative)
+        if files.keys() != {""}:
+            raise FileNotFoundError(2, "is a folder", self.at(relative))
+        return files[""]
 
     def _files(self, relative: str) -> dict[str, tuple[str, Entry]]:
         """Find a file (under the name ``""``), or all files of a folder: keys and entries, by their names in it."""
