@@ -7,8 +7,8 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from typing import Any, TextIO
 
@@ -85,23 +85,37 @@ class _Lines:
         print(self._line(), file=self._stream, flush=True)
 
 
-class Bar:
-    """Counts finished shards, or items of another `unit`."""
+class _Shown:
+    """What is shown of progress: a bar of tqdm's on a terminal, else lines."""
+
+    def __init__(self, kind: type[tqdm], total: float, stream: TextIO, nothing: bool, **bar: Any) -> None:
+        self._lines = None if nothing or stream.isatty() else _Lines(self._line, stream)
+        disable = nothing or self._lines is not None
+        self._tqdm = kind(total=total, file=stream, leave=False, disable=disable, **bar)
+
+    def _line(self) -> str:
+        raise NotImplementedError
+
+    def advance(self, n: int = 1, frames: int = 0) -> None:
+        """Count `n` more items and their video frames."""
+
+    def refresh(self) -> None:
+        """Show the current progress."""
+
+    def close(self) -> None:
+        """Remove the bar."""
+        self._tqdm.close()
+        if self._lines:
+            self._lines.close()
+
+
+class Bar(_Shown):
+    """Counts finished shards, or items of another `unit`; only `advance` changes it."""
 
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
-        label = shown(label)
-        self._label, self._total, self._unit = label, total, unit
-        self._frames = 0
-        self._done, self._rate, self._frame_rate = 0, Rate(), Rate()
-        self._lines = _Lines(self._line, stream) if total and not quiet and not stream.isatty() else None
-        self._tqdm = _Tqdm(
-            total=total,
-            desc=label,
-            unit=f" {unit}",
-            file=stream,
-            leave=False,
-            disable=quiet or self._lines is not None or not total,
-        )
+        self._label, self._total, self._unit = shown(label), total, unit
+        self._done, self._frames, self._rate, self._frame_rate = 0, 0, Rate(), Rate()
+        super().__init__(_Tqdm, total, stream, quiet or not total, desc=self._label, unit=f" {unit}")
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
         """Count `n` more items and their video frames."""
@@ -124,15 +138,6 @@ class Bar:
         parts += [f"{frames_per_s:.1f} frames/s"] if frames_per_s else []
         parts += [f"ETA {(self._total - self._done) / per_s:.0f} s"] if per_s else []
         return ", ".join(parts)
-
-    def refresh(self) -> None:
-        """Do nothing: only `advance` changes the bar."""
-
-    def close(self) -> None:
-        """Remove the bar."""
-        self._tqdm.close()
-        if self._lines:
-            self._lines.close()
 
 
 @dataclass(frozen=True)
@@ -168,16 +173,14 @@ class Overview:
         return text
 
 
-class Overall:
-    """Shows the progress of a run through several stages."""
+class Overall(_Shown):
+    """Shows the progress of a run through several stages, when a shard starts."""
 
     def __init__(self, get_overview: Callable[[], Overview], stream: TextIO, quiet: bool) -> None:
         self._get_overview, self._stream = get_overview, stream
         overview = get_overview()
-        nothing = quiet or overview.scenes_done == overview.scenes
-        self._lines = None if nothing or stream.isatty() else _Lines(self._line, stream)
-        self._tqdm = tqdm(
-            total=1.0, file=stream, leave=False, disable=nothing or self._lines is not None, dynamic_ncols=True,
+        super().__init__(
+            tqdm, 1.0, stream, quiet or overview.scenes_done == overview.scenes, dynamic_ncols=True,
             bar_format=f"{{percentage:3.0f}}%|{{bar:{_BAR}}}| {{desc}}", mininterval=0.0,
         )  # fmt: skip
 
@@ -193,15 +196,6 @@ class Overall:
     def _line(self) -> str:
         overview = self._get_overview()
         return f"{100 * overview.share:.0f} %, {overview}"
-
-    def advance(self, frames: int = 0) -> None:
-        """Do nothing: progress is shown when the next shard starts."""
-
-    def close(self) -> None:
-        """Remove the bar."""
-        self._tqdm.close()
-        if self._lines:
-            self._lines.close()
 
 
 def columns(stream: TextIO) -> int:
@@ -245,20 +239,10 @@ class Reporter:
             tqdm.write(text, file=self._stream)
             self._stream.flush()
 
-    @contextmanager
-    def bar(self, label: str, total: int, unit: str = "shards") -> Iterator[Bar]:
+    def bar(self, label: str, total: int, unit: str = "shards") -> AbstractContextManager[Bar]:
         """Show progress over `total` shards, or items of another unit, during the block."""
-        bar = Bar(label, total, self._stream, self._quiet, unit)
-        try:
-            yield bar
-        finally:
-            bar.close()
+        return closing(Bar(label, total, self._stream, self._quiet, unit))
 
-    @contextmanager
-    def overall(self, get_overview: Callable[[], Overview]) -> Iterator[Overall]:
+    def overall(self, get_overview: Callable[[], Overview]) -> AbstractContextManager[Overall]:
         """Show the progress that `get_overview` returns, during the block."""
-        shown = Overall(get_overview, self._stream, self._quiet)
-        try:
-            yield shown
-        finally:
-            shown.close()
+        return closing(Overall(get_overview, self._stream, self._quiet))
