@@ -13,7 +13,7 @@ from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.pipeline.code_digest import stage_code
-from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
+from aerialdojo_gen.pipeline.stage import SOURCE_FOLDERS, ProjectPaths, Stage
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import file_digest
 
@@ -48,7 +48,7 @@ def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, sce
 @lru_cache(maxsize=4096)
 def _short(path: Path, roots: ProjectPaths) -> str:
     """Return a file's path relative to its source folder: the same in every checkout and in a wheel."""
-    for name in ("recipes", "scene_assets", "annotations"):
+    for name in SOURCE_FOLDERS:
         folder = getattr(roots, name)
         if path.is_relative_to(folder):
             return f"{name}/{path.relative_to(folder).as_posix()}"

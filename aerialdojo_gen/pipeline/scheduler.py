@@ -16,7 +16,7 @@ from aerialdojo_gen.pipeline.freshness import ShardFinder, Shards
 from aerialdojo_gen.pipeline.progress import Overview, Reporter
 from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
 from aerialdojo_gen.pipeline.stage import Stage
-from aerialdojo_gen.pipeline.summary import StageSummary, StageTotals
+from aerialdojo_gen.pipeline.summary import StageSummary
 from aerialdojo_gen.pipeline.task import Computed, Task
 from aerialdojo_gen.store.root import DataRoot
 
@@ -39,7 +39,8 @@ class SceneScheduler(TaskQueue[Task]):
         super().__init__((), lambda task: task.scene)
         self._stages, self._names, self._data = stages, list(scenes), data
         self._finder, self._reporter, self._estimate = finder, reporter, estimate
-        self._totals = [StageTotals() for _ in stages]
+        self._totals = [StageSummary(stage.name) for stage in stages]
+        self._tasks = Counter[int]()
         # How many stages a scene has behind it, and how many shards of its next one are there, and not done.
         self._passed = dict.fromkeys(scenes, 0)
         self._shards, self._left = Counter[str](), Counter[str]()
@@ -100,7 +101,7 @@ class SceneScheduler(TaskQueue[Task]):
     def on_done(self, task: Task, outcome: Computed | AerialDojoError) -> None:
         """Record a task's result; the last task of a scene's stage queues those of the next stage."""
         scene, number = task.scene, self._passed[task.scene]
-        totals, name = self._totals[number], self._stages[number].name
+        totals = self._totals[number]
         del self._running[scene, task.job.part]
         self._left[scene] -= 1
         if isinstance(outcome, BudgetSpent):
@@ -108,10 +109,10 @@ class SceneScheduler(TaskQueue[Task]):
         elif isinstance(outcome, AerialDojoError):
             self._fail(number, scene, outcome)
         else:
-            totals.summaries.append(outcome.summary)
+            totals.add(outcome.summary)
             totals.computed += 1
             totals.seconds += outcome.seconds
-            self._estimate.record(name, scene, 1.0 / self._shards[scene], outcome.seconds)
+            self._estimate.record(totals.stage, scene, 1.0 / self._shards[scene], outcome.seconds)
         if self._left[scene] or scene in self._ended:
             return
         self._passed[scene] += 1
@@ -139,8 +140,9 @@ class SceneScheduler(TaskQueue[Task]):
             found = self._finder.find(stage, scenes)
         except AerialDojoError as error:
             found = Shards([], [], dict.fromkeys(scenes, error))
-        totals.summaries += found.fresh
-        totals.tasks += len(found.tasks)
+        for summary in found.fresh:
+            totals.add(summary)
+        self._tasks[number] += len(found.tasks)
         totals.seconds += time.monotonic() - started
         self._add(found.tasks)
         for scene, why in found.errors.items():
@@ -180,11 +182,11 @@ class SceneScheduler(TaskQueue[Task]):
         return seconds >= _JOIN_S
 
     def _summary(self, number: int) -> StageSummary:
-        stage, totals = self._stages[number], self._totals[number]
-        if totals.computed < totals.tasks:
-            left = f"{totals.tasks - totals.computed:,} of {totals.tasks:,} shards are left"
-            self._reporter.line(f"{stage.name}: the budget is spent, {left}; the same command continues from here")
-        return totals.summary(stage.name)
+        totals, tasks = self._totals[number], self._tasks[number]
+        if totals.computed < tasks:
+            left = f"{tasks - totals.computed:,} of {tasks:,} shards are left"
+            self._reporter.line(f"{totals.stage}: the budget is spent, {left}; the same command continues from here")
+        return totals
 
 
 def _part(task: Task) -> str:

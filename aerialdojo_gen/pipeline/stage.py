@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from aerialdojo_gen.scenes.model import Scene
 
 
+# Those of `ProjectPaths` that stages only read; the recipes may lie in the assets, and are looked at first.
+SOURCE_FOLDERS = ("recipes", "scene_assets", "annotations")
+
+
 @dataclass(frozen=True)
 class ProjectPaths:
     """The folders of a run."""

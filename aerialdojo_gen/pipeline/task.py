@@ -13,7 +13,7 @@ from aerialdojo_gen.base.config.shared import Section
 from aerialdojo_gen.base.environment_errors import environment_error
 from aerialdojo_gen.base.errors import AerialDojoError, BudgetSpent
 from aerialdojo_gen.pipeline.registry import BY_NAME
-from aerialdojo_gen.pipeline.stage import Job
+from aerialdojo_gen.pipeline.stage import SOURCE_FOLDERS, Job
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import ShardFile
 
@@ -41,12 +41,7 @@ class Task:
     def moved(self, place: Callable[[Path], Path]) -> Task:
         """Return the same task for a machine with other source folders."""
         roots = self.job.roots
-        paths = replace(
-            roots,
-            scene_assets=place(roots.scene_assets),
-            recipes=place(roots.recipes),
-            annotations=place(roots.annotations),
-        )
+        paths = replace(roots, **{name: place(getattr(roots, name)) for name in SOURCE_FOLDERS})
         return replace(self, job=replace(self.job, roots=paths))
 
 
