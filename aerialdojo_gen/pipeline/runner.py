@@ -131,7 +131,7 @@ def _run_group(
         else reporter.overall(scheduler.overview) as bar
     ):
         scheduler.on_start(bar.refresh)
-        for outcome in pool.run(compute, scheduler, memory_mb=scheduler.memory_mb):
+        for outcome in pool.run(compute, scheduler):
             interrupts.check()
             report()
             if isinstance(outcome, Computed):

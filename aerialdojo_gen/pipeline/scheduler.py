@@ -36,7 +36,7 @@ class SceneScheduler(TaskQueue[Task]):
         reporter: Reporter,
         estimate: RuntimeEstimate,
     ) -> None:
-        super().__init__((), lambda task: task.scene)
+        super().__init__((), lambda task: task.scene, memory_mb=max(stage.memory_mb for stage in stages))
         self._stages, self._names, self._data = stages, list(scenes), data
         self._finder, self._reporter, self._estimate = finder, reporter, estimate
         self._totals = [StageSummary(stage.name) for stage in stages]
@@ -61,11 +61,6 @@ class SceneScheduler(TaskQueue[Task]):
         passed = {scene: passed for scene, passed in self._passed.items() if scene not in self._ended}
         in_parts = any(stage.in_parts for stage in self._stages[min(passed.values(), default=0) :])
         return len(self) <= 1 and len(passed) <= 1 and not (passed and in_parts)
-
-    @property
-    def memory_mb(self) -> int:
-        """Peak memory of a process that runs all stages."""
-        return max(stage.memory_mb for stage in self._stages)
 
     @property
     def errors(self) -> list[AerialDojoError]:

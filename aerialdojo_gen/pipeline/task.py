@@ -41,8 +41,8 @@ class Task:
     def moved(self, place: Callable[[Path], Path]) -> Task:
         """Return the same task for a machine with other source folders."""
         roots = self.job.roots
-        paths = replace(roots, **{name: place(getattr(roots, name)) for name in SOURCE_FOLDERS})
-        return replace(self, job=replace(self.job, roots=paths))
+        moved: dict[str, Any] = {name: place(getattr(roots, name)) for name in SOURCE_FOLDERS}
+        return replace(self, job=replace(self.job, roots=replace(roots, **moved)))
 
 
 @dataclass(frozen=True)

@@ -33,27 +33,6 @@ from aerialdojo_gen.store.layout import (
 )
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
-__all__ = [
-    "LAYOUT",
-    "META",
-    "Place",
-    "cache_footers",
-    "check_run_name",
-    "check_scene_name",
-    "content",
-    "count_rows",
-    "partition",
-    "prune",
-    "read_info",
-    "read_scene",
-    "read_stored",
-    "shard_folder",
-    "shard_name",
-    "shard_path",
-    "shards",
-    "write_shard",
-]  # fmt: skip
-
 META = b"aerialdojo"
 
 

@@ -92,17 +92,10 @@ class Executor(ABC):
         memory_mb: int = 0,
     ) -> Iterator[R | AerialDojoError]:
         """Run tasks that are known from the start: `run` of a `TaskQueue`."""
-        return self.run(work, TaskQueue(tasks, scene_of), channel=channel, memory_mb=memory_mb)
+        return self.run(work, TaskQueue(tasks, scene_of, channel, memory_mb))
 
     @abstractmethod
-    def run(
-        self,
-        work: Callable[..., R],
-        waiting: TaskQueue[T],
-        *,
-        channel: ParentChannel | None = None,
-        memory_mb: int = 0,
-    ) -> Iterator[R | AerialDojoError]:
+    def run(self, work: Callable[..., R], waiting: TaskQueue[T]) -> Iterator[R | AerialDojoError]:
         """Run tasks and yield results or expected errors in completion order."""
 
     @abstractmethod
@@ -140,9 +133,16 @@ def make_executor(
 
 
 class TaskQueue(Generic[T]):
-    """Tasks not started yet, by scene."""
+    """Tasks not started yet, by scene, with what all of them need."""
 
-    def __init__(self, tasks: Sequence[T], scene_of: Callable[[T], str] | None) -> None:
+    def __init__(
+        self,
+        tasks: Sequence[T],
+        scene_of: Callable[[T], str] | None,
+        channel: ParentChannel | None = None,
+        memory_mb: int = 0,
+    ) -> None:
+        self.channel, self.memory_mb = channel, memory_mb  # Of each process: megabytes that it takes at most
         self._scene_of = scene_of or (lambda _: "")
         self._scenes: dict[str, deque[T]] = {}
         self._add(tasks)

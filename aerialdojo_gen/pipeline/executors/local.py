@@ -20,7 +20,7 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.pipeline.executors.base import Executor, ParentChannel, R, T, TaskQueue, guarded
+from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, guarded
 from aerialdojo_gen.pipeline.executors.channels import InProcessChannel, RateLimiter, end
 
 # How often the parent checks whether workers must stop, seconds.
@@ -79,15 +79,9 @@ class LocalExecutor(Executor):
                 lane.process.join(_STOP_TIMEOUT_S)
         end()
 
-    def run(
-        self,
-        work: Callable[..., R],
-        waiting: TaskQueue[T],
-        *,
-        channel: ParentChannel | None = None,
-        memory_mb: int = 0,
-    ) -> Iterator[R | AerialDojoError]:
+    def run(self, work: Callable[..., R], waiting: TaskQueue[T]) -> Iterator[R | AerialDojoError]:
         """Run tasks and yield results or expected errors in completion order."""
+        channel = waiting.channel
         if self._workers <= 1 or waiting.alone:
             in_process = InProcessChannel(channel.on_message, channel.stopped) if channel else None
             for task in waiting.one_by_one():

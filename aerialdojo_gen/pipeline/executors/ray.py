@@ -86,20 +86,13 @@ class RayExecutor(Executor):
             return max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         return self._requested
 
-    def run(
-        self,
-        work: Callable[..., R],
-        waiting: TaskQueue[T],
-        *,
-        channel: ParentChannel | None = None,
-        memory_mb: int = 0,
-    ) -> Iterator[R | AerialDojoError]:
+    def run(self, work: Callable[..., R], waiting: TaskQueue[T]) -> Iterator[R | AerialDojoError]:
         """Run tasks and yield results or expected errors in completion order."""
         if not waiting:
             return
         self._connect()
-        self._require(memory_mb)
-        running = dict[Any, tuple[_Lane, T]]()
+        self._require(waiting.memory_mb)
+        channel, running = waiting.channel, dict[Any, tuple[_Lane, T]]()
         tries: Counter[int] = Counter()
         begun_s = time.monotonic()
         while True:

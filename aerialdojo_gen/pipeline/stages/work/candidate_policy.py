@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -72,54 +72,29 @@ class Candidates:
         )
 
 
-class CandidatePolicy(Protocol):
-    """Selects the candidates of a scene."""
+class CandidatePolicy:
+    """Selects the candidates of a scene; this one searches every candidate, and releases every kept one."""
 
-    compares: bool  # Whether it compares all candidates of a scene by predicted lengths, and so needs them at once
+    compares = False  # Whether it compares all candidates of a scene by predicted lengths, and so needs them at once
 
     def initial_batch(self, candidates: Candidates) -> Integers:
         """Rows to search first, (m,) int64, ascending."""
-
-    def next_batch(self, routes: Sequence[Route | None]) -> Integers:
-        """Rows to search next, (m,) int64, ascending; empty if enough are kept. `routes` has a row a candidate."""
-
-    def enough(self, kept: Accepted) -> bool:
-        """Whether what is released can be drawn from these."""
-
-    def release(self, kept: Accepted) -> NDArray[np.bool_]:
-        """Draw what is released, (n,) bool."""
-
-    def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
-        """Training tasks per setting of the released tasks, of which this fraction trains unless a quota says it."""
-
-
-class AllCandidates:
-    """Searches every candidate, and releases every kept one."""
-
-    compares = False
-
-    def initial_batch(self, candidates: Candidates) -> Integers:
-        """All rows."""
         return np.arange(len(candidates.sampling_keys))
 
     def next_batch(self, routes: Sequence[Route | None]) -> Integers:
-        """None: all were in the first batch."""
+        """Rows to search next, (m,) int64, ascending; empty if enough are kept. `routes` has a row a candidate."""
         return np.empty(0, np.int64)
 
-    def enough(self, kept: Accepted) -> bool:
-        """Whatever there is."""
-        return True
-
     def release(self, kept: Accepted) -> NDArray[np.bool_]:
-        """Release all."""
+        """Draw what is released, (n,) bool."""
         return np.ones(len(kept.settings), dtype=bool)
 
     def train_counts(self, settings: Sequence[str], fraction: float) -> dict[str, int]:
-        """Take the same share of each setting."""
+        """Training tasks per setting of the released tasks, of which this fraction trains unless a quota says it."""
         return train_counts(settings, fraction)
 
 
-class PaperQuota:
+class PaperQuota(CandidatePolicy):
     """Searches and releases as many candidates of a scene as the paper has, as near as possible to its metres."""
 
     compares = True
@@ -156,7 +131,7 @@ class PaperQuota:
         rows = done[kept]
         levels = difficulty_level(self._detour(rows, lengths[kept]), self._candidates.visible[rows])
         kept_rows = self._accepted(rows, setting[kept], lengths[kept], levels)
-        while not self.enough(kept_rows):
+        while not self._enough(kept_rows):
             self._margin = max(2.0 * self._margin, 0.1)
             rows = self._within_margin()
             if len(rows):
@@ -207,7 +182,7 @@ class PaperQuota:
             [self._candidates.sampling_keys[k] for k in rows.tolist()], setting.tolist(), length_m, levels
         )
 
-    def enough(self, kept: Accepted) -> bool:
+    def _enough(self, kept: Accepted) -> bool:
         """Whether the paper's counts and total length can be selected from these."""
         setting = np.asarray(kept.settings)
         for name, n in self._paper_scene.tasks.items():
@@ -230,4 +205,4 @@ class PaperQuota:
 def policy_of(scene: str, quota: QuotaConfig | None, seed: int) -> CandidatePolicy:
     """Make a scene's policy: by the paper's counts if there is a quota and the paper has the scene."""
     paper_scene = inventory().get(scene) if quota else None
-    return AllCandidates() if quota is None or paper_scene is None else PaperQuota(paper_scene, quota, seed)
+    return CandidatePolicy() if quota is None or paper_scene is None else PaperQuota(paper_scene, quota, seed)
