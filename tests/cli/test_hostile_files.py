@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from fuzzing.mutate import Raw, toml_dumped
+from fuzzing.tables import recording_row
 from shapely.geometry import Polygon
 from support import rendered
 from support.command_line import said
@@ -179,12 +180,8 @@ def test_a_prop_s_counts_are_bounded_before_anything_is_made_of_them(tmp_path, p
 
 
 FINGERPRINT = "f" * 64
-ROW = {
-    "scene": "U_A_0", "nav_id": "n", "view": "front", "modality": "rgb", "path": "media/U_A_0/n/front_rgb.mp4",
-    "stream": 0, "left_px": 0, "top_px": 0, "depth_step": None,
-    "sampling": "steps", "n_frames": 1, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0, "codec": "h264",
-    "renderer": "gl", "device": "x", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": [],
-}  # fmt: skip
+FOLDER = "media/U_A_0/n"
+ROW = recording_row(FOLDER)
 
 
 @pytest.mark.parametrize(
@@ -201,17 +198,17 @@ ROW = {
     ],
 )  # fmt: skip
 def test_a_recording_json_of_other_types_is_rendered_again(tmp_path, rows):
-    folder = tmp_path / "media" / "U_A_0" / "n"
+    folder = tmp_path / FOLDER
     folder.mkdir(parents=True)
     (folder / "front_rgb.mp4").write_bytes(b"xxxx")
     note = folder / "recording.json"
     note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": [ROW]}))
-    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) == [ROW]
+    assert finished.find(open_root(tmp_path), FOLDER, FINGERPRINT) == [ROW]
     note.write_text(json.dumps({"fingerprint": FINGERPRINT, "recordings": rows}))
-    assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
+    assert finished.find(open_root(tmp_path), FOLDER, FINGERPRINT) is None
     for text in ("[" * 50_000, "[]", '"x"', "1" * 5000, '{"fingerprint": NaN}'):
         note.write_text(text)
-        assert finished.find(open_root(tmp_path), "media/U_A_0/n", FINGERPRINT) is None
+        assert finished.find(open_root(tmp_path), FOLDER, FINGERPRINT) is None
 
 
 def test_a_recording_is_read_by_its_path_as_text(tmp_path):

@@ -84,10 +84,6 @@ def _pipelines() -> list[Case]:
     return [{"p.toml": toml_dumped(whole).encode()}, *({"p.toml": p.read_bytes()} for p in paths)]
 
 
-def _read_pipeline(folder: Path) -> None:
-    load_pipeline(folder / "p.toml").model_dump_json()
-
-
 _COURT = {
     "plan": 1, "seed": 5, "size_m": [36.0, 36.0], "ceiling_m": 15.0, "sky": "#96bee6", "sun": [0.4, -0.3, 0.8],
     "palette": {"wall": "brick", "path": "paving"}, "inventory": {"bench": 1}, "floor_m": {"eaves": 4.0},
@@ -101,13 +97,9 @@ _COURT = {
 }  # fmt: skip
 
 
-def _recipes() -> list[Case]:
-    return [{"scenes/U_Court_0.toml": toml_dumped(_COURT).encode()}]
-
-
 def _build(folder: Path) -> None:
-    scene = build_scene(folder / "scenes" / "U_Court_0.toml", load_catalogue(ASSETS))
-    write_glb(scene, folder / "scenes" / "U_Court_0.glb")
+    (path,) = folder.rglob("*.toml")
+    write_glb(build_scene(path, load_catalogue(ASSETS)), path.with_suffix(".glb"))
 
 
 def _imported_recipes() -> list[Case]:
@@ -117,20 +109,6 @@ def _imported_recipes() -> list[Case]:
         "cuts": [{"node": "box_000", "category": "box", "low_m": [4.5, 0.5, 0.5], "high_m": [6.5, 2.5, 2.5]}],
     }}  # fmt: skip
     return [{"U_Court_0.toml": toml_dumped(recipe).encode(), "U_Court_0.glb": court_glb()}]
-
-
-def _build_imported(folder: Path) -> None:
-    scene = build_scene(folder / "U_Court_0.toml", load_catalogue(ASSETS))
-    write_glb(scene, folder / "built.glb")
-
-
-def _plans() -> list[Case]:
-    return [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()]
-
-
-def _build_plan(folder: Path) -> None:
-    (path,) = (folder / "scenes").iterdir()
-    build_scene(path, load_catalogue(ASSETS))
 
 
 def _props() -> list[Case]:
@@ -171,10 +149,14 @@ def _materials() -> list[Case]:
 
 TARGETS = {
     "annotations": Target(_annotations, _read_annotations),
-    "pipeline": Target(_pipelines, _read_pipeline),
-    "recipe": Target(_recipes, _build),
-    "plan": Target(_plans, _build_plan, share=0.05),
-    "recipe-imported": Target(_imported_recipes, _build_imported, ".toml", names_the_file=False),
+    "pipeline": Target(_pipelines, lambda folder: load_pipeline(folder / "p.toml").model_dump_json()),
+    "recipe": Target(lambda: [{"scenes/U_Court_0.toml": toml_dumped(_COURT).encode()}], _build),
+    "plan": Target(
+        lambda: [{f"scenes/{name}.toml": toml_dumped(plan).encode()} for name, plan in PLANS.items()],
+        _build,
+        share=0.05,
+    ),
+    "recipe-imported": Target(_imported_recipes, _build, ".toml", names_the_file=False),
     "prop": Target(_props, _instantiate, "x.toml"),
     "materials": Target(_materials, _instantiate),
 }

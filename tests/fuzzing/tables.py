@@ -65,21 +65,19 @@ _FINGERPRINT = "f" * 64
 _NAV = f"media/{court.SCENE}/nav_a"
 
 
-def _recording_rows() -> list[dict]:
-    return [
-        {
-            "scene": court.SCENE, "nav_id": "nav_a", "view": "front", "modality": modality,
-            "path": f"{_NAV}/front_{modality}.{suffix}",
-            "sampling": "steps", "n_frames": 3, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0,
-            "codec": "h264",
-            "renderer": "gl", "device": "llvmpipe", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": ["dark"],
-        }
-        for modality, suffix in (("depth", "mkv"), ("rgb", "mp4"))
-    ]  # fmt: skip
+def recording_row(folder: str, modality: str = "rgb") -> dict:
+    """A row of `recordings` of a file of four bytes."""
+    suffix = {"rgb": "mp4", "depth": "mkv"}[modality]
+    return {
+        "scene": court.SCENE, "nav_id": "n", "view": "front", "modality": modality,
+        "path": f"{folder}/front_{modality}.{suffix}", "stream": 0, "left_px": 0, "top_px": 0, "depth_step": None,
+        "sampling": "steps", "n_frames": 1, "fps": 15.0, "width": 16, "height": 16, "fov_deg": 90.0, "codec": "h264",
+        "renderer": "gl", "device": "x", "bytes": 4, "sha256": "0" * 64, "ok": True, "flags": [],
+    }  # fmt: skip
 
 
 def _notes() -> list[Case]:
-    rows = _recording_rows()
+    rows = [recording_row(_NAV, modality) for modality in ("depth", "rgb")]
     note = json.dumps({"fingerprint": _FINGERPRINT, "recordings": rows}).encode()
     return [{f"{_NAV}/recording.json": note, **{row["path"]: b"xxxx" for row in rows}}]
 

@@ -11,9 +11,15 @@ from aerialdojo_gen.pipeline.stages.work.rules import judge
 CONFIG = FilterConfig()
 
 
-def verdict(outcome="SOLVED", euclidean=10.0, length=12.0, n_actions=20, config=CONFIG):
+def verdict(outcome="SOLVED", euclidean=10.0, length=12.0, n_actions=20, config=CONFIG, **figures):
+    told = {name: np.array([value]) for name, value in figures.items()}
     reason, setting = judge(
-        np.array([outcome]), np.array([euclidean]), np.array([length]), np.array([n_actions], np.int32), config
+        np.array([outcome]),
+        np.array([euclidean]),
+        np.array([length]),
+        np.array([n_actions], np.int32),
+        config,
+        **told,
     )
     return reason[0], setting[0]
 
@@ -69,17 +75,15 @@ HARD = FilterConfig(min_plan_detour=1.05, max_visible_at_start=0.1)
     ],
 )
 def test_rules_of_difficulty_at_their_boundaries(detour, visible, config, expected):
-    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
-    assert judge(*case, config, np.array([detour]), np.array([visible]))[0][0] == expected
+    told = {"config": config, "plan_detour": detour, "visible_at_start": visible}
+    assert verdict(**told) == (expected, "base")
     # The paper's own rules come first.
-    near = (case[0], case[1], np.array([10.1]), case[3])
-    assert judge(*near, config, np.array([detour]), np.array([visible]))[0][0] == "near_straight"
+    assert verdict(length=10.1, **told)[0] == "near_straight"
 
 
 def test_what_nobody_told_is_not_kept_where_it_is_asked_for():
-    case = (np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32))
-    assert judge(*case, HARD)[0][0] == "small_plan_detour"
-    assert judge(*case, CONFIG)[0][0] == "kept"
+    assert verdict(config=HARD)[0] == "small_plan_detour"
+    assert verdict()[0] == "kept"
 
 
 @given(

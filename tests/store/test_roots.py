@@ -37,17 +37,21 @@ def test_a_file_is_what_was_committed(root):
     assert root.local_copy("meshes/a.glb").name == "a.glb", "readers go by suffixes"
 
 
-def test_what_fails_leaves_the_old_one(root):
+def test_what_fails_leaves_the_old_one_and_what_is_made_is_not_there_before_it_is_whole(root, tmp_path):
     write(root, "meshes/a.glb", b"old")
     fill(root, "media/S/n", {"a": b"old"})
     version = root.version("meshes/a.glb")
     for commit in (root.commit("meshes/a.glb"), root.commit_folder("media/S/n")):
         path = commit.__enter__()
         (path / "b" if path.is_dir() else path).write_bytes(b"half")
+        assert read_folder(root, "media/S/n") == {"a": b"old"}
         assert not commit.__exit__(ZeroDivisionError, ZeroDivisionError(), None)
     assert root.local_copy("meshes/a.glb").read_bytes() == b"old"
     assert root.version("meshes/a.glb") == version
     assert read_folder(root, "media/S/n") == {"a": b"old"}
+    left = {p.relative_to(tmp_path / "data").as_posix() for p in (tmp_path / "data").rglob("*")}
+    whole = {"meshes", "meshes/a.glb", "media", "media/S", "media/S/n", "media/S/n/a"}
+    assert left == (whole if isinstance(root, LocalRoot) else set()), "nothing temporary"
 
 
 def test_a_folder_is_replaced_with_all_that_is_in_it(root):

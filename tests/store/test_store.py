@@ -16,7 +16,7 @@ from support.handmade import filled
 from aerialdojo_gen.base.errors import DamagedFile, StoreError
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.tables import content_digest, from_rows
 
 finite = st.floats(-1e6, 1e6)
@@ -201,19 +201,6 @@ def test_file_outputs_cannot_leave_the_folder(tmp_path, relative):
     assert [p.name for p in tmp_path.iterdir()] == ["data"]
 
 
-def test_an_error_while_writing_leaves_the_old_file_and_no_temporary(tmp_path):
-    (tmp_path / "f.bin").write_text("old")
-
-    def fail():
-        with atomic_file(tmp_path, "f.bin") as path:
-            path.write_text("half")
-            _ = 1 / 0
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
-    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"f.bin": "old"}
-
-
 # A process that may not write files beyond 4 kB stands for a full disk: the write fails half-way for real.
 NO_ROOM = """
 import resource, signal, sys
@@ -240,26 +227,6 @@ def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
     assert "cannot write" in out
     assert "would exceed the allowed size" in out
     assert not [p for p in data.rglob("*") if p.is_file()]
-
-
-def test_a_folder_is_replaced_when_the_new_one_is_whole_and_not_before(tmp_path):
-    folder = tmp_path / "f"
-    with atomic_folder(folder) as path:
-        (path / "a").write_text("old")
-
-    def fail():
-        with atomic_folder(folder) as path:
-            (path / "a").write_text("half")
-            _ = 1 / 0
-
-    with pytest.raises(ZeroDivisionError):
-        fail()
-    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/a"}
-    assert (folder / "a").read_text() == "old"
-    with atomic_folder(folder) as path:
-        (path / "b").write_text("new")
-        assert (folder / "a").read_text() == "old"
-    assert {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")} == {"f", "f/b"}
 
 
 def test_digest_sees_every_change_and_no_metadata():
