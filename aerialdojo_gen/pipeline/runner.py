@@ -19,7 +19,7 @@ from aerialdojo_gen.pipeline.freshness import ShardFinder, prefetch_digests
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.options import RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
-from aerialdojo_gen.pipeline.registry import STAGES, upstream
+from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES, upstream
 from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
 from aerialdojo_gen.pipeline.scheduler import SceneScheduler
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
@@ -180,10 +180,7 @@ def chosen_scenes(pipeline: Pipeline, roots: ProjectPaths, patterns: Sequence[st
 
 def stages_named(names: Sequence[str] | None) -> list[Stage]:
     """Return the stages of these names in pipeline order; all of them for None."""
-    if names is None:
-        return list(STAGES)
-    known = [stage.name for stage in STAGES]
-    for name in names:
-        if name not in known:
-            raise UsageError(unknown("no stage", name, known))
-    return [stage for stage in STAGES if stage.name in names]
+    for name in names or ():
+        if name not in BY_NAME:
+            raise UsageError(unknown("no stage", name, BY_NAME))
+    return [stage for stage in STAGES if names is None or stage.name in names]

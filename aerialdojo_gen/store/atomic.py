@@ -30,27 +30,29 @@ def atomic_file(data: Path, relative: str) -> Iterator[Path]:
         raise StoreError(f"cannot write {path}: {first_line(error)}") from None
     if not inside:
         raise StoreError(f"{relative!r} points outside the data directory {data}")
-    try:
-        _make_folders(path.parent)
-        with staged(_staging_root(data, path), path) as item:
-            temporary = item / f"new{path.suffix}"
-            yield temporary
-            _sync(temporary)
-            _place(temporary, path)
-    except OSError as error:
-        raise disk_error(error, path) from error
+    with _made(data, path, f"new{path.suffix}") as temporary:
+        yield temporary
 
 
 @contextlib.contextmanager
 def atomic_folder(path: Path, root: Path | None = None) -> Iterator[Path]:
     """Fill a folder: whole or not at all; one that is there stays until the new one is whole."""
+    with _made(root or path.parent, path, "new") as temporary:
+        temporary.mkdir()
+        yield temporary
+
+
+@contextlib.contextmanager
+def _made(root: Path, path: Path, name: str) -> Iterator[Path]:
+    """Hold a place below the root for what is to become a file or folder."""
     try:
         _make_folders(path.parent)
-        with staged(_staging_root(root or path.parent, path), path) as item:
-            temporary = item / "new"
-            temporary.mkdir()
+        # Unless the file's folder is of another disk (a mount).
+        same_disk = root.stat().st_dev == path.parent.stat().st_dev
+        with staged(root if same_disk else path.parent, path) as item:
+            temporary = item / name
             yield temporary
-            _sync_folder(temporary)
+            _sync_all(temporary)
             _place(temporary, path)
     except OSError as error:
         raise disk_error(error, path) from error
@@ -66,32 +68,26 @@ def make_folder(folder: Path) -> None:
         raise disk_error(error, folder) from error
 
 
-def _staging_root(root: Path, path: Path) -> Path:
-    """Where to stage: below the root, unless the file's folder is of another disk (a mount)."""
-    return root if root.stat().st_dev == path.parent.stat().st_dev else path.parent
-
-
 def _place(temporary: Path, path: Path) -> None:
     try:
-        if temporary.is_dir():
-            replace_folder(temporary, path)
-        else:
-            temporary.replace(path)
+        _rename(temporary, path)
     except OSError as error:
         if error.errno != errno.EXDEV:
             raise
         # The same disk, mounted twice, as containers do: no rename leads from one mount to the other.
         with staged(path.parent, path) as item:
             copy = item / temporary.name
-            if temporary.is_dir():
-                shutil.copytree(temporary, copy)
-                _sync_folder(copy)
-                replace_folder(copy, path)
-            else:
-                shutil.copyfile(temporary, copy)
-                _sync(copy)
-                copy.replace(path)
+            (shutil.copytree if temporary.is_dir() else shutil.copyfile)(temporary, copy)
+            _sync_all(copy)
+            _rename(copy, path)
     _sync(path.parent)
+
+
+def _rename(new: Path, path: Path) -> None:
+    if new.is_dir():
+        replace_folder(new, path)
+    else:
+        new.replace(path)
 
 
 def _make_folders(folder: Path) -> None:
@@ -104,13 +100,13 @@ def _make_folders(folder: Path) -> None:
         _sync(path.parent)
 
 
-def _sync_folder(folder: Path) -> None:
-    """Wait until a folder and all that is in it is on the disk."""
-    folders, files = [folder], []
-    for found, names, inside in os.walk(folder):
+def _sync_all(made: Path) -> None:
+    """Wait until a file, or a folder and all that is in it, is on the disk."""
+    folders, files = [made], []
+    for found, names, inside in os.walk(made):
         folders += [Path(found, name) for name in names]
         files += [Path(found, name) for name in inside]
-    if len(files) > _FEW_FILES and _sync_file_system(folder):
+    if len(files) > _FEW_FILES and _sync_file_system(made):
         return
     for path in (*files, *reversed(folders)):
         _sync(path)

@@ -140,15 +140,14 @@ class Connection:
 
     def not_understood(self, what: str) -> AgentUnavailable:
         """Make the error for an answer that is not what the protocol says."""
-        return AgentUnavailable(
-            f"{self.name}: its answer is no {what}: is base_url right?", kind="malformed answer", again=False
-        )
+        return self._refused(f"its answer is no {what}: is base_url right?", "malformed answer")
 
     def filtered(self) -> AgentUnavailable:
         """Make the error for an answer that the service's content filter has taken away."""
-        return AgentUnavailable(
-            f"{self.name}: its content filter took the answer away", kind="content filter", again=False
-        )
+        return self._refused("its content filter took the answer away", "content filter")
+
+    def _refused(self, why: str, kind: str) -> AgentUnavailable:
+        return AgentUnavailable(f"{self.name}: {why}", kind=kind, again=False)
 
     def clean(self, text: str) -> str:
         """Return a text without keys, should the service have sent one back, and without lone surrogates."""
@@ -164,7 +163,7 @@ class Connection:
             closing.add_done_callback(lambda _: self._loop.stop())
 
     def _bound(self, error: BodyBoundError) -> AgentUnavailable:
-        return AgentUnavailable(f"{self.name}: {self.clean(str(error))}", kind="malformed answer", again=False)
+        return self._refused(self.clean(str(error)), "malformed answer")
 
     def _failure(self, error: Any) -> AerialDojoError:
         if isinstance(error, self._package.APIStatusError):

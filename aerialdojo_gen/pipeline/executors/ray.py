@@ -11,7 +11,6 @@ import logging
 import os
 import re
 import secrets
-import shutil
 import socket
 import sys
 import tempfile
@@ -96,7 +95,8 @@ class RayExecutor(Executor):
         tries: Counter[int] = Counter()
         begun_s = time.monotonic()
         while True:
-            self._grow(len(running) + len(waiting))
+            while len(self._lanes) < min(self.workers, len(running) + len(waiting)):
+                self._add(len(self._lanes))
             busy = {lane.number for lane, _ in running.values()}
             idle = {lane.number: lane for lane in self._lanes if lane.ready and lane.number not in busy}
             for number, task in waiting.give(tuple(idle)):
@@ -133,7 +133,11 @@ class RayExecutor(Executor):
                     yield outcome
             if not running and time.monotonic() - begun_s > _WARN_AFTER_S:
                 begun_s = float("inf")
-                self._folders.say(f"no process of the cluster has started yet: {self._free_resources()}")
+                nodes, free = self._alive(), self._ray.available_resources()
+                self._folders.say(
+                    f"no process of the cluster has started yet: {len(nodes)} nodes, "
+                    f"{free.get('CPU', 0):g} cores and {free.get('memory', 0) / 1e6:,.0f} MB free"
+                )
 
     def close(self) -> None:
         """End the actors after their current tasks."""
@@ -157,8 +161,11 @@ class RayExecutor(Executor):
         if ray.is_initialized():
             raise UsageError("this process has a Ray cluster already: call ray.shutdown() before")
         # The next command removes what a killed one leaves there.
-        place = _short_folder() if self._address is None else scratch_folder()
-        scratch = self._stack.enter_context(place)
+        place: contextlib.AbstractContextManager[Path | str] = scratch_folder()
+        if self._address is None:
+            # Ray's sockets are in it, and socket paths are limited to 107 characters.
+            place = tempfile.TemporaryDirectory(prefix="ad-ray-", ignore_cleanup_errors=True)
+        scratch = Path(self._stack.enter_context(place))
         common = {"log_to_driver": False, "logging_level": logging.CRITICAL}
         if self._address is None:
             own = {"num_cpus": self._requested or own_cores(), "include_dashboard": False, "_temp_dir": str(scratch)}
@@ -210,37 +217,24 @@ class RayExecutor(Executor):
             marks[str(marker)] = text
         return marks
 
-    def _free_resources(self) -> str:
-        nodes = [node for node in self._ray.nodes() if node["Alive"]]
-        free = self._ray.available_resources()
-        return f"{len(nodes)} nodes, {free.get('CPU', 0):g} cores and {free.get('memory', 0) / 1e6:,.0f} MB free"
+    def _alive(self) -> list[Any]:
+        """Return the resources of the nodes that are there."""
+        return [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
 
     # ----- its processes
 
     def _require(self, memory_mb: int) -> None:
-        """Restart the actors if they have less memory."""
-        memory_mb = self._possible(memory_mb)
-        if memory_mb > self._memory_mb:
-            self._end_lanes()
-            self._memory_mb = memory_mb
-
-    def _grow(self, tasks: int) -> None:
-        """Start actors for a number of tasks."""
-        while len(self._lanes) < min(self.workers, tasks):
-            self._add(len(self._lanes))
-
-    def _possible(self, memory_mb: int) -> int:
-        """Check that a node has that much memory; 0 if the cluster does not report its memory."""
-        nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
-        most = max((node["memory"] for node in nodes if "memory" in node), default=None)
-        if most is None:
-            return 0
-        if memory_mb * 1e6 > most:
+        """Check that a node has that much memory, and restart the actors if they have less."""
+        most = max((node["memory"] for node in self._alive() if "memory" in node), default=None)
+        if most is not None and memory_mb * 1e6 > most:
             raise AerialDojoError(
                 f"a process takes {memory_mb:,} MB, and no node gives more than {most / 1e6:,.0f} MB: larger "
                 "nodes are needed (`ray start --memory` says how much of one is given)"
             )
-        return memory_mb
+        # A cluster need not report its memory.
+        if most is not None and memory_mb > self._memory_mb:
+            self._end_lanes()
+            self._memory_mb = memory_mb
 
     def _add(self, number: int) -> None:
         options: dict[str, Any] = {"num_cpus": 1, "max_restarts": 0, "max_task_retries": 0}
@@ -302,16 +296,6 @@ def _check_answers(address: str) -> None:
         raise AerialDojoError(
             f"no Ray cluster answers at {address} ({first_line(error)}): start one (docs/scale.md)"
         ) from None
-
-
-@contextlib.contextmanager
-def _short_folder() -> Iterator[Path]:
-    # Ray's sockets are in it, and socket paths are limited to 107 characters.
-    folder = Path(tempfile.mkdtemp(prefix="ad-ray-"))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _required() -> set[str]:

@@ -63,13 +63,14 @@ class Worker:
         """Return what this machine lacks; empty if it can run tasks."""
         os.environ.update(expected.environment)
         where = f"node {socket.gethostname()}"
+        # A marker is DIR/.aerialdojo-staging/ITEM/marker.
         for path, text in expected.marked.items():
             try:
                 right = Path(path).read_text(encoding="utf-8") == text
             except OSError:
                 right = False
             if not right:
-                return f"{where} does not see {_above_marker(path)}: {_SHARE}"
+                return f"{where} does not see {Path(path).parents[2]}: {_SHARE}"
         for folder, digest in expected.seen.items():
             if listing(Path(folder)) != digest:
                 return f"{where} does not see {folder}, or another one of that name: {_SHARE}"
@@ -97,11 +98,6 @@ class Worker:
 
 
 _SHARE = "all nodes must mount the data directory's file system at the same path, or --data be an object store"
-
-
-def _above_marker(path: str) -> Path:
-    # DIR/.aerialdojo-staging/ITEM/marker
-    return Path(path).parents[2]
 
 
 class MessageBoard:
