@@ -27,7 +27,8 @@ from aerialdojo_gen.store.cloud_errors import Changed, cloud_error, code_of, is_
 _SINGLE, _PART, _MAX_PARTS, _AT_ONCE = 16 << 20, 8 << 20, 9_000, 4
 _BLOCK = 1 << 20
 _TRIES = 6
-# A connection that is silent for so long is given up and made anew: well below the time that a lock holds.
+# A connection that is silent for so long is given up and made anew, unless ``$AERIALDOJO_TIMEOUT_S`` says otherwise:
+# well below the time that a lock holds.
 _SILENT_S = 15.0
 
 
@@ -222,11 +223,6 @@ def _age_s(answer: Mapping[str, Any]) -> float:
     return now - float(answer["LastModified"].timestamp())
 
 
-def timeout_s() -> float:
-    """Seconds without a byte after which a request is tried again: ``$AERIALDOJO_TIMEOUT_S``, or 15."""
-    return number_of("AERIALDOJO_TIMEOUT_S", _SILENT_S, 0.1, 3600.0, "write a number of seconds from 0.1 to 3600")
-
-
 _making = threading.Lock()
 
 
@@ -248,7 +244,7 @@ def _made_client(_process: int) -> Any:
         retries["total_max_attempts"] = _TRIES
     # Stores other than AWS's have one host name for all buckets.
     own = any(os.environ.get(name) for name in ("AWS_ENDPOINT_URL", "AWS_ENDPOINT_URL_S3"))
-    silent_s = timeout_s()
+    silent_s = number_of("AERIALDOJO_TIMEOUT_S", _SILENT_S, 0.1, 3600.0, "write a number of seconds from 0.1 to 3600")
     config = Config(
         retries=retries or None, connect_timeout=silent_s, read_timeout=silent_s, max_pool_connections=2 * _AT_ONCE,
         s3={"addressing_style": "path"} if own else None,

@@ -32,7 +32,8 @@ class Cache:
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder or cache_folder()
-        self._most = _bound_bytes()
+        hint = "write a number of gigabytes, e.g. 20"
+        self._most = int(1e9 * number_of("AERIALDOJO_CACHE_GB", _DEFAULT_GB, 0.0, 1e9, hint))
         self._unmeasured = self._most  # measured at the first item
         self._held: OrderedDict[Path, int] = OrderedDict()
         self._lock = threading.Lock()
@@ -141,10 +142,6 @@ def cache_folder() -> Path:
         return Path(value).expanduser().absolute()
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "aerialdojo-gen"
-
-
-def _bound_bytes() -> int:
-    return int(1e9 * number_of("AERIALDOJO_CACHE_GB", _DEFAULT_GB, 0.0, 1e9, "write a number of gigabytes, e.g. 20"))
 
 
 def _size(folder: Path) -> int:

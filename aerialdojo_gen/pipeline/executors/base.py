@@ -5,13 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.pipeline.executors.channels import WorkerChannel
+from aerialdojo_gen.pipeline.executors.channels import RateLimiter, WorkerChannel
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 EXECUTORS = ("local", "ray")
@@ -49,12 +49,14 @@ def on_disk(*places: Path | DataRoot, below: str = "") -> tuple[Path, ...]:
     return tuple(path / below for path in paths if isinstance(path, Path))
 
 
-@dataclass(frozen=True)
+@dataclass
 class ParentChannel:
-    """The parent's side of its workers' channels."""
+    """The parent's side of its workers' channels, and the channel of a worker in this process."""
 
-    on_message: Callable[[Any], None]  # Called in this process with a worker's message
+    send: Callable[[Any], None]  # Called in this process with a worker's message
     stopped: Callable[[], bool]
+    every_s: float = 0.0
+    turn: Callable[[float], float] = field(default_factory=lambda: RateLimiter().take)
 
 
 class Executor(ABC):

@@ -27,30 +27,17 @@ class WorkerChannel(Protocol):
 
 
 class RateLimiter:
-    """Gives out turns at even intervals; `next` is the time of the next one, seconds of a shared clock."""
+    """Gives out turns at even intervals."""
 
-    def __init__(self, following: float = 0.0) -> None:
-        self.next = following
+    def __init__(self) -> None:
+        self._next = 0.0
 
-    def take(self, interval_s: float, now: float) -> float:
+    def take(self, interval_s: float) -> float:
         """Return how many seconds to wait for the next turn."""
-        at = max(now, self.next)
-        self.next = at + interval_s
+        now = time.monotonic()
+        at = max(now, self._next)
+        self._next = at + interval_s
         return at - now
-
-
-class InProcessChannel:
-    """The channel of a worker that runs in the parent's process."""
-
-    every_s = 0.0
-
-    def __init__(self, on_message: Callable[[object], None], stopped: Callable[[], bool]) -> None:
-        self.send, self.stopped = on_message, stopped
-        self._turns = RateLimiter()
-
-    def turn(self, interval_s: float) -> float:
-        """Return how many seconds to wait for a turn."""
-        return self._turns.take(interval_s, time.monotonic())
 
 
 _closers: list[Callable[[], object]] = []

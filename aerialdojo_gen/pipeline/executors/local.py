@@ -21,7 +21,7 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, guarded
-from aerialdojo_gen.pipeline.executors.channels import InProcessChannel, RateLimiter, end
+from aerialdojo_gen.pipeline.executors.channels import end
 
 # How often the parent checks whether workers must stop, seconds.
 _POLL_S = 0.2
@@ -83,13 +83,12 @@ class LocalExecutor(Executor):
         """Run tasks and yield results or expected errors in completion order."""
         channel = waiting.channel
         if self._workers <= 1 or waiting.alone:
-            in_process = InProcessChannel(channel.on_message, channel.stopped) if channel else None
             for task in waiting.one_by_one():
-                outcome = guarded(work, task, in_process)
+                outcome = guarded(work, task, channel)
                 waiting.on_done(task, outcome)
                 yield outcome
             return
-        turns, running, stopping = RateLimiter(), dict[int, T](), set[int]()
+        running, stopping = dict[int, T](), set[int]()
         try:
             while True:
                 # One task per process: a Ctrl-C does not wait for queued tasks.
@@ -105,11 +104,10 @@ class LocalExecutor(Executor):
                         self._lanes[number].send(_STOP)
                 for number in (pipes[pipe] for pipe in ready if isinstance(pipe, Connection)):
                     match self._lanes[number].receive():
-                        case "message", message:
-                            if channel:
-                                channel.on_message(message)
-                        case "turn", interval_s:
-                            self._lanes[number].send(turns.take(interval_s, time.monotonic()))
+                        case "message", message if channel:
+                            channel.send(message)
+                        case "turn", interval_s if channel:
+                            self._lanes[number].send(channel.turn(interval_s))
                         case "raised", error, origin:
                             raise error from RuntimeError(f"in a worker process\n{origin}")
                         case "done", outcome:

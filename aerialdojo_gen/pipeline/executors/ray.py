@@ -284,7 +284,7 @@ class RayExecutor(Executor):
 
     def _pass_messages(self, channel: ParentChannel) -> None:
         for message in self._ray.get(self._board.take.remote(channel.stopped())):
-            channel.on_message(message)
+            channel.send(message)
 
 
 def _check_answers(address: str) -> None:

@@ -124,7 +124,7 @@ class MessageBoard:
 
     def turn(self, interval_s: float) -> float:
         """Return how many seconds to wait for a turn."""
-        return self._turns.take(interval_s, time.monotonic())
+        return self._turns.take(interval_s)
 
 
 class BoardChannel:

@@ -23,8 +23,7 @@ def scene_sources(roots: ProjectPaths, scene: str) -> list[Path]:
     return [
         roots.recipes / f"{scene}.toml",
         *(path for path in beside if path.is_file()),
-        roots.scene_assets / "materials.toml",
-        *catalogue_files(roots.scene_assets),
+        *catalogue_sources(roots, scene),
     ]
 
 
