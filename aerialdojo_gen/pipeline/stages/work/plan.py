@@ -138,8 +138,8 @@ def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
     return np.array([goal for goal, _ in ends]), np.array([start for _, start in ends])
 
 
-def _difficulty_columns(planner: Planner | None, routes: list[Route], schema: pa.Schema) -> dict[str, pa.Array]:
-    """Difficulty columns and agent actions of solved routes, null elsewhere."""
+def _difficulty_columns(planner: Planner | None, routes: list[Route]) -> dict[str, pa.Array]:
+    """Difficulty columns of solved routes, null elsewhere."""
     solved = [i for i, route in enumerate(routes) if route.outcome == "SOLVED"]
     values: dict[str, Any] = {name: np.empty(0) for name in Difficulty._fields}
     if planner is not None and solved:
@@ -152,21 +152,11 @@ def _difficulty_columns(planner: Planner | None, routes: list[Route], schema: pa
     place = np.full(len(routes), -1)
     place[solved] = np.arange(len(solved))
     rows = pa.array(place, pa.int32(), mask=place < 0)
-    route_columns = {name: pa.array(v, schema.field(name).type).take(rows) for name, v in values.items()}
-    flown = [agent_actions(routes[i].actions) for i in solved]
-    ends = np.cumsum([0, *map(len, flown)], dtype=np.int32)
-    kind = schema.field("agent_action").type
-    flat = pa.array(np.concatenate([np.empty(0, np.int8), *flown]), kind.value_type)
-    route_columns["agent_action"] = pa.ListArray.from_arrays(pa.array(ends), flat, type=kind).take(rows)
-    return route_columns
+    return {name: pa.array(own, PLANS.schema.field(name).type).take(rows) for name, own in values.items()}
 
 
 def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planner | None) -> pa.Table:
-    """Make a table of routes; lists are passed as flat arrays, since millions of Python objects are slow."""
-    ends = np.cumsum([0, *(len(r.poses) for r in routes)], dtype=np.int32)
-    poses = np.concatenate([np.empty((0, 4)), *(r.poses for r in routes)])
-    actions = np.concatenate([np.empty(0, np.int8), *(r.actions for r in routes)])
-    flat = {**dict(zip(("x_m", "y_m", "z_m", "yaw_rad"), poses.T, strict=True)), "action": actions}
+    """Make a table of routes; lists are passed as arrays, since millions of Python objects are slow."""
     columns = {
         "scene": [scene] * len(routes),
         "pair_id": pair_ids,
@@ -176,13 +166,9 @@ def _table(scene: str, pair_ids: list[str], routes: list[Route], planner: Planne
         "n_actions": [r.n_actions for r in routes],
         "expansions": [r.expansions for r in routes],
         "min_clearance_m": [r.min_clearance_m for r in routes],
-        **_difficulty_columns(planner, routes, PLANS.schema),
+        **_difficulty_columns(planner, routes),
+        **{name: [r.poses[:, k] for r in routes] for k, name in enumerate(("x_m", "y_m", "z_m", "yaw_rad"))},
+        "action": [r.actions for r in routes],
+        "agent_action": [agent_actions(r.actions) if r.outcome == "SOLVED" else None for r in routes],
     }
-    arrays = []
-    for field in PLANS.schema:
-        if field.name in flat:
-            values = pa.array(np.ascontiguousarray(flat[field.name]), field.type.value_type)
-            arrays.append(pa.ListArray.from_arrays(pa.array(ends), values, type=field.type))
-        else:
-            arrays.append(pa.array(columns[field.name], field.type))
-    return pa.Table.from_arrays(arrays, schema=PLANS.schema)
+    return pa.table({name: columns[name] for name in PLANS.schema.names}, schema=PLANS.schema)
