@@ -1,10 +1,10 @@
 """Every key of a pipeline file, changed in the file, changes the fingerprints of the stages that read it."""
 
-import json
 import typing
 from pathlib import Path
 
 import pytest
+from fuzzing.mutate import toml_dumped
 from pydantic import BaseModel
 
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
@@ -71,14 +71,6 @@ def others(value, words):
     return ["another-text-of-some-length", ["plan"]]
 
 
-def toml(value):
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items() if v is not None) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(toml, value)) + "]"
-    return json.dumps(str(value) if isinstance(value, Path) else value)
-
-
 def put(raw, key, value):
     *folders, last = key
     for folder in folders:
@@ -94,14 +86,13 @@ def written(folder, changes):
         "vlm": VlmConfig(model="m", base_url="http://127.0.0.1:9/v1"),
     }
     whole = whole.model_copy(update={"anchor_sample": whole.anchor_sample.model_copy(update=scorers)})
-    raw = whole.model_dump(by_alias=True)
-    raw["plan"]["ladder"] = list(raw["plan"]["ladder"])
+    raw = whole.model_dump(by_alias=True, mode="json", exclude_none=True)
     for key, value in changes.items():
         put(raw, key, value)
     if ("render", "profile") in changes:
         raw["render"] = {k: v for k, v in raw["render"].items() if k not in PROFILES["training"]}
     file = folder / "pipeline.toml"
-    file.write_text("".join(f"{json.dumps(k)} = {toml(v)}\n" for k, v in raw.items() if v is not None))
+    file.write_text(toml_dumped(raw))
     return load_pipeline(file)
 
 

@@ -20,6 +20,7 @@ from aerialdojo_gen.benchmark.runner import evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.imports.worlds import VaryOptions, vary
 from aerialdojo_gen.pipeline.executors import bundled, ray_worker
+from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.store.staging import AREA
 
 # All of it on the loopback interface, as a cluster that a command starts for itself.
@@ -212,3 +213,14 @@ def test_what_is_too_large_to_travel_is_one_line(tmp_path):
         file.truncate(bundled.MAX_BYTES + 1)
     with pytest.raises(UsageError, match=r"have 2\d\d MB: no more than 200 MB are sent"):
         bundled.pack(tmp_path.parent / "never.zip", [tmp_path])
+
+
+@pytest.mark.nightly
+def test_the_largest_scene_takes_no_more_memory_than_its_stages_declare(tmp_path):
+    """One process makes U_Mall_0 up to `plan`, as a worker does that a cluster gives the largest declared memory."""
+    declared_mb = max(stage.memory_mb for stage in STAGES)
+    command = ["plan", "--scene", "U_Mall_0", "--pipeline", "pipelines/aerialdojo-200k.toml", "--workers", "1"]
+    process = subprocess.Popen([sys.executable, "-m", "aerialdojo_gen.cli", *command, "--data", str(tmp_path)])
+    _, status, usage = os.wait4(process.pid, 0)
+    assert status == 0
+    assert 300 < usage.ru_maxrss / 1024 <= declared_mb

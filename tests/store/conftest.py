@@ -15,6 +15,13 @@ from support.s3_server import CREDENTIALS, Proxy, forget_clients, s3_server
 from aerialdojo_gen.store.root import DataRoot, open_root
 
 
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of the test's own."""
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 @pytest.fixture(scope="session")
 def server() -> Iterator[str]:
     with s3_server() as url:

@@ -13,6 +13,8 @@ from aerialdojo_gen.store.footer_cache import cached_footers
 from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.tables import from_rows
 
+pytestmark = pytest.mark.usefixtures("cache")
+
 SCENE = "U_Test_0"
 
 
@@ -24,12 +26,6 @@ class Counted(LocalRoot):
     def open(self, relative):
         self.opened.append(relative)
         return super().open(relative)
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
 
 
 @pytest.fixture

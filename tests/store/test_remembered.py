@@ -1,7 +1,8 @@
-"""What is kept of files is what they say: never of files that have changed, never in the way where it cannot be."""
+"""What is kept or read ahead of files is what they say: never of files that have changed, never in the way."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 
@@ -9,14 +10,11 @@ import pytest
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.cli.app import app
+from aerialdojo_gen.store.files import file_digest, prefetch_files
 from aerialdojo_gen.store.memo import cache_text, is_cached, memo, memo_key
 from aerialdojo_gen.store.root import open_root
 
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "cache"))
-    return tmp_path / "cache"
+pytestmark = pytest.mark.usefixtures("cache")
 
 
 @pytest.fixture
@@ -84,3 +82,25 @@ def test_a_truncated_part_is_told_of_though_its_tables_were_kept(smoke, tmp_path
     part.write_bytes(part.read_bytes()[:-20])
     with pytest.raises(StoreError, match=part.name):
         app(["stats", "--data", str(data)], standalone_mode=False)
+
+
+def test_what_a_thread_reads_ahead_is_found(tmp_path):
+    paths = [tmp_path / str(k) for k in range(20)]
+    for k, path in enumerate(paths):
+        path.write_bytes(os.urandom(k * 700_000))
+    prefetch_files([*paths, tmp_path / "none"])
+    prefetch_files(paths)
+    for path in paths:
+        assert file_digest(path) == hashlib.sha256(path.read_bytes()).hexdigest()
+    with pytest.raises(FileNotFoundError):
+        file_digest(tmp_path / "none")
+
+
+def test_a_file_that_was_changed_since_is_read_again(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"one")
+    prefetch_files([path])
+    before = path.stat()
+    path.write_bytes(b"two")
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert file_digest(path) == hashlib.sha256(b"two").hexdigest()
