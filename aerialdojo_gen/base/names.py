@@ -20,9 +20,9 @@ def closest(name: str, known: Iterable[str], most: int = 1, *, cutoff: float = 0
     return [folded[found] for found in difflib.get_close_matches(name.casefold(), list(folded), most, cutoff)]
 
 
-def did_you_mean(name: str, known: Iterable[str], most: int = 1, *, cutoff: float = 0.6) -> str:
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """Say what was probably meant: ``"did you mean 'box'?"``; empty where nothing is like it."""
-    near = [repr(found) for found in closest(name, known, most, cutoff=cutoff)]
+    near = [repr(found) for found in closest(name, known, most)]
     return f"did you mean {' or '.join([', '.join(near[:-1]), near[-1]] if near[1:] else near)}?" if near else ""
 
 

@@ -74,11 +74,7 @@ class Key:
 
     def as_json(self) -> dict[str, Any]:
         """Return the key as plain values, paths as text and tables as objects."""
-        return {
-            "section": self.section, "key": self.name, "value": plain(self.value), "default": plain(self.default),
-            "required": self.required, "kind": self.kind, "unit": self.unit, "bounds": self.bounds,
-            "meaning": self.meaning,
-        }  # fmt: skip
+        return {"key" if name == "name" else name: plain(value) for name, value in vars(self).items()}
 
 
 def config_keys(pipeline: str | Path | Pipeline | None = None, stage: str | None = None) -> list[Key]:
