@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.progress import Reporter
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
-    from aerialdojo_gen.pipeline.summary import StageSummary
+    from aerialdojo_gen.pipeline.task import StageSummary
     from aerialdojo_gen.store.root import DataRoot
 
 log = logging.getLogger(__name__)
@@ -177,7 +177,7 @@ def run_stages(
     from aerialdojo_gen.pipeline.freshness import cache_footers
     from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.store.footer_cache import cached_footers
+    from aerialdojo_gen.store.footers import cached_footers
 
     options, reporter = options or RunOptions(), reporter or Reporter(quiet=True)
     names = runner.chosen_scenes(config, roots, scenes)

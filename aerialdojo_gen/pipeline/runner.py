@@ -23,8 +23,7 @@ from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES, upstream
 from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
 from aerialdojo_gen.pipeline.scheduler import SceneScheduler
 from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
-from aerialdojo_gen.pipeline.summary import StageSummary
-from aerialdojo_gen.pipeline.task import Computed, compute
+from aerialdojo_gen.pipeline.task import Computed, StageSummary, compute
 from aerialdojo_gen.store import shards as store
 
 _PACKAGE = Path(__file__).resolve().parents[1]

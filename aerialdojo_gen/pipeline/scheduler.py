@@ -16,8 +16,7 @@ from aerialdojo_gen.pipeline.freshness import ShardFinder, Shards
 from aerialdojo_gen.pipeline.progress import Overview, Reporter
 from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
 from aerialdojo_gen.pipeline.stage import Stage
-from aerialdojo_gen.pipeline.summary import StageSummary
-from aerialdojo_gen.pipeline.task import Computed, Task
+from aerialdojo_gen.pipeline.task import Computed, StageSummary, Task
 from aerialdojo_gen.store.root import DataRoot
 
 # A second process must first read and build the scene again, which takes about half of that.

@@ -36,8 +36,7 @@ from aerialdojo_gen.store.bucket import Bucket, Entry
 from aerialdojo_gen.store.cloud_errors import Changed
 from aerialdojo_gen.store.files import sha256_of
 from aerialdojo_gen.store.lease import lease_lost, lease_s, leased, token_of
-from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders
-from aerialdojo_gen.store.object_state import state_of
+from aerialdojo_gen.store.object_folders import MANIFEST, ObjectFolders, state_of
 from aerialdojo_gen.store.root import DataRoot, inside
 
 LOCK = ".aerialdojo-lock.json"

@@ -20,8 +20,7 @@ import pyarrow as pa
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import DamagedFile, StoreError, first_line
-from aerialdojo_gen.store.footer_cache import footer_cache
-from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode
+from aerialdojo_gen.store.footers import ShardFile, ShardInfo, decode, encode, footer_cache
 from aerialdojo_gen.store.layout import (
     LAYOUT,
     Place,
@@ -131,7 +130,7 @@ def _read_info(root: DataRoot, name: str, version: str) -> ShardInfo:
 
 
 def cache_footers(root: DataRoot, names: Sequence[str]) -> None:
-    """Let `aerialdojo_gen.store.footer_cache` keep what shards' footers say; those that are damaged are left out."""
+    """Let the `FooterCache` keep what shards' footers say; those that are damaged are left out."""
     if footer_cache() is None:
         return
     for name in names:

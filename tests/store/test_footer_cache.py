@@ -7,9 +7,9 @@ import pytest
 from support.handmade import filled
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.store import footer_cache, schemas
+from aerialdojo_gen.store import footers, schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.footer_cache import cached_footers
+from aerialdojo_gen.store.footers import cached_footers
 from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.tables import from_rows
 
@@ -31,7 +31,7 @@ class Counted(LocalRoot):
 @pytest.fixture
 def at_once(monkeypatch):
     """What has just been written is kept too, so that no test waits for it to come of age."""
-    monkeypatch.setattr(footer_cache, "_TIME_RESOLUTION_NS", -1)
+    monkeypatch.setattr(footers, "_TIME_RESOLUTION_NS", -1)
 
 
 def shard(folder, fingerprint="f" * 64, rows=3):

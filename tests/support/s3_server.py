@@ -12,7 +12,7 @@ import time
 import urllib.request
 from collections.abc import Iterator
 
-from aerialdojo_gen.store import bucket, object_state
+from aerialdojo_gen.store import bucket, object_folders
 
 CREDENTIALS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing", "AWS_DEFAULT_REGION": "us-east-1"}
 
@@ -20,7 +20,7 @@ CREDENTIALS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing
 def forget_clients() -> None:
     """Let the next request of this process read the environment anew."""
     bucket._made_client.cache_clear()
-    object_state._made.cache_clear()
+    object_folders._made.cache_clear()
 
 
 @contextlib.contextmanager
