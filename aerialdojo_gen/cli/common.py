@@ -14,7 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.secrets import Secrets
 from aerialdojo_gen.dataset.build import default_workers, open_pipeline, pipeline_file, run_stages
+from aerialdojo_gen.store.root import Where
 
 if TYPE_CHECKING:
     from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -22,7 +25,6 @@ if TYPE_CHECKING:
     from aerialdojo_gen.pipeline.options import RunOptions
     from aerialdojo_gen.pipeline.stage import ProjectPaths, Stage
     from aerialdojo_gen.scenes.model import Scene
-    from aerialdojo_gen.store.root import Where
 
 __all__ = ["default_workers", "open_pipeline", "pipeline_file", "run_chosen", "run_until"]
 
@@ -103,7 +105,6 @@ def run_chosen(
     verbose: bool = False,
 ) -> None:
     """Run stages with progress (`aerialdojo_gen.dataset.build.run_stages`), and say what an error or Ctrl-C left."""
-    from aerialdojo_gen.base.errors import UsageError
     from aerialdojo_gen.pipeline.progress import Reporter
 
     kept = "finished shards are kept, " + (
@@ -133,9 +134,6 @@ def print_scene(scene: Scene, notes: Sequence[str]) -> None:
 
 def key_values(given: list[str]) -> dict[str, str]:
     """Read ``--option key=value``."""
-    from aerialdojo_gen.base.errors import UsageError
-    from aerialdojo_gen.base.secrets import Secrets
-
     options = {}
     for item in given:
         key, equals, options[key] = item.partition("=")

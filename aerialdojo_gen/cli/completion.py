@@ -5,14 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from aerialdojo_gen.base.shipped import home
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import open_root
 
 
 def shipped_pipelines() -> list[str]:
@@ -55,10 +52,8 @@ def _scenes(ctx: typer.Context) -> list[str]:
 
 def _released(data: Path) -> list[str]:
     from aerialdojo_gen.dataset.contents import existing_scenes
-    from aerialdojo_gen.store.root import open_root
 
-    root: DataRoot = open_root(data)
-    return list(existing_scenes(root)) if data.is_dir() else []
+    return list(existing_scenes(open_root(data))) if data.is_dir() else []
 
 
 def _files(incomplete: str) -> Iterator[str]:

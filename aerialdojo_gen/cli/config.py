@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from aerialdojo_gen.base import cli_context
+from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import pipeline_file, print_json
 
@@ -24,7 +25,6 @@ def show(
 ) -> None:
     """Show every key of a pipeline: value, default, unit, bounds, meaning."""
     from aerialdojo_gen.base.config.keys import config_keys
-    from aerialdojo_gen.base.text_table import terminal_width
     from aerialdojo_gen.pipeline.template import key_lines
 
     keys = config_keys(pipeline_file(pipeline), stage)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -13,9 +13,7 @@ from aerialdojo_gen.base import cli_context
 from aerialdojo_gen.base.errors import UsageError, brief
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import interruptible, merge_scenes, print_json
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.store.root import DataRoot
+from aerialdojo_gen.store.root import DataRoot, LocalRoot, open_root
 
 app = typer.Typer()
 
@@ -136,7 +134,6 @@ def export(
     from aerialdojo_gen.base.names import unknown
     from aerialdojo_gen.exchange.exporting import FORMATS, export_release
     from aerialdojo_gen.pipeline.progress import Reporter
-    from aerialdojo_gen.store.root import LocalRoot, open_root
 
     training = {
         "splits": split, "settings": setting, "limit": limit, "seed": seed, "views": view, "goal": goal,
@@ -253,7 +250,6 @@ def import_benchmark(
 ) -> None:
     """Convert task files of another benchmark to tables like the release's, in DATA/imported/NAME."""
     from aerialdojo_gen.exchange import importing
-    from aerialdojo_gen.store.root import open_root
 
     options = importing.Options(
         frame=frame, angles=angles, pictures=images, with_pictures=pictures, skip_bad=skip_bad

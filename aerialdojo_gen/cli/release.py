@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.text_table import terminal_width
+from aerialdojo_gen.base.text_table import facts, terminal_width
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import json_text, merge_scenes, open_pipeline, print_json
+from aerialdojo_gen.store.atomic import atomic_file
+from aerialdojo_gen.store.root import DataRoot, open_root
 
 if TYPE_CHECKING:
     from aerialdojo_gen.dataset.stats.comparison import Comparison, Listing
-    from aerialdojo_gen.store.root import DataRoot
 
 app = typer.Typer()
 
@@ -40,7 +41,6 @@ def stats(
     from aerialdojo_gen.dataset.contents import existing_files, existing_scenes, no_release, scenes_in_release
     from aerialdojo_gen.dataset.provenance import RECORD
     from aerialdojo_gen.store.memo import memo, memo_key
-    from aerialdojo_gen.store.root import open_root
 
     root, scene = open_root(data), merge_scenes(scenes, scene)
     released = existing_scenes(root)
@@ -73,7 +73,6 @@ def stats(
     print(memo(memo_key(root, [*existing_files(root), RECORD], "stats", names, as_json or width), show))
     if markdown or csv:
         from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
-        from aerialdojo_gen.store.atomic import atomic_file
 
         compared = _compared(root, names)
         for path, text in ((markdown, as_markdown(compared)), (csv, as_csv(compared))):
@@ -115,7 +114,6 @@ def show(
     as_json: options.Json = False,
 ) -> None:
     """Draw one task: goal, route in its scene, clearance, reference image, views along the route."""
-    from aerialdojo_gen.base.text_table import facts, terminal_width
     from aerialdojo_gen.dataset.lookup import find_task
     from aerialdojo_gen.studio.show.figure import write_page, write_png
     from aerialdojo_gen.studio.show.pictured import picture_task

@@ -6,7 +6,7 @@ import re
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -14,9 +14,7 @@ from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import default_workers, merge_scenes, open_pipeline, print_json, run_until
 from aerialdojo_gen.pipeline.registry import BY_NAME
-
-if TYPE_CHECKING:
-    from aerialdojo_gen.store.root import Where
+from aerialdojo_gen.store.root import Where
 
 app = typer.Typer()
 

@@ -13,6 +13,7 @@ from typer.core import TyperCommand
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.text_table import terminal_width, wrapped
 from aerialdojo_gen.cli import options
+from aerialdojo_gen.store.root import open_root
 
 app = typer.Typer()
 
@@ -122,7 +123,6 @@ def report(
     from aerialdojo_gen.benchmark.tables import DEFAULT_RADII_M, ReportRequest
     from aerialdojo_gen.dataset.contents import release_scenes
     from aerialdojo_gen.dataset.protocol import read_sample
-    from aerialdojo_gen.store.root import open_root
 
     if as_json:
         style = "json"

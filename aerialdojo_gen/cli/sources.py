@@ -15,6 +15,8 @@ from aerialdojo_gen.base.names import choose_scenes, closest
 from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import key_values, merge_scenes, open_pipeline, pipeline_file, print_scene
+from aerialdojo_gen.store.atomic import make_folder
+from aerialdojo_gen.store.root import open_root
 
 if TYPE_CHECKING:
     from aerialdojo_gen.benchmark.llm.agent import LanguageModelAgent
@@ -232,7 +234,6 @@ def gallery(
     from aerialdojo_gen.rendering.gallery import designs_sheet, props_sheet, scene_sheet, write_picture
     from aerialdojo_gen.scenes.build import build_scene
     from aerialdojo_gen.scenes.catalogue import load_catalogue
-    from aerialdojo_gen.store.atomic import make_folder
 
     config, roots = open_pipeline(pipeline, out)
     chosen = runner.chosen_scenes(config, roots, scene)
@@ -261,8 +262,6 @@ def gallery(
 def _reference_sheets(out: Path, scene: list[str] | None, data: str, suffix: str) -> None:
     from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
     from aerialdojo_gen.rendering.gallery import reference_sheets, write_picture
-    from aerialdojo_gen.store.atomic import make_folder
-    from aerialdojo_gen.store.root import open_root
 
     root = open_root(data)
     scenes = scenes_with_pictures(root, scene)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerialdojo_gen.base.cli_context import command
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.shipped import home
+from aerialdojo_gen.base.text_table import terminal_width
 from aerialdojo_gen.cli import options
 from aerialdojo_gen.cli.common import merge_scenes, pipeline_file, print_json
 
@@ -83,8 +85,6 @@ def validate(
 ) -> None:
     """Check a release independently, from its Parquet files and meshes, and name every faulty row."""
     from aerialdojo_gen.base.config.pipeline import load_pipeline
-    from aerialdojo_gen.base.errors import UsageError
-    from aerialdojo_gen.base.text_table import terminal_width
     from aerialdojo_gen.dataset import validate as validation
     from aerialdojo_gen.dataset.build import release_pipeline
     from aerialdojo_gen.dataset.provenance import pipeline_names
@@ -134,7 +134,6 @@ def validate(
 
 def _name_orphans(release: Release, reporter: Reporter) -> None:
     """Warn of recordings beside the release whose trajectories it does not have."""
-    from aerialdojo_gen.base.errors import StoreError
     from aerialdojo_gen.dataset.recordings import orphans
 
     # Of a release that stands alone nobody knows the recordings; a damaged part is a fault that the checks name.
