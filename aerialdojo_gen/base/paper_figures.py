@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from aerialdojo_gen.base.constants import SETTINGS
 from aerialdojo_gen.base.shipped import home
 
 
@@ -28,13 +29,12 @@ class PaperScene:
     @property
     def tasks(self) -> dict[str, int]:
         """Navigation tasks by setting."""
-        return {"base": self.base, "standard": self.standard, "long_horizon": self.long_horizon}
+        return {name: getattr(self, name) for name in SETTINGS}
 
 
 @cache
 def inventory() -> dict[str, PaperScene]:
     """Read the paper's Table 10: 42 scenes by name."""
-    rows = _rows("inventory.csv")
     return {
         row["scene"]: PaperScene(
             scene=row["scene"],
@@ -45,7 +45,7 @@ def inventory() -> dict[str, PaperScene]:
             long_horizon=int(row["long_horizon"]) // 2,
             path_m=1000.0 * float(row["path_km"]),
         )
-        for row in rows
+        for row in _rows("inventory.csv")
     }
 
 
@@ -57,8 +57,7 @@ def paper_counts() -> dict[str, tuple[int, int]]:
 @cache
 def splits() -> dict[tuple[str, str], dict[str, int]]:
     """Read the paper's table of splits."""
-    settings = ("base", "standard", "long_horizon")
-    return {(r["partition"], r["subset"]): {s: int(r[s]) // 2 for s in settings} for r in _rows("splits.csv")}
+    return {(r["partition"], r["subset"]): {s: int(r[s]) // 2 for s in SETTINGS} for r in _rows("splits.csv")}
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
@@ -49,18 +50,6 @@ def run(job: Job, config: DescribeConfig) -> Output:
                 "from others of its category: write its description, or choose another object: "
                 f"{command('annotate', scene=job.scene)}"
             )
-        rows += [_row(job.scene, item["object_id"], k, text) for k, text in enumerate(texts)]
+        ids = {"scene": job.scene, "object_id": item["object_id"]}
+        rows += [ids | {"paraphrase_id": k} | asdict(text) for k, text in enumerate(texts)]
     return Output({"descriptions": from_rows(DESCRIPTIONS, rows)}, len(objects), len(rows), counts)
-
-
-def _row(scene: str, object_id: int, paraphrase_id: int, text: Text) -> dict[str, Any]:
-    return {
-        "scene": scene,
-        "object_id": object_id,
-        "paraphrase_id": paraphrase_id,
-        "level": text.level,
-        "text": text.text,
-        "claims": list(text.claims),
-        "frame": text.frame,
-        "held_out": text.held_out,
-    }
