@@ -42,8 +42,7 @@ class Secrets:
         found = {value for name, value in os.environ.items() if is_secret_name(name) and name not in _FOLDERS}
         found |= set(_under_secret_names(options or {})) | set(values)
         # The longest first: one may be the beginning of another.
-        known = sorted({v for v in found if len(v.strip()) >= _MIN_CHARACTERS}, key=len, reverse=True)
-        self._known = known
+        self._known = sorted({v for v in found if len(v.strip()) >= _MIN_CHARACTERS}, key=len, reverse=True)
 
     def text(self, text: str) -> str:
         """Return a text without secrets."""
@@ -53,15 +52,12 @@ class Secrets:
             text = pattern.sub(instead, text)
         return text
 
-    def options(self, value: Any) -> Any:
+    def options(self, value: Any, hidden: bool = False) -> Any:
         """Return options, or a part of them, without secrets: by their names, and by what they look like."""
-        return self._clean(value, hidden=False)
-
-    def _clean(self, value: Any, hidden: bool) -> Any:
         if isinstance(value, Mapping):
-            return {self.text(str(k)): self._clean(v, hidden or is_secret_name(str(k))) for k, v in value.items()}
+            return {self.text(str(k)): self.options(v, hidden or is_secret_name(str(k))) for k, v in value.items()}
         if isinstance(value, (list, tuple)):
-            return [self._clean(item, hidden) for item in value]
+            return [self.options(item, hidden) for item in value]
         if isinstance(value, str):
             return REDACTED if hidden and value else self.text(value)
         return value

@@ -33,11 +33,6 @@ class Shards:
     fresh: list[dict[str, Any]]  # Summaries of fresh shards
     errors: dict[str, AerialDojoError]  # Missing or damaged inputs, by scene
 
-    @property
-    def all_fresh(self) -> bool:
-        """Whether there is nothing to compute."""
-        return not self.tasks and not self.errors
-
 
 class ShardFinder:
     """Finds the shards that a run must compute, under one resolved configuration a stage."""
@@ -63,7 +58,7 @@ class ShardFinder:
             try_choices = stage.name not in self._force and len(scenes) == len(self._scenes)
             for choice in stage.choices(section) if try_choices else ():
                 found = self._shards(stage, choice, scenes, Reporter(quiet=True))
-                if found.all_fresh:
+                if not found.tasks and not found.errors:
                     self._configs[stage.name] = choice
                     return found
             self._configs[stage.name] = stage.resolve_config(section, self._reporter.line)

@@ -125,11 +125,11 @@ def _run_group(
 
     report()
     with (
-        reporter.bar(scheduler.label, len(scheduler))
-        if scheduler.of_one_stage
+        reporter.bar(scheduler.only_stage, len(scheduler))
+        if scheduler.only_stage
         else reporter.overall(scheduler.overview) as bar
     ):
-        scheduler.on_start(bar.refresh)
+        scheduler.on_start = bar.refresh
         for outcome in pool.run(compute, scheduler):
             interrupts.check()
             report()

@@ -48,7 +48,7 @@ class SceneScheduler(TaskQueue[Task]):
         self._spent: set[str] = set()
         self._errors: list[tuple[int, int, AerialDojoError]] = []
         self._reported, self._peak_running = 0, 0
-        self._on_start: Callable[[], None] = lambda: None
+        self.on_start: Callable[[], None] = lambda: None  # Called at the start of each task
         passed = self._names
         for number in range(len(stages)):
             passed = self._enter(number, passed)
@@ -67,14 +67,9 @@ class SceneScheduler(TaskQueue[Task]):
         return [error for _, _, error in sorted(self._errors, key=lambda one: one[:2])]
 
     @property
-    def of_one_stage(self) -> bool:
-        """Whether there is a single stage."""
-        return len(self._stages) == 1
-
-    @property
-    def label(self) -> str:
-        """First and last stage, for messages."""
-        return " to ".join(dict.fromkeys((self._stages[0].name, self._stages[-1].name)))
+    def only_stage(self) -> str:
+        """Name of the stage if there is a single one; else empty."""
+        return self._stages[0].name if len(self._stages) == 1 else ""
 
     def overview(self) -> Overview:
         """Return the progress of the run."""
@@ -82,10 +77,6 @@ class SceneScheduler(TaskQueue[Task]):
         estimate = self._estimate
         scenes = len(self._ended), len(self._names)
         return Overview(estimate.done_s, estimate.left_s, *scenes, running, self._peak_running)
-
-    def on_start(self, on_start: Callable[[], None]) -> None:
-        """Set a callback for the start of each task."""
-        self._on_start = on_start
 
     def summaries(self) -> list[StageSummary]:
         """Return summaries of stages that all scenes have completed since the last call."""
@@ -164,7 +155,7 @@ class SceneScheduler(TaskQueue[Task]):
         task = super()._pop(scene)
         self._running[scene, task.job.part] = task
         self._peak_running = max(self._peak_running, len(self._running))
-        self._on_start()
+        self.on_start()
         return task
 
     def _weight(self, scene: str) -> float:

@@ -85,11 +85,8 @@ def write_shard(
     return root.local_copy(name)
 
 
-def read_info(data: Where, name: str = "") -> ShardInfo:
+def read_info(data: Where, name: str) -> ShardInfo:
     """Read a shard's footer."""
-    if not name:
-        path = Path(str(data))
-        data, name = LocalRoot(path.absolute().parent), path.name
     root = open_root(data)
     try:
         version = root.version(name)

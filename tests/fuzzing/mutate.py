@@ -167,39 +167,30 @@ def _raw_in(value: Any) -> bool:
     return any(isinstance(holder[key], Raw) for holder, key in _places([value]))
 
 
-def _dumped(value: Any) -> str:
-    """JSON; also with what JSON has not."""
+def _dumped(value: Any, equals: str = ": ") -> str:
+    """JSON, or a value of TOML, whose keys are followed by " = "; also with what these have not."""
     if isinstance(value, Raw):
         return str(value)
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(str(k))}: {_dumped(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{json.dumps(str(k))}{equals}{_dumped(v, equals)}" for k, v in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_dumped, value)) + "]"
+        return "[" + ", ".join(_dumped(v, equals) for v in value) + "]"
+    if equals == " = " and (value is None or (isinstance(value, float) and not math.isfinite(value))):
+        return '"None"' if value is None else str(value)
     return json.dumps(value) if isinstance(value, str | int | float | None) else json.dumps(str(value))
 
 
-def toml_dumped(value: Any, top: bool = True) -> str:
+def toml_dumped(value: Any) -> str:
     """TOML, all tables below the first two levels inline."""
-    if isinstance(value, Raw):
-        return str(value)
-    if isinstance(value, dict) and top:
-        plain = [
-            f"{json.dumps(str(k))} = {toml_dumped(v, False)}" for k, v in value.items() if not isinstance(v, dict)
-        ]
-        tables = [
-            f"[{json.dumps(str(k))}]\n"
-            + "\n".join(f"{json.dumps(str(a))} = {toml_dumped(b, False)}" for a, b in v.items())
-            for k, v in value.items()
-            if isinstance(v, dict)
-        ]
-        return "\n".join([*plain, *tables]) + "\n"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(str(k))} = {toml_dumped(v, False)}" for k, v in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_dumped(v, False) for v in value) + "]"
-    if isinstance(value, float) and not math.isfinite(value):
-        return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
-    return json.dumps(value) if isinstance(value, str | int | float) else json.dumps(str(value))
+    if not isinstance(value, dict):
+        return _dumped(value, " = ")
+
+    def lines(table: dict[Any, Any]) -> list[str]:
+        return [f"{json.dumps(str(k))} = {_dumped(v, ' = ')}" for k, v in table.items()]
+
+    tables = {k: v for k, v in value.items() if isinstance(v, dict)}
+    plain = lines({k: v for k, v in value.items() if k not in tables})
+    return "\n".join([*plain, *("\n".join([f"[{json.dumps(str(k))}]", *lines(v)]) for k, v in tables.items())]) + "\n"
 
 
 def _encoded(text: str) -> bytes:

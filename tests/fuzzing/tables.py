@@ -52,7 +52,7 @@ def _shards() -> list[Case]:
 def _read_shard(folder: Path) -> None:
     path = next(p for p in folder.rglob("*.parquet"))
     table = next(t for t in _TABLES if store.shard_path(folder, t, court.SCENE) == path)
-    info = store.read_info(path)
+    info = store.read_info(path.parent, path.name)
     if info is not None:
         assert isinstance(info.fingerprint, str)
         assert isinstance(info.parts, int)

@@ -189,7 +189,7 @@ def test_tasks_and_routes_meet_on_their_key(tasks, routes):
 
 def test_every_shard_says_what_it_was_made_from(smoke):
     for path in sorted(smoke.rglob("part-*.parquet")):
-        info = store.read_info(path)
+        info = store.read_info(path.parent, path.name)
         assert len(info.fingerprint) == 64
         meta = json.loads(pq.read_schema(path).metadata[b"aerialdojo"])
         assert meta["content"] == content_digest(pq.read_table(path, partitioning=None)), path

@@ -127,7 +127,7 @@ def test_a_page_that_stands_for_another_column_is_found(tmp_path):
     """Every checksum of Parquet is right: only the digests of the columns tell."""
     path = shard(tmp_path)
     table = store.read_scene(tmp_path, "pairs", SCENE)
-    info = store.read_info(path)
+    info = store.read_info(path.parent, path.name)
     swapped = check_table(schemas.PAIRS, table.set_column(4, "target_object_id", table["start_object_id"]))
     write_clustered(schemas.PAIRS, swapped.replace_schema_metadata({store.META: encode(info)}), path)
     with pytest.raises(StoreError, match=r"is damaged \(other rows than were written\)"):

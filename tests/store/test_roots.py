@@ -114,7 +114,7 @@ def test_tables_are_the_same_in_every_root(root, tmp_path):
     assert written.read_bytes() == other.read_bytes()
     (name,) = store.shards(root, "pairs", SCENE)
     assert name == store.shard_name("pairs", SCENE) == other.relative_to(tmp_path / "other").as_posix()
-    assert store.read_info(root, name) == store.read_info(other)
+    assert store.read_info(root, name) == store.read_info(other.parent, other.name)
     assert store.read_scene(root, "pairs", SCENE).equals(table.replace_schema_metadata(None))
     assert store.count_rows(root, "pairs", SCENE) == 1
     store.prune(root, "pairs", SCENE, 0)
