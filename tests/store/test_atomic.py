@@ -18,59 +18,44 @@ from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
 from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.staging import AREA, scratch_folder, sweep
 
-HOLDING = """
-import sys, time
+PRELUDE = """
+import os, signal, sys, time
 from pathlib import Path
-from aerialdojo_gen.store.atomic import atomic_file
-with atomic_file(Path(sys.argv[1]), "f.bin") as path:
+from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
+from aerialdojo_gen.store.root import open_root
+from aerialdojo_gen.store.staging import scratch_folder, staged
+root = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+"""
+HOLDING = f"""{PRELUDE}
+with atomic_file(root, "f.bin") as path:
     path.write_text("x")
     print(path, flush=True)
     time.sleep(300)
 """
-STAGING = """
-import sys
-from pathlib import Path
-from aerialdojo_gen.store.staging import staged
-root = Path(sys.argv[1])
+STAGING = f"""{PRELUDE}
 for _ in range(int(sys.argv[2])):
     with staged(root, root / "f"):
         pass
 """
-WRITING = """
-import sys
-from pathlib import Path
-from aerialdojo_gen.store.atomic import atomic_file
-with atomic_file(Path(sys.argv[1]), "deep/er/f.txt") as path:
+WRITING = f"""{PRELUDE}
+with atomic_file(root, "deep/er/f.txt") as path:
     path.write_text("new")
 """
-REPLACING = """
-import sys
-from pathlib import Path
-from aerialdojo_gen.store.atomic import atomic_folder
-with atomic_folder(Path(sys.argv[1]) / "f") as path:
+REPLACING = f"""{PRELUDE}
+with atomic_folder(root / "f") as path:
     (path / "a").write_text("new")
     (path / "b").write_text("new")
 """
-
-
-LOCKED_AND_KILLED = """
-import os, signal, sys
-from aerialdojo_gen.store.root import open_root
-with open_root(sys.argv[1]).lock():
+LOCKED_AND_KILLED = f"""{PRELUDE}
+with open_root(root).lock():
     os.kill(os.getpid(), signal.SIGKILL)
 """
-SCRATCH_AND_KILLED = """
-import os, signal
-from aerialdojo_gen.store.staging import scratch_folder
+SCRATCH_AND_KILLED = f"""{PRELUDE}
 with scratch_folder() as folder:
     (folder / "0.obj").write_text("v")
     os.kill(os.getpid(), signal.SIGKILL)
 """
-WRITING_TWICE = """
-import sys
-from pathlib import Path
-from aerialdojo_gen.store.atomic import atomic_file, atomic_folder
-root = Path(sys.argv[1])
+WRITING_TWICE = f"""{PRELUDE}
 for text in ("one", "two"):
     with atomic_folder(root / "media" / "f", root=root) as path:
         (path / "a").write_text(text)

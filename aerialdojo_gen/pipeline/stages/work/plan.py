@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.geometry.frames import wrap_one_rad
+from aerialdojo_gen.geometry.frames import wrap_turned_rad
 from aerialdojo_gen.pipeline.stage import Job, Output
 from aerialdojo_gen.pipeline.stages.work.candidate_policy import CandidatePolicy, Candidates, policy_of
 from aerialdojo_gen.planning.difficulty import Difficulty, agent_actions, difficulty_of, free_lengths_m
@@ -104,38 +104,26 @@ def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
     return context.part("planner", lambda: Planner(scene, config, radius_m), config, radius_m)
 
 
-def _anchor_poses(job: Job) -> tuple[dict[tuple[int, int], Floats], dict[int, tuple[int, int]]]:
-    """Poses of all anchors by (object, anchor), and every object's selected anchor."""
-    poses: dict[tuple[int, int], Floats] = {}
-    selected: dict[int, tuple[int, int]] = {}
-    for a in job.read("anchors").to_pylist():
-        key = (a["object_id"], a["anchor_id"])
-        poses[key] = np.array([a["x_m"], a["y_m"], a["z_m"], a["yaw_rad"]])
-        if a["selected"]:
-            selected[a["object_id"]] = key
-    return poses, selected
-
-
-def _turned(anchor: Floats) -> Floats:
-    """Start pose: the start object's anchor, its yaw turned by 180° (paper: start poses)."""
-    return np.array([*anchor[:3], wrap_one_rad(float(anchor[3]) + math.pi)])
-
-
 def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
-    """Goals and start poses of the candidates, (n, 4) float64 each."""
-    poses, selected = _anchor_poses(job)
-    columns = ("target_object_id", "start_object_id", "start_anchor_id")
+    """Goals and start poses of the candidates, (n, 4) float64 each.
+
+    A start is the start object's anchor, its yaw turned by 180° (paper: start poses).
+    """
+    columns = ["object_id", "anchor_id", "x_m", "y_m", "z_m", "yaw_rad", "selected"]
+    anchors, wanted = job.read("anchors").select(columns).to_pydict(), pairs.to_pydict()
+    poses = np.column_stack([anchors[name] for name in columns[2:6]])
+    rows = {key: k for k, key in enumerate(zip(anchors["object_id"], anchors["anchor_id"], strict=True))}
+    selected = {anchors["object_id"][k]: k for k in np.flatnonzero(anchors["selected"])}
     try:
-        ends = [
-            (poses[selected[target]], _turned(poses[start, anchor]))
-            for target, start, anchor in zip(*(pairs[name].to_pylist() for name in columns), strict=True)
-        ]
+        goals = poses[[selected[target] for target in wanted["target_object_id"]]]
+        starts = poses[[rows[key] for key in zip(wanted["start_object_id"], wanted["start_anchor_id"], strict=True)]]
     except KeyError as error:
         raise StoreError(
             f"{job.scene}: a candidate needs anchor {error}, which is not in anchors: "
             f"run {command('pair-objects', scene=job.scene)}"
         ) from None
-    return np.array([goal for goal, _ in ends]), np.array([start for _, start in ends])
+    starts[:, 3] = wrap_turned_rad(starts[:, 3] + math.pi)
+    return goals, starts
 
 
 def _difficulty_columns(planner: Planner | None, routes: list[Route]) -> dict[str, pa.Array]:
