@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -34,45 +34,41 @@ class Shards:
     errors: dict[str, AerialDojoError]  # Missing or damaged inputs, by scene
 
 
+@dataclass
 class ShardFinder:
     """Finds the shards that a run must compute, under one resolved configuration a stage."""
 
-    def __init__(
-        self,
-        pipeline: Pipeline,
-        roots: ProjectPaths,
-        scenes: Sequence[str],
-        reporter: Reporter,
-        force: Collection[str] = (),
-        limits: RunLimits | None = None,
-    ) -> None:
-        self._pipeline, self._roots, self._scenes, self._reporter = pipeline, roots, scenes, reporter
-        self._force, self._limits = force, limits or RunLimits()
-        self._configs: dict[str, Section] = {}
+    pipeline: Pipeline
+    roots: ProjectPaths
+    scenes: Sequence[str]
+    reporter: Reporter
+    force: Collection[str] = ()
+    limits: RunLimits = field(default_factory=RunLimits)
+    configs: dict[str, Section] = field(default_factory=dict)
 
     def find(self, stage: Stage, scenes: Sequence[str]) -> Shards:
         """Find the stale shards of some scenes; raises the stage's `check` of all scenes if there are any."""
-        if stage.name not in self._configs:
-            section = self._pipeline.section(stage.name)
+        if stage.name not in self.configs:
+            section = self.pipeline.section(stage.name)
             # Resolving takes time: skip it while everything is fresh under one of the possible results.
-            try_choices = stage.name not in self._force and len(scenes) == len(self._scenes)
+            try_choices = stage.name not in self.force and len(scenes) == len(self.scenes)
             for choice in stage.choices(section) if try_choices else ():
                 found = self._shards(stage, choice, scenes, Reporter(quiet=True))
                 if not found.tasks and not found.errors:
-                    self._configs[stage.name] = choice
+                    self.configs[stage.name] = choice
                     return found
-            self._configs[stage.name] = stage.resolve_config(section, self._reporter.line)
-        config = self._configs[stage.name]
-        found = self._shards(stage, config, scenes, self._reporter)
+            self.configs[stage.name] = stage.resolve_config(section, self.reporter.line)
+        config = self.configs[stage.name]
+        found = self._shards(stage, config, scenes, self.reporter)
         if found.tasks:
             check_memory(stage.name)
-            stage.check(self._roots.data, self._scenes, config)
+            stage.check(self.roots.data, self.scenes, config)
         return found
 
     def _shards(self, stage: Stage, config: Section, scenes: Sequence[str], reporter: Reporter) -> Shards:
         """Find which of a stage's shards are fresh under a configuration, and remove surplus shards."""
-        roots, limits, force = self._roots, self._limits, stage.name in self._force
-        pipeline = self._pipeline.model_copy(update={stage.name.replace("-", "_"): config})
+        roots, limits, force = self.roots, self.limits, stage.name in self.force
+        pipeline = self.pipeline.model_copy(update={stage.name.replace("-", "_"): config})
         found = Shards([], [], {})
         number, shares = limits.share
         shard = -1

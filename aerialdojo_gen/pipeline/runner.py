@@ -17,7 +17,7 @@ from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import Executor, SharedPaths, make_executor, on_disk
 from aerialdojo_gen.pipeline.freshness import ShardFinder, prefetch_digests
 from aerialdojo_gen.pipeline.interrupt import Interrupts
-from aerialdojo_gen.pipeline.options import RunOptions
+from aerialdojo_gen.pipeline.options import RunLimits, RunOptions
 from aerialdojo_gen.pipeline.progress import Reporter, duration
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES, upstream
 from aerialdojo_gen.pipeline.runtime_estimate import RuntimeEstimate
@@ -62,7 +62,7 @@ def run(
         for group in group_stages(stages, alone=options.limits is not None):
             # Other processes may have written.
             roots.data.refresh()
-            limits = options.limits if group[-1] is stages[-1] else None
+            limits = options.limits if options.limits and group[-1] is stages[-1] else RunLimits()
             finder = ShardFinder(pipeline, roots, scenes, reporter, options.force, limits)
             scheduler = SceneScheduler(group, scenes, finder, roots.data, reporter, estimate)
             busy = [stage.name for stage in group if any(estimate.left(stage.name, scene) for scene in scenes)]

@@ -20,8 +20,8 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
 
 from aerialdojo_gen.base.environment_errors import number_of
 from aerialdojo_gen.base.errors import Malformed, StoreError
@@ -34,8 +34,7 @@ _RENEWALS = 4
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class _LeaseRecord:
+class _LeaseRecord(NamedTuple):
     """What the object says: who holds it, in words and by a token; released when the lease is 0."""
 
     token: str
@@ -184,8 +183,7 @@ def _holder_name() -> str:
 
 def _encode(note: _LeaseRecord) -> bytes:
     # The time makes each one another object: a tag is of the bytes.
-    fields = {"token": note.token, "holder": note.holder, "lease_s": note.lease_s, "put": secrets.token_hex(4)}
-    return json.dumps(fields).encode()
+    return json.dumps(note._asdict() | {"put": secrets.token_hex(4)}).encode()
 
 
 def _decode(data: bytes) -> _LeaseRecord | None:

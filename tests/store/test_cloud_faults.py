@@ -22,18 +22,6 @@ from aerialdojo_gen.store.tables import from_rows
 BIG = os.urandom(17 << 20)
 
 
-@pytest.fixture
-def anew(monkeypatch, tmp_path):
-    """Begin as another process would, with more variables; with `cache`, with an empty cache."""
-
-    def begin(*, cache: bool = False, **variables: str) -> None:
-        for name, value in (variables | ({"AERIALDOJO_CACHE": str(tmp_path / "another")} if cache else {})).items():
-            monkeypatch.setenv(name, value)
-        forget_clients()
-
-    return begin
-
-
 @pytest.mark.parametrize("how", [503, "drop", 0.5])
 def test_a_fault_that_passes_is_not_seen(cloud: str, proxy: Proxy, how: int | str | float):
     root = open_root(cloud)
@@ -55,21 +43,24 @@ def test_a_part_of_an_upload_is_put_again(cloud: str, proxy: Proxy, how: int | s
     assert root.below("t").digest("a/x", reread=True) == root.digest("t/a/x")
 
 
-def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, anew):
+def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
     write(open_root(cloud), "t/a/x", BIG[: 4 << 20])
-    anew(cache=True)
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
     proxy.fail("^GET .*t/a/x", "cut", 2)
     assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG[: 4 << 20]
     assert proxy.left() == 0
 
 
-def test_a_connection_that_falls_silent_is_made_anew(cloud: str, proxy: Proxy, anew):
-    anew(AERIALDOJO_TIMEOUT_S="0.5")
+def test_a_connection_that_falls_silent_is_made_anew(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.5")
+    forget_clients()
     root = open_root(cloud)
     proxy.fail("^PUT", 30.0)
     write(root, "t/a/x", BIG[: 1 << 20])
     assert sum(line.startswith("PUT") for line in proxy.seen) == 2
-    anew(cache=True)
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
     proxy.fail("^GET .*t/a/x", 30.0)
     proxy.fail("^GET .*t/a/x", "stall", 2)
     assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG[: 1 << 20]
@@ -90,17 +81,21 @@ def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: 
     assert f"{url} cannot be reached, does not answer" in done.stderr
 
 
-def test_a_download_is_tried_as_often_as_the_client_tries(cloud: str, proxy: Proxy, anew):
+def test_a_download_is_tried_as_often_as_the_client_tries(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
     write(open_root(cloud), "t/a/x", b"some bytes")
-    anew(cache=True, AERIALDOJO_TIMEOUT_S="0.3", AWS_MAX_ATTEMPTS="2")
+    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.3")
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
     proxy.fail("^GET .*t/a/x", 30.0, 100)
     with pytest.raises(StoreError, match="does not answer"):
         open_root(cloud).local_copy("t/a/x")
     assert proxy.left() == 98
 
 
-def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, anew):
-    anew(AWS_MAX_ATTEMPTS="2")
+def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeypatch):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
+    forget_clients()
     root = open_root(cloud)
     write(root, "t/a/x", b"old")
     fill(root, "media/S/n", {"a": b"old", "b": b"old"})
@@ -118,11 +113,12 @@ def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, anew):
 
 
 @pytest.mark.parametrize("read", [store.count_rows, store.read_scene])
-def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy: Proxy, monkeypatch, read, anew):
+def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy: Proxy, monkeypatch, tmp_path, read):
     monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
     row = {"scene": "U_Test_0", "landmark_id": 0, "name": "tower", "mesh_node": "n", "x_m": 1, "y_m": 2, "z_m": 3}
     store.write_shard(cloud, "landmarks", "U_Test_0", 0, from_rows(schemas.LANDMARKS, [row]))
-    anew(cache=True)
+    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
+    forget_clients()
     store._read_info.cache_clear()
     if read == store.read_scene:
         store.count_rows(cloud, "landmarks", "U_Test_0")
@@ -143,9 +139,7 @@ with root.lock():
 """
 
 
-def test_what_a_killed_run_left_is_removed_under_the_next_lock(
-    cloud: str, proxy: Proxy, server: str, monkeypatch, anew
-):
+def test_what_a_killed_run_left_is_removed_under_the_next_lock(cloud: str, proxy: Proxy, server: str, monkeypatch):
     """A real SIGKILL in the middle of an upload in parts, by a run that holds the lock."""
     monkeypatch.setenv("AERIALDOJO_LEASE_S", "2")
     write(open_root(cloud), "t/a/x", b"old")
@@ -159,7 +153,8 @@ def test_what_a_killed_run_left_is_removed_under_the_next_lock(
         assert run.poll() is None
     run.kill()
     run.wait()
-    anew(AWS_ENDPOINT_URL=server)
+    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
+    forget_clients()
     bucket = Bucket(cloud.split("/")[2])
     uploads = bucket._client.list_multipart_uploads(Bucket=bucket.name)
     assert len(uploads.get("Uploads", [])) == 1
@@ -219,8 +214,9 @@ def test_a_bucket_that_is_not_there_is_named(cloud: str):
         open_root("s3://no-such-bucket/data").exists("t/a/x")
 
 
-def test_the_cache_is_bounded(cloud: str, tmp_path, anew):
-    anew(AERIALDOJO_CACHE_GB="0.001")
+def test_the_cache_is_bounded(cloud: str, monkeypatch, tmp_path):
+    monkeypatch.setenv("AERIALDOJO_CACHE_GB", "0.001")
+    forget_clients()
     root = open_root(cloud)
     for k in range(8):
         write(root, f"t/a/{k}", os.urandom(300_000))
@@ -236,8 +232,9 @@ def test_an_upload_by_others_is_a_folder_too(cloud: str):
     assert read_folder(open_root(cloud), "media/S/n") == {"a": b"1", "b": b"1"}
 
 
-def test_a_folder_that_is_being_written_is_not_there(cloud: str, proxy: Proxy, anew):
-    anew(AWS_MAX_ATTEMPTS="1")
+def test_a_folder_that_is_being_written_is_not_there(cloud: str, proxy: Proxy, monkeypatch):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    forget_clients()
     root = open_root(cloud)
     proxy.fail("^PUT .*n/b", 503, 9)
     with pytest.raises(StoreError):

@@ -108,9 +108,10 @@ class PaperQuota(CandidatePolicy):
     def initial_batch(self, candidates: Candidates) -> Integers:
         """Rows that are likely to be released, and a margin."""
         self._candidates = candidates
-        n = len(candidates.sampling_keys)
         predicted = candidates.predicted_m
-        reason, setting = self._judge(np.where(np.isfinite(predicted), "SOLVED", "NO_PATH"), predicted, np.zeros(n))
+        rows = np.arange(len(predicted))
+        outcome = np.where(np.isfinite(predicted), "SOLVED", "NO_PATH")
+        reason, setting = self._judge(rows, outcome, predicted, np.zeros(len(rows)))
         likely = np.flatnonzero(reason == KEPT)
         order = self._rank(likely, setting[likely], predicted[likely])
         # Candidates predicted to be rejected come last, the shortest first: some are kept after all.
@@ -126,7 +127,7 @@ class PaperQuota(CandidatePolicy):
         outcomes = np.array([route.outcome for _, route in searched], dtype="U24")
         lengths = np.array([route.length_m for _, route in searched])
         actions = np.array([route.n_actions for _, route in searched])
-        reason, setting = self._judge(outcomes, lengths, actions, done)
+        reason, setting = self._judge(done, outcomes, lengths, actions)
         kept = reason == KEPT
         rows = done[kept]
         levels = difficulty_level(self._detour(rows, lengths[kept]), self._candidates.visible[rows])
@@ -151,18 +152,12 @@ class PaperQuota(CandidatePolicy):
         return np.sort(np.concatenate(rows))
 
     def _judge(
-        self,
-        outcome: NDArray[np.str_],
-        length_m: Floats,
-        n_actions: NDArray[np.generic],
-        rows: Integers | None = None,
+        self, rows: Integers, outcome: NDArray[np.str_], length_m: Floats, n_actions: NDArray[np.generic]
     ) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
         c = self._candidates
-        at = slice(None) if rows is None else rows
-        detour = np.maximum(length_m / np.maximum(c.free_length_m[at], 1e-12), 1.0)
         return judge(
-            outcome.astype("U24"), c.euclidean_m[at], length_m, n_actions.astype(np.int32), self._config.rules,
-            detour, c.visible[at],
+            outcome.astype("U24"), c.euclidean_m[rows], length_m, n_actions.astype(np.int32), self._config.rules,
+            np.maximum(self._detour(rows, length_m), 1.0), c.visible[rows],
         )  # fmt: skip
 
     def _detour(self, rows: Integers, length_m: Floats) -> Floats:
