@@ -83,6 +83,7 @@ ON_SMOKE = (
     (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
     (r"^(render .*--light random)", r"\1 --limit 1"),
     (r"^(evaluate .*)--limit [24]0", r"\1--limit 4"),
+    (r"^(evaluate .*(?:--split id_test|--modality semantic))$", r"\1 --limit 4"),
 )  # fmt: skip
 WITH_WORKERS = ("run", "plan", "render", "evaluate", "validate", "filter", "split")
 PYTHON_ELSEWHERE = {"api.md": "tests/test_api_page.py", "CONTRIBUTING.md": "tests/pipeline/test_new_stage.py"}
