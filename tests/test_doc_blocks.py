@@ -77,6 +77,7 @@ ON_SMOKE = (
     (r"^((?:stats|validate|show)\b.*) --data data-smoke\b", r"\1"),
     (r"--split id_train (.*--estimate)", r"--split train \1"),
     (r"\bTASK_ID\b", "TASK"),
+    (r"^(show TASK --out task\.png)$", r"\1 --html task.html"),
     (r"^validate --json\b", "validate --json --no-meshes"),
     # Recorded for training they would take the place of those that the page's blocks read.
     (r"^(render .*--profile training)", r"\1 --estimate"),
