@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import fcntl
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,6 +36,16 @@ EXPECTED_SKIPS = (
     "this machine lets nobody make namespaces",  # most containers
 )
 
+# Files with the longest tests, which begin.
+DEAREST = (
+    "tests/test_doc_blocks.py", "tests/layouts/test_every_scene.py", "tests/learning/test_several_places.py",
+    "tests/learning/test_training.py", "tests/pipeline/test_resume.py", "tests/test_wheel.py",
+    "tests/pipeline/test_render_scale.py", "tests/scenes/test_worlds.py", "tests/scenes/test_shipped_catalogue.py",
+    "tests/dataset/test_validate_every_row.py", "tests/benchmark/test_evaluate.py", "tests/learning/test_loader.py",
+)  # fmt: skip
+
+# What is drawn for a day's run (`drawn` of support.layout_checks) is the same in all processes of a session.
+os.environ.setdefault("SAMPLE_SEED", time.strftime("%Y%m%d"))
 
 # Where it is ignored, as in a script's background job, the processes of the tests would ignore Ctrl-C too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -43,9 +56,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# Threads of PyTorch and NumPy that wait for one another sleep: where there are more than cores, those that spin would
+# use up what the others wait for.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
+
 # How long an example takes is the machine's affair: no test fails for that.
 hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # xdist would begin with the files that have the most tests; `DEAREST` keeps no process at work alone at the end.
+    config.option.loadscopereorder = False
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -62,6 +85,7 @@ def unexpected_skips(config: pytest.Config) -> list[str]:
 
 
 def pytest_terminal_summary(terminalreporter, config: pytest.Config) -> None:
+    terminalreporter.write_line(f"samples of the nightly tests were drawn by SAMPLE_SEED={os.environ['SAMPLE_SEED']}")
     for line in unexpected_skips(config):
         terminalreporter.write_line(f"skipped, which EXPECTED_SKIPS does not allow: {line}", red=True)
 
@@ -73,11 +97,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put every test into its tier; leave out the nightly ones, unless they are named or asked for by `-m`."""
+    """Put every test into its tier; the dearest first; no nightly ones, unless named or asked for by `-m`."""
     if "nightly" not in config.option.markexpr and not any("::" in arg for arg in config.args):
         nightly = [item for item in items if item.get_closest_marker("nightly")]
         config.hook.pytest_deselected(items=nightly)
         items[:] = [item for item in items if item not in nightly]
+    rank = {name: k for k, name in enumerate(DEAREST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(rank)))
     for item in items:
         for fixture in BY_FIXTURE.keys() & set(getattr(item, "fixturenames", ())):
             item.add_marker(BY_FIXTURE[fixture])
@@ -90,6 +116,16 @@ def nothing_given() -> Iterator[None]:
     """Advice repeats what a command was given: in one process the next test was given nothing."""
     with cli_context.use_context(cli_context.CliContext()):
         yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_kept() -> Iterator[None]:
+    """Scenes, and what the C library holds free for later, go with a module: a process would grow file by file."""
+    yield
+    if contexts := sys.modules.get("aerialdojo_gen.scenes.context"):
+        contexts.release_scenes()
+    with contextlib.suppress(AttributeError):  # a C library without it
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -77,12 +77,14 @@ ON_SMOKE = (
     (r"^((?:stats|validate|show)\b.*) --data data-smoke\b", r"\1"),
     (r"--split id_train (.*--estimate)", r"--split train \1"),
     (r"\bTASK_ID\b", "TASK"),
+    (r"^(show TASK --out task\.png)$", r"\1 --html task.html"),
     (r"^validate --json\b", "validate --json --no-meshes"),
     # Recorded for training they would take the place of those that the page's blocks read.
     (r"^(render .*--profile training)", r"\1 --estimate"),
     (r"^(render .*)--limit [03](?!.*--estimate)", r"\1--limit 1"),
     (r"^(render .*--light random)", r"\1 --limit 1"),
     (r"^(evaluate .*)--limit [24]0", r"\1--limit 4"),
+    (r"^(evaluate .*(?:--split id_test|--modality semantic))$", r"\1 --limit 4"),
 )  # fmt: skip
 WITH_WORKERS = ("run", "plan", "render", "evaluate", "validate", "filter", "split")
 PYTHON_ELSEWHERE = {"api.md": "tests/test_api_page.py", "CONTRIBUTING.md": "tests/pipeline/test_new_stage.py"}

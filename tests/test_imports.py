@@ -48,6 +48,15 @@ def imported(tree):
             yield from (a.value for a in node.args if isinstance(a, ast.Constant))
 
 
+@pytest.fixture(scope="module")
+def of_files():
+    """What every source of the package imports, by its path."""
+    return {
+        path.relative_to(PACKAGE).as_posix(): set(imported(ast.parse(path.read_bytes())))
+        for path in PACKAGE.rglob("*.py")
+    }
+
+
 @pytest.fixture
 def copied(tmp_path):
     for path in PACKAGE.rglob("*.py"):
@@ -87,11 +96,10 @@ def test_every_module_stands_in_a_layer():
     assert listed <= modules
 
 
-def test_libraries_are_imported_where_they_belong():
+def test_libraries_are_imported_where_they_belong(of_files):
     found = {name: set() for name in ONLY}
-    for path in PACKAGE.rglob("*.py"):
-        relative = path.relative_to(PACKAGE).as_posix()
-        for module in imported(ast.parse(path.read_bytes())):
+    for relative, modules in of_files.items():
+        for module in modules:
             for name in ONLY:
                 if f"{module}.".startswith(f"{name}."):
                     found[name].add(relative)
@@ -102,14 +110,10 @@ def test_libraries_are_imported_where_they_belong():
     assert found["pyarrow.parquet"]
 
 
-def test_what_is_a_dependency_is_imported():
+def test_what_is_a_dependency_is_imported(of_files):
     declared = tomllib.loads(PYPROJECT.read_text())["project"]["dependencies"]
     modules = {"opencv-python-headless": "cv2", "python-fcl": "fcl"}
-    found = {
-        module.partition(".")[0]
-        for path in PACKAGE.rglob("*.py")
-        for module in imported(ast.parse(path.read_bytes()))
-    }
+    found = {module.partition(".")[0] for modules in of_files.values() for module in modules}
     names = [re.split(r"[^\w-]", requirement)[0] for requirement in declared]
     unused = {name for name in names if modules.get(name, name) not in found}
     assert not unused

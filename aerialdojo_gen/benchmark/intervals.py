@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.benchmark.metrics import METRICS, Floats, Summary
@@ -21,6 +20,8 @@ LEVEL = 0.95
 
 def bootstrap(scenes: Sequence[Floats]) -> tuple[Floats, Floats]:
     """95 % percentile intervals, low and high (m,), of the families' mean; scenes are resampled within a family."""
+    from scipy.stats import bootstrap as resampled
+
     width = scenes[0].shape[1] if scenes else len(METRICS)
     ends = np.full((2, width), math.nan)
     if not scenes or min(map(len, scenes)) < 2:
@@ -32,7 +33,7 @@ def bootstrap(scenes: Sequence[Floats]) -> tuple[Floats, Floats]:
         return sum(np.mean(part, axis=axis) for part in parts) / len(parts)
 
     draws = rng.generator(0, "bootstrap", *(len(part) for part in scenes))
-    found = stats.bootstrap(
+    found = resampled(
         tuple(part[:, known] for part in scenes), mean_of_families, n_resamples=RESAMPLES, confidence_level=LEVEL,
         axis=0, method="percentile", rng=draws,
     ).confidence_interval  # fmt: skip

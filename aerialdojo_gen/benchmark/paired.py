@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
@@ -38,6 +37,8 @@ def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Text
 
 def _table(first: Run, second: Run, profile: Profile) -> TextTable:
     """Compare two logs of the same tasks, row by row."""
+    from scipy.stats import binomtest
+
     summaries = [summarize(run.episodes, profile) for run in (first, second)]
     one, other = (scene_scores(summary) for summary in summaries)
     families = [y - x for x, y in zip(one, other, strict=True)]
@@ -48,7 +49,7 @@ def _table(first: Run, second: Run, profile: Profile) -> TextTable:
     x, y = (outcomes(run.episodes, profile).success for run in (first, second))
     only_first, only_second = int(np.sum(x & ~y)), int(np.sum(y & ~x))
     torn = only_first + only_second
-    exact = float(stats.binomtest(only_first, torn).pvalue) if torn else 1.0
+    exact = float(binomtest(only_first, torn).pvalue) if torn else 1.0
     known = any(knows_views(run.episodes, profile) for run in (first, second))
     rows = []
     for k, metric in enumerate(METRICS):
@@ -78,6 +79,7 @@ def _table(first: Run, second: Run, profile: Profile) -> TextTable:
 
 def _chances(a: Floats, b: Floats, weight: Floats) -> Floats:
     """How often a difference as large arises where two runs are exchanged scene by scene: exact for few exchanges."""
+    from scipy.stats import permutation_test
 
     def weighted(x: Any, y: Any, axis: int) -> Any:
         # Rounded: sums in another order differ in their last digits, and would count as other differences.
@@ -88,7 +90,7 @@ def _chances(a: Floats, b: Floats, weight: Floats) -> Floats:
         if not (np.isfinite(a[:, k]) & np.isfinite(b[:, k])).all():
             p[k] = math.nan
             continue
-        p[k] = stats.permutation_test(
+        p[k] = permutation_test(
             (a[:, k], b[:, k]), weighted, permutation_type="samples", vectorized=True, n_resamples=RESAMPLES,
             rng=rng.generator(0, "permutation"),
         ).pvalue  # fmt: skip

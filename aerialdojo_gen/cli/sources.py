@@ -326,12 +326,13 @@ def annotate(
     ] = None,
 ) -> None:
     """Annotate a scene in the browser: landmarks, objects and their anchors."""
-    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
-    from aerialdojo_gen.studio.annotate.session import open_session
     from aerialdojo_gen.studio.web.serving import require_web
 
     if coco is None:
         require_web()
+    from aerialdojo_gen.pipeline.runner import chosen_scenes, known_scenes
+    from aerialdojo_gen.studio.annotate.session import open_session
+
     config, roots = open_pipeline(pipeline, data)
     given = named_scene(name, scene)
     scene = pick_scene(given, known_scenes(roots.recipes) if given else chosen_scenes(config, roots))

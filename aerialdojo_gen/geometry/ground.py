@@ -13,8 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.geometry.columns import ColumnIndex, Plan, lowest_of, shares_of
 from aerialdojo_gen.geometry.soup import SceneLike
@@ -187,6 +185,9 @@ def _numbered(*columns: Ints) -> Ints:
 
 def _bodies(faces: Ints, n: int) -> Ints:
     """Number of the connected body that every face belongs to, counted from 0 without gaps."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     rows, columns = np.repeat(faces[:, 0], 2), faces[:, 1:].reshape(-1)
     graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
     _, label = connected_components(graph, directed=False)

@@ -74,6 +74,12 @@ def context() -> Any:
     return _thread.context
 
 
+def release_context() -> None:
+    """Free this thread's OpenGL context, if it has one; the thread draws no more."""
+    if (current := _thread.__dict__.pop("context", None)) is not None:
+        current.release()
+
+
 def device() -> str:
     """Name of the OpenGL device; RenderError where there is no OpenGL."""
     return str(context().info["GL_RENDERER"])

@@ -13,7 +13,7 @@ from aerialdojo_gen.base.rng import generator
 
 pytestmark = pytest.mark.slow
 
-EACH = 40
+EACH = 20
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ from aerialdojo_gen.store.staging import AREA
 
 pytestmark = pytest.mark.slow
 
-ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 5})
+ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 3})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
 
 
@@ -47,14 +47,14 @@ def whole(tmp_path_factory):
     data = tmp_path_factory.mktemp("whole")
     write_inputs(data)
     (summary,) = run_whole(data, ALL)
-    assert (summary.rows_in, summary.rows_out, summary.computed) == (22, 22 * 8, 5)
+    assert (summary.rows_in, summary.rows_out, summary.computed) == (12, 12 * 8, 4)
     return data
 
 
 @pytest.mark.kill
 def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole):
     write_inputs(tmp_path)
-    code = f"from support.court import *; from pathlib import Path; run_whole(Path({str(tmp_path)!r}), CONFIG.model_copy(update={{'limit': 0, 'trajectories_per_part': 5}}))"  # noqa: E501
+    code = f"from support.court import *; from pathlib import Path; run_whole(Path({str(tmp_path)!r}), CONFIG.model_copy(update={{'limit': 0, 'trajectories_per_part': 3}}))"  # noqa: E501
     process = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1])
     media = tmp_path / "media" / SCENE
     limit = time.monotonic() + 120
@@ -63,7 +63,7 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     kept = {p: p.stat().st_mtime_ns for p in media.glob("nav_*/recording.json")}
-    assert 4 <= len(kept) < 22
+    assert 4 <= len(kept) < 12
     # As if it had been killed in the middle of a file, whenever it was.
     half = tmp_path / AREA / "dead"
     (half / "new").mkdir(parents=True)
@@ -108,12 +108,12 @@ def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_p
     clock = [time.time()]
     monkeypatch.setattr(render._Trajectory, "record", slow)
     monkeypatch.setattr(time, "time", lambda: clock[0])
-    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=clock[0] + 65.0))
-    assert len(recorded) == 7
+    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=clock[0] + 45.0))
+    assert len(recorded) == 5
     assert summary.computed == 1
     assert not list((tmp_path / "media" / SCENE).glob(".*"))
     run_whole(tmp_path, ALL)
-    assert len(recorded) == len(set(recorded)) == 22
+    assert len(recorded) == len(set(recorded)) == 12
     assert files_of(tmp_path) == files_of(whole)
 
 
@@ -233,11 +233,11 @@ def test_the_estimate_is_of_the_selection_and_near_the_truth(whole):
     said = estimate(whole, [SCENE], ALL, 0, 2)
     assert "with 2 workers on idle cores" in str(said)
     assert "with 1 worker on idle cores" in str(dataclasses.replace(said, workers=1))
-    assert (said.trajectories, said.poses, said.videos) == (22, 132, 176)
+    assert (said.trajectories, said.poses, said.videos) == (12, 72, 96)
     size = sum(r["bytes"] for r in store.read_scene(whole, "recordings", SCENE).to_pylist())
     assert 0.4 * size < said.size_bytes < 2.5 * size
     assert said.wall_s == pytest.approx(said.cpu_s / 2)
-    assert "22 trajectories, 132 poses, 176 videos" in str(said)
+    assert "12 trajectories, 72 poses, 96 videos" in str(said)
     with pytest.raises(UsageError, match="nothing to record"):
         estimate(whole, [SCENE], ALL.model_copy(update={"split": "ood_train"}), 0, 2)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.layout_checks import ASSETS, catalogue, nightly_unless
+from support.layout_checks import ASSETS, catalogue, drawn
 
 import aerialdojo_gen.scenes.worlds
 from aerialdojo_gen.annotations.appearance import SHADES
@@ -58,7 +58,7 @@ def test_a_draw_of_a_world_has_its_digest(kind: str) -> None:
     pytest.fail(f"no draw of {world.name} has its digest")
 
 
-@pytest.mark.parametrize("kind", [nightly_unless(k % 4 == 0, kind) for k, kind in enumerate(TYPES)])
+@pytest.mark.parametrize("kind", drawn(TYPES, 3))
 def test_a_world_is_sound_and_the_same_as_on_the_day_of_its_digest(kind: str) -> None:
     made = make_world(World(kind, 1000), ASSETS, catalogue())
     assert hashlib.sha256(made.text.encode()).hexdigest() == DIGESTS[made.world.name]
@@ -96,9 +96,20 @@ def test_every_type_of_the_scenes_has_a_generator_and_suns_on_all_sides() -> Non
         assert all(z > 0.05 for *_, z in suns)
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2)
 @given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
 def test_a_drawn_world_is_sound(kind: str, seed: int, held_out: bool) -> None:
+    assert_sound(kind, seed, held_out)
+
+
+@pytest.mark.nightly
+@settings(max_examples=40)
+@given(st.sampled_from(TYPES), st.integers(0, 2**31 - 1), st.booleans())
+def test_many_drawn_worlds_are_sound(kind: str, seed: int, held_out: bool) -> None:
+    assert_sound(kind, seed, held_out)
+
+
+def assert_sound(kind: str, seed: int, held_out: bool) -> None:
     made = make_world(World(kind, seed, held_out=held_out), ASSETS, catalogue())
     table = load_type(kind, ASSETS, catalogue())
     world = tomllib.loads(made.text)["world"]

@@ -58,7 +58,7 @@ def write_inputs(data, bad=BAD):
         ],
         "routes/train": [
             route_row("nav_a", "base", ROUTE), route_row("nav_b", "standard", bad),
-            *(route_row(f"nav_{k:02}", "long_horizon", ROUTE) for k in range(20)),
+            *(route_row(f"nav_{k:02}", "long_horizon", ROUTE) for k in range(10)),
         ],
         "routes/test": [],
     }  # fmt: skip

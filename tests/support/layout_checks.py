@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pytest
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes import checks
 from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
@@ -32,23 +33,31 @@ def nightly_unless(daily: bool, value: str) -> object:
     return pytest.param(value, marks=[] if daily else pytest.mark.nightly)
 
 
+def drawn(values: Collection[str], n: int) -> list[object]:
+    """Make parameters of a test: `n` for a day, drawn by `SAMPLE_SEED`, and all others nightly."""
+    daily = generator(int(os.environ["SAMPLE_SEED"]), "sample").permutation(len(values))[:n]
+    return [nightly_unless(k in daily, value) for k, value in enumerate(values)]
+
+
 def each_scene(names: Iterable[str]) -> pytest.MarkDecorator:
     """Parametrize a test by `name` with scenes, those not in `DAILY` nightly."""
     return pytest.mark.parametrize("name", [nightly_unless(name in DAILY, name) for name in names])
 
 
-def built_elsewhere(recipe: Path, out: Path, environment: Mapping[str, str]) -> bytes:
-    """Build a recipe in a process of its own, and return its GLB's bytes."""
+def built_elsewhere(names: Sequence[str], folder: Path, environment: Mapping[str, str]) -> list[bytes]:
+    """Build scenes in a process of their own, and return their GLBs' bytes."""
     code = (
         "import sys; from pathlib import Path\n"
         "from aerialdojo_gen.scenes.build import build_scene\n"
         "from aerialdojo_gen.scenes.catalogue import load_catalogue\n"
         "from aerialdojo_gen.scenes.glb import write_glb\n"
-        "recipe, assets, out = map(Path, sys.argv[1:])\n"
-        "write_glb(build_scene(recipe, load_catalogue(assets)), out)\n"
+        "assets, out = map(Path, sys.argv[1:3])\n"
+        "catalogue = load_catalogue(assets)\n"
+        "for name in sys.argv[3:]:\n"
+        "    write_glb(build_scene(assets / 'scenes' / f'{name}.toml', catalogue), out / f'{name}.glb')\n"
     )
-    subprocess.run([sys.executable, "-c", code, recipe, ASSETS, out], env=os.environ | environment, check=True)
-    return out.read_bytes()
+    subprocess.run([sys.executable, "-c", code, ASSETS, folder, *names], env=os.environ | environment, check=True)
+    return [(folder / f"{name}.glb").read_bytes() for name in names]
 
 
 @cache

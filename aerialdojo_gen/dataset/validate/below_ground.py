@@ -10,9 +10,9 @@ ground is ground whatever its form.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, place_text
@@ -20,6 +20,9 @@ from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.model import Instance, Scene
+
+if TYPE_CHECKING:
+    import trimesh
 
 # Of a body's columns: those that meet one layer of it, those that meet nothing below it, and of its area the part in
 # plan; of the columns of the scene: those that meet ground.
@@ -148,6 +151,8 @@ def open_ground(scene: Scene) -> TriangleRayCaster | None:
 
 def _open_bodies(instance: Instance) -> list[trimesh.Trimesh]:
     """Connected bodies of an instance that have a rim; a surface that is there from both sides counts once."""
+    import trimesh
+
     mesh = trimesh.Trimesh(instance.vertices, instance.faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=3)
     mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Mask, Rows, SceneData, place_text
@@ -98,6 +96,9 @@ def _by_routes(data: SceneData, rays: RayCaster, places: Floats) -> Mask:
 
 def over_lattice(rays: RayCaster, bounds: Floats, places: Floats) -> Mask:
     """Whether places (n, 3) see a lattice point that hangs together with one in the open."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     size = bounds[1] - bounds[0]
     step = max(_STEP_M, float(np.prod(size) / _MAX_NODES) ** (1 / 3))
     shape = np.maximum(1, (size / step).astype(np.int64))

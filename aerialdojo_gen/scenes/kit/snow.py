@@ -7,7 +7,6 @@ from typing import Annotated
 import numpy as np
 import shapely
 from pydantic import Field
-from scipy.ndimage import gaussian_filter1d
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.base.errors import AssetError
@@ -28,6 +27,8 @@ def profile_slope(
     lean: Number = 0.0, smooth_m: Annotated[Number, Field(gt=0)] = 4.0,
 ) -> Terrain:  # fmt: skip
     """Raise the ground by a profile from south to north, (y, z), and by `lean` metres a metre eastwards."""
+    from scipy.ndimage import gaussian_filter1d
+
     corners = terrain.corners()
     y = np.linspace(corners[:, 1].min(), corners[:, 1].max(), 600)
     z = np.interp(y, [p[0] for p in profile], [p[1] for p in profile])

@@ -24,6 +24,7 @@ from aerialdojo_gen.benchmark.flight import Flight
 from aerialdojo_gen.benchmark.runner import RunLog
 from aerialdojo_gen.benchmark.tasks import select
 from aerialdojo_gen.benchmark.worker import Finished, RetryPolicy, Worker
+from aerialdojo_gen.rendering.gl import release_context
 from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import Where, open_root
 
@@ -158,6 +159,7 @@ class Session(AgentBase):
             )
         finally:
             self._flight.close()
+            release_context()
 
     def _fly_all(self) -> None:
         # A task that the renderer failed at is offered again, unlike one that was flown.
