@@ -112,20 +112,23 @@ def select(data: Where, selection: Selection) -> pa.Table:
         what = "the paper's sample, test tasks of base and standard," if selection.protocol else "the release"
         raise UsageError(f"no task of {what} fits: widen --split, --setting, --modality or --scene")
     found = found.sort_by([(key, "ascending") for key in TASKS.key])
-    return found if selection.limit is None else _sample(found, selection.limit, selection.seed)
+    if selection.limit is None:
+        return found
+    scenes, ids = (found[column].to_pylist() for column in ("scene", "task_id"))
+    return found.take(pa.array(draw_evenly(scenes, ids, selection.limit, selection.seed, "evaluate")))
 
 
-def _sample(found: pa.Table, limit: int, seed: int) -> pa.Table:
-    """Take the first of every scene in random order, then the second, and so on, up to the limit."""
+def draw_evenly(scenes: Sequence[str], ids: Sequence[str], limit: int, seed: int, stage: str) -> list[int]:
+    """Draw rows, ascending: the first of every scene in random order, then the second, and so on, up to the limit."""
     by_scene: dict[str, list[tuple[int, int]]] = {}
-    for i, (scene, task_id) in enumerate(zip(*(found[c].to_pylist() for c in ("scene", "task_id")), strict=True)):
-        by_scene.setdefault(scene, []).append((rng.rank(seed, "evaluate", task_id), i))
+    for i, (scene, name) in enumerate(zip(scenes, ids, strict=True)):
+        by_scene.setdefault(scene, []).append((rng.rank(seed, stage, name), i))
     keys = [
-        (turn, rng.rank(seed, "evaluate", scene), i)
+        (turn, rng.rank(seed, stage, scene), i)
         for scene, ranked in by_scene.items()
         for turn, (_, i) in enumerate(sorted(ranked)[:limit])
     ]
-    return found.take(pa.array(sorted(i for _, _, i in sorted(keys)[:limit])))
+    return sorted(i for _, _, i in sorted(keys)[:limit])
 
 
 def goals_withheld(root: DataRoot, scene: str, subset: str) -> bool:

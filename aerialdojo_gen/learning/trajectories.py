@@ -18,7 +18,7 @@ from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
 from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
@@ -329,12 +329,8 @@ def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     """Draw rows of the index, ascending, spread evenly over the scenes; a larger limit only adds to them."""
     if limit < 1:
         raise UsageError(f"a limit is at least 1, not {limit}")
-    lots: list[tuple[int, int, int]] = []
-    for number, scene in enumerate(index.scenes):
-        own = np.flatnonzero(index.scene == number).tolist()
-        ranked = sorted((sampling_key(seed, index.nav_id[k]), k) for k in own)[:limit]
-        lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
-    return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
+    scenes = [index.scenes[number] for number in index.scene]
+    return np.array(draw_evenly(scenes, index.nav_id, limit, seed, "learning"), np.int64)
 
 
 def sampling_key(seed: int, nav_id: str) -> int:
