@@ -267,12 +267,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             self._closed, self._begun = True, False
             self._flight.close()
 
-    def __copy__(self) -> AerialDojoEnv:
-        """Refuse: see `__deepcopy__`."""
-        raise TypeError(_NO_COPY)
-
-    def __deepcopy__(self, _memo: dict[int, Any]) -> AerialDojoEnv:
-        """Refuse: a copy would share what draws, and what holds the scene, with this one."""
+    def __reduce__(self) -> str:
+        """Refuse to be copied: a copy would share what draws, and what holds the scene, with this one."""
         raise TypeError(_NO_COPY)
 
     @property
