@@ -73,7 +73,9 @@ class OutcomeTable:
         columns["malls"] = np.where(np.isin(columns["scene"], MALLS), "malls", "other scenes")
         columns["run"] = np.repeat(np.arange(len(runs)), [len(run.episodes) for run in runs])
         self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
-        self.judged, self.summary, self.intervals = cache(self._judged), cache(self._summary), cache(self._interval)
+        self.judged, self.summary = cache(self._judged), cache(self._summary)
+        # The 95 % intervals of a cut's overall metrics, in the order of `METRICS`.
+        self.intervals = cache(lambda cut: score_intervals(self.summary(cut)))
 
     def _judged(self, profile: Profile, along_way: bool = False) -> Floats:
         """Return the `METRICS` of every episode, (n, 6), by a profile."""
@@ -101,10 +103,6 @@ class OutcomeTable:
         assert cut.profile is not None
         scene, family = (self.columns[name][mask] for name in ("scene", "family"))
         return summarize_values(self.judged(cut.profile, cut.along_way)[mask], scene, family)
-
-    def _interval(self, cut: Cut) -> Sequence[tuple[float, float]]:
-        """Return the 95 % intervals of a cut's overall metrics, in the order of `METRICS`."""
-        return score_intervals(self.summary(cut))
 
     def score(self, cut: Cut) -> Score:
         """Average a cut to one score."""
