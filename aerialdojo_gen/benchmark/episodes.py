@@ -81,8 +81,8 @@ def _steps(run: str, scene: str, flown: Sequence[dict[str, Any]]) -> pa.Table:
     """Join the columns of the episodes' steps."""
     parts = [schemas.STEPS.schema.empty_table()]
     for record in flown:
-        columns, n = record["steps"], len(record["steps"]["action"])
-        columns |= {"run_id": [run] * n, "scene": [scene] * n, "task_id": [record["task_id"]] * n, "step": [*range(n)]}
+        own, n = {"run_id": run, "scene": scene, "task_id": record["task_id"]}, len(record["steps"]["action"])
+        columns = {name: [value] * n for name, value in own.items()} | {"step": [*range(n)]} | record["steps"]
         parts.append(pa.table(columns, schema=schemas.STEPS.schema))
     return pa.concat_tables(parts)
 

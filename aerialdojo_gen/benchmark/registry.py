@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from aerialdojo_gen.base.constants import MODALITIES
-from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.text_table import TextTable
 from aerialdojo_gen.benchmark import tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
@@ -363,9 +362,7 @@ def missing_note(request: ReportRequest, names: Sequence[str] = DEFAULT) -> str:
 
 def check_names(names: Sequence[str]) -> Sequence[str]:
     """Return the names; UsageError for an unknown one."""
-    for name in names:
-        if name not in (*NAMES, "all"):
-            raise UsageError(unknown("no table", name, NAMES, besides=("all",)))
+    check_known("no table", names, NAMES, besides=("all",))
     return names
 
 

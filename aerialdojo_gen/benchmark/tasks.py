@@ -19,7 +19,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import HINTS, Goal, Heading, Rules
 from aerialdojo_gen.dataset.contents import scenes_in_release
@@ -63,10 +63,7 @@ class Selection:
             ("split", self.splits, SUBSETS), ("setting", self.settings, SETTINGS),
             ("modality", self.modalities, MODALITIES),
         ):  # fmt: skip
-            for name in chosen:
-                if name not in known:
-                    also = tuple(_USUAL) if what == "split" else ()
-                    raise UsageError(unknown(f"no {what}", name, (*known, *also)))
+            check_known(f"no {what}", chosen, (*known, *_USUAL) if what == "split" else known)
         check_protocol(self.protocol)
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")
@@ -177,9 +174,7 @@ def reference_actions(
 
 def check_hints(hints: Sequence[str]) -> tuple[str, ...]:
     """Return the names of hints in their fixed order; UsageError for an unknown one."""
-    for name in hints:
-        if name not in HINTS:
-            raise UsageError(unknown("no hint", name, HINTS))
+    check_known("no hint", hints, HINTS)
     return tuple(name for name in HINTS if name in hints)
 
 
@@ -239,8 +234,7 @@ _PARAPHRASES = ("task", "random")
 
 def check_paraphrase(choice: str) -> str:
     """Return the choice; UsageError for an unknown one."""
-    if choice not in _PARAPHRASES:
-        raise UsageError(unknown("no choice of paraphrase", choice, _PARAPHRASES))
+    check_known("no choice of paraphrase", [choice], _PARAPHRASES)
     return choice
 
 
