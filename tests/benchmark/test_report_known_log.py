@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -189,15 +190,9 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
     assert [head for head, _ in detour.groups] == ["1.1 to 1.25", "1.25 to 1.5"]
     assert cells(detour, "package:Alpha")[::3] == ("25.00", "18.75")
     # A log or a release that has the column has the table.
-    shown = [
-        Run(
-            **{
-                **vars(run),
-                "table": run.table.append_column("target_seen_in_train", [[k % 2 == 0 for k in range(18)]]),
-            }
-        )
-        for run in load_runs(log, ["alpha", "beta"])
-    ]
+    column = [[k % 2 == 0 for k in range(18)]]
+    loaded = load_runs(log, ["alpha", "beta"])
+    shown = [replace(run, table=run.table.append_column("target_seen_in_train", column)) for run in loaded]
     seen = made("seen", shown, log)
     assert [head for head, _ in seen.groups] == ["seen in training", "unseen"]
     # Every second task is one with a semantic goal.

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.walled import write_walled
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
@@ -41,11 +40,6 @@ class Listener(AgentBase):
 
     def act(self, observation: Observation) -> int:
         return 0
-
-
-@pytest.fixture(scope="module")
-def court(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_walled(tmp_path_factory.mktemp("walled"))
 
 
 @given(st.floats(-20.0, 20.0))
