@@ -296,7 +296,7 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
     return made
 
 
-_TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
+_TABLES: dict[str, TableSpec | Callable[[ReportRequest], list[TextTable]]] = {
     "overall": TableSpec(
         "Overall", _headline_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes", "hints"),
         headed=False, notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
@@ -316,20 +316,20 @@ _TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list
     ),
     "modality": TableSpec("By modality", run_rows, _by("modality")),
     "radius": radius_tables,
-    "visits": tables.CountSpec(
-        "Where visits are lost", {
+    "visits": partial(
+        tables.count_tables, "Where visits are lost", {
             "episodes": ("flown", "visited", "solved", "lost"),
             "lost: how they ended, %": ("too far", "collided", "ran out", "no Stop"),
         }, _setting_rows, tables.visit_cells,
-        "Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out: "
-        "of actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
+        note="Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out:"
+        " of actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
         "averaged.",
         headed=True,
     ),
     "difficulty": partial(breakdown_tables, kind=DIFFICULTY),
     "seen": partial(breakdown_tables, kind=SEEN),
-    "conduct": tables.CountSpec(
-        "How episodes went", {
+    "conduct": partial(
+        tables.count_tables, "How episodes went", {
             "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
             "service": ("requests", "tokens in", "tokens out", "USD"),
         }, run_rows, tables.outcome_cells,
@@ -344,9 +344,7 @@ DEFAULT = ("overall", "results")
 
 def _made(request: ReportRequest, name: str) -> list[TextTable]:
     spec = _TABLES[name]
-    if isinstance(spec, TableSpec):
-        return [make_table(spec, request, request.broken_down)]
-    return [tables.count_table(spec, request)] if isinstance(spec, tables.CountSpec) else spec(request)
+    return [make_table(spec, request, request.broken_down)] if isinstance(spec, TableSpec) else spec(request)
 
 
 def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:

@@ -267,33 +267,24 @@ def _marks(groups: Mapping[str, Sequence[tuple[float, int]]]) -> dict[int, str]:
     return marks
 
 
-@dataclass(frozen=True)
-class CountSpec:
-    """How a table of counts is made, a row a run."""
-
-    title: str
-    groups: Mapping[str, Sequence[str]]
-    rows: Callable[[ReportRequest], Sequence[Row]]
-    cells: Callable[[Run, Profile], tuple[str, ...]]
-    note: str = ""
-    headed: bool = False
-
-
-def count_table(spec: CountSpec, request: ReportRequest) -> TextTable:
+def count_tables(
+    title: str, groups: Mapping[str, Sequence[str]], rows_of: Callable[[ReportRequest], Sequence[Row]],
+    cells: Callable[[Run, Profile], tuple[str, ...]], request: ReportRequest, *, note: str = "", headed: bool = False,
+) -> list[TextTable]:  # fmt: skip
     """Make a table of counts, a row a run: visits that end as failures, or how episodes went."""
-    profile, rows = request.profiles[0], spec.rows(request)
+    profile, rows = request.profiles[0], rows_of(request)
     lines = []
     for row in rows:
         assert row.cut.run is not None
         run = request.runs[row.cut.run]
         for name, value in row.cut.where:
             run = run.where(getattr(run.episodes, name) == value)
-        lines.append((row.label, spec.cells(run, profile)))
+        lines.append((row.label, cells(run, profile)))
     sections = {k: row.section for k, row in enumerate(rows) if row.section != (rows[k - 1].section if k else "")}
-    heads = [Column(head, group) for group, names in spec.groups.items() for head in names]
-    title = f"{spec.title}, {profile.radius_m:g} m" if spec.headed else spec.title
-    notes = [spec.note.format(radius=f"{profile.radius_m:g} m")] if spec.note else []
-    return TextTable("agent", heads, lines, title, notes, sections)
+    heads = [Column(head, group) for group, names in groups.items() for head in names]
+    title = f"{title}, {profile.radius_m:g} m" if headed else title
+    notes = [note.format(radius=f"{profile.radius_m:g} m")] if note else []
+    return [TextTable("agent", heads, lines, title, notes, sections)]
 
 
 def visit_cells(run: Run, profile: Profile) -> tuple[str, ...]:
