@@ -47,12 +47,6 @@ def has_table(data: Where, run: str, table: str) -> bool:
     return all(store.shards(data, table, scene, run) for scene in run_scenes(data, run))
 
 
-def fingerprint_of(data: Where, run: str, scene: str) -> str | None:
-    """Return the fingerprint that a scene's episodes were written with; None where there are none."""
-    paths = store.shards(data, "episodes", scene, run)
-    return store.read_info(data, paths[0]).fingerprint if paths else None
-
-
 def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
     """Add finished episodes of a scene to a run's tables."""
     by_task = {record["task_id"]: record for record in records}
