@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from dataclasses import replace
 from itertools import product
@@ -288,15 +290,10 @@ def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
 
 def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
-    lines = score_rows.as_csv(request).splitlines()
-    head = lines[0].split(",")
-    (row,) = [line.split(",") for line in lines if line.startswith("paper,Claude Opus 5,aerialdojo,3.0,base")]
-    assert dict(zip(head, row, strict=True))["osr"] == "0.0784"
-    assert dict(zip(head, row, strict=True))["dts_m_sd"] == "5.97"
-    assert sum(line.startswith("paper,") for line in lines) == 22
-    (row,) = [
-        line.split(",")
-        for line in lines
-        if line.startswith("alpha,package:Alpha,aerialdojo,3.0,all,all,partition,OOD")
-    ]
-    assert dict(zip(head, row, strict=True))["sr"] == "0.25"
+    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
+    keys = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name")
+    found = {tuple(row[key] for key in keys): row for row in rows}
+    opus = found["paper", "Claude Opus 5", "aerialdojo", "3.0", "base", "all", "overall", "overall"]
+    assert (opus["osr"], opus["dts_m_sd"]) == ("0.0784", "5.97")
+    assert sum(row["run"] == "paper" for row in rows) == 22
+    assert found["alpha", "package:Alpha", "aerialdojo", "3.0", "all", "all", "partition", "OOD"]["sr"] == "0.25"
