@@ -19,6 +19,7 @@ from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.geodesic import blocked_actions
+from aerialdojo_gen.learning.labels import scatter_rows
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
@@ -155,8 +156,7 @@ def _encoded_goal(
     shown: NDArray[np.bool_],
 ) -> Any:  # fmt: skip
     shown = shown | ~columns["semantic"][rows]
-    images = np.zeros((len(rows), *columns["images"].shape[1:]), np.uint8)
-    images[shown] = columns["images"][columns["image"][rows[shown]]]
+    images = scatter_rows(columns["images"][columns["image"][rows[shown]]], shown)
     tokens = np.array(
         [vocabulary.encode(text) for text in columns["text"][rows, 1 - shown.astype(np.int64)].tolist()]
     )
