@@ -138,8 +138,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             self._data, self._sensors, success_radius_m, embodiment, renderer, self._hints, scenes_in_memory
         )
         self._begun = self._closed = False
-        chosen = map(as_names, (split, setting, modality, scene))
-        self._rows = select(self._data, Selection(*chosen, limit=limit, seed=seed))
+        splits, settings, modalities, scenes = map(as_names, (split, setting, modality, scene))
+        self._rows = select(self._data, Selection(splits, settings, modalities, scenes, limit, seed))
         self._draw = TaskSampler(self._rows["scene"].to_pylist(), episodes_per_scene)
         self._prefetch = prefetch
         self._index: dict[str, int] | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -105,7 +105,7 @@ def _measure_steps(
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
     body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
-    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, hints=hints)
+    flight = Flight(root, sensors, embodiment=body, renderer=renderer, hints=hints)
     # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]

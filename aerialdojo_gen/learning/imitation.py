@@ -129,7 +129,7 @@ class Learner:
         """Begin a phase, with a new optimiser."""
         train = self.recipe.train
         self.progress = Progress(phase)
-        self.optimiser = self.torch.optim.AdamW(
+        self.optimiser: Any = self.torch.optim.AdamW(
             self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
         )
 
