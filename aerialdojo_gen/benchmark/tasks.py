@@ -59,11 +59,9 @@ class Selection:
         """Refuse what does not exist, with what there is; give splits their names."""
         names = [name for split in self.splits for name in _USUAL.get(split, (split,))]
         object.__setattr__(self, "splits", tuple(dict.fromkeys(names)))
-        for what, chosen, known in (
-            ("split", self.splits, SUBSETS), ("setting", self.settings, SETTINGS),
-            ("modality", self.modalities, MODALITIES),
-        ):  # fmt: skip
-            check_known(f"no {what}", chosen, (*known, *_USUAL) if what == "split" else known)
+        check_known("no split", self.splits, (*SUBSETS, *_USUAL))
+        check_known("no setting", self.settings, SETTINGS)
+        check_known("no modality", self.modalities, MODALITIES)
         check_protocol(self.protocol)
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")

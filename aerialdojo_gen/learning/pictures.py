@@ -242,17 +242,14 @@ class RecordedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Read; see `Source`."""
         known = np.array([self.has(int(k)) for k in trajectories])
-        parts: list[tuple[NDArray[np.int64], Frames]] = []
-        if not known.all():
-            rows = np.flatnonzero(~known)
-            parts.append((rows, self._drawn.frames(trajectories[rows], steps[rows])))
-        if known.any():
-            # Frame after frame of each: a seek decodes from the key frame on.
-            rows = np.flatnonzero(known)
-            rows = rows[np.lexsort((steps[rows], trajectories[rows]))]
-            parts.append((rows, self._read(trajectories[rows], steps[rows])))
-        back = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        return take(join([frames for _, frames in parts]), back)
+        # Frame after frame of each: a seek decodes from the key frame on.
+        order = np.lexsort((steps, trajectories))
+        out = empty_frames(self._sensors, len(steps))
+        for rows, read in ((order[known[order]], self._read), (order[~known[order]], self._drawn.frames)):
+            if len(rows):
+                for name, seen in read(trajectories[rows], steps[rows]).items():
+                    out[name][rows] = seen
+        return out
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
