@@ -261,7 +261,7 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
         own = replace(request, runs=runs)
         table = make_table(
             own, NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), rows, _by_profile(own, _FURTHER),
-            leading=("hints",), spread=True, intervals=request.intervals, headed=False,
+            leading=("hints",), spread=True, intervals=request.intervals,
         )  # fmt: skip
         if any(not label for label, _ in table.rows):
             notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
@@ -274,7 +274,7 @@ def radius_tables(request: ReportRequest) -> list[TextTable]:
     profile = request.profiles[0]
     title = f"Success radius{'' if profile.own else f', {profile.name}'}"
     notes = _radius_notes(request)
-    return [make_table(request, title, _setting_rows(request), _by_radius(request), notes=notes, headed=False)]
+    return [make_table(request, title, _setting_rows(request), _by_radius(request), notes=notes)]
 
 
 def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
@@ -296,6 +296,7 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
 def _broken_down(
     request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], **how: Any
 ) -> list[TextTable]:
+    title = f"{title}, {profile_head(request.profiles[0])}"
     return [make_table(request, title, rows, columns, data=request.broken_down, **how)]
 
 
@@ -322,10 +323,10 @@ _CONDUCT = {
 
 
 _TABLES: dict[str, Callable[[ReportRequest], list[TextTable]]] = {
-    "overall": lambda r: _broken_down(
+    "overall": lambda r: [make_table(
         r, "Overall", _headline_rows(r), _by_profile(r, _RATES), spread=True, leading=("episodes", "hints"),
-        headed=False, notes=[_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
-    ),
+        notes=[_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)], data=r.broken_down,
+    )],
     "results": result_tables,
     "partition": lambda r: _broken_down(
         r, "ID and OOD scenes", _setting_rows(r), _by(r, "partition", gap="OOD − ID, points"),

@@ -190,12 +190,11 @@ def text(measure: str, value: float, signed: bool = False) -> str:
 def make_table(
     request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], *, stub: str = "agent",
     notes: Sequence[str] = (), leading: Sequence[str] = (), spread: bool = False, intervals: bool = False,
-    headed: bool = True, data: OutcomeTable | None = None,
+    data: OutcomeTable | None = None,
 ) -> TextTable:  # fmt: skip
     """Evaluate a table: every cell is a measure of its row's and its column's episodes.
 
-    `leading` are headings of columns that are no measures; `spread` shows deviations over scenes, `headed` names the
-    success rule in the title.
+    `leading` are headings of columns that are no measures; `spread` shows deviations over scenes.
     """
     data, base = data or request.table, Cut(profile=request.profiles[0])
     lines: list[tuple[str, tuple[str, ...]]] = []
@@ -221,7 +220,6 @@ def make_table(
     marks = {(i, shift + k): mark for k, groups in enumerate(ranked) for i, mark in _marks(groups).items()}
     heads = [Column(head) for head in leading]
     heads += [Column(column.head or MEASURES[column.measure].head, column.group) for column in columns]
-    title = f"{title}, {profile_head(request.profiles[0])}" if headed else title
     return TextTable(stub, heads, lines, title, notes, sections, marks)
 
 
