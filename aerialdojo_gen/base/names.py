@@ -38,6 +38,19 @@ def unknown(what: str, name: str, known: Iterable[str], *, besides: Sequence[str
     return f"{what} {brief(name, 100)!r}: {did_you_mean(name, names, most) or _listed([*names, *besides])}"
 
 
+def as_names(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names, where one may stand alone."""
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def check_known(what: str, names: Iterable[str], known: Iterable[str], *, besides: Sequence[str] = ()) -> None:
+    """Refuse names that do not exist: `UsageError` for the first."""
+    listed = [*known]
+    for name in names:
+        if name not in (*listed, *besides):
+            raise UsageError(unknown(what, name, listed, besides=besides))
+
+
 def _listed(names: Sequence[str]) -> str:
     if not names:
         return "there is none"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.constants import MODALITIES, SUCCESS_RADIUS_M
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import as_names, unknown
 from aerialdojo_gen.benchmark import tasks
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS, Sensors
 from aerialdojo_gen.benchmark.flight import Flight
@@ -131,16 +131,15 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
                 raise UsageError(f"{name} is at least 1, not {number}")
         self.render_mode = render_mode
         self._data = open_root(data)
-        self._sensors = sensors or Sensors(_names(views), rgb, depth, width, height, light=light)
-        self._hints = check_hints(_names(tell))
+        self._sensors = sensors or Sensors(as_names(views), rgb, depth, width, height, light=light)
+        self._hints = check_hints(as_names(tell))
         self._paraphrase = tasks.check_paraphrase(paraphrase)
         self._flight = Flight(
             self._data, self._sensors, success_radius_m, embodiment, renderer, self._hints, scenes_in_memory
         )
         self._begun = self._closed = False
-        self._rows = select(
-            self._data, Selection(_names(split), _names(setting), _names(modality), _names(scene), limit, seed)
-        )
+        splits, settings, modalities, scenes = map(as_names, (split, setting, modality, scene))
+        self._rows = select(self._data, Selection(splits, settings, modalities, scenes, limit, seed))
         self._draw = TaskSampler(self._rows["scene"].to_pylist(), episodes_per_scene)
         self._prefetch = prefetch
         self._index: dict[str, int] | None = None
@@ -267,12 +266,8 @@ class AerialDojoEnv(gymnasium.Env[dict[str, Any], np.int64]):
             self._closed, self._begun = True, False
             self._flight.close()
 
-    def __copy__(self) -> AerialDojoEnv:
-        """Refuse: see `__deepcopy__`."""
-        raise TypeError(_NO_COPY)
-
-    def __deepcopy__(self, _memo: dict[int, Any]) -> AerialDojoEnv:
-        """Refuse: a copy would share what draws, and what holds the scene, with this one."""
+    def __reduce__(self) -> str:
+        """Refuse to be copied: a copy would share what draws, and what holds the scene, with this one."""
         raise TypeError(_NO_COPY)
 
     @property
@@ -369,7 +364,3 @@ def make_env(data: Where = "data", **options: Any) -> AerialDojoEnv:
         There is no release in `data`.
     """
     return AerialDojoEnv(open_root(data).url, **options)
-
-
-def _names(given: str | Sequence[str]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(given)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
@@ -48,12 +47,6 @@ def has_table(data: Where, run: str, table: str) -> bool:
     return all(store.shards(data, table, scene, run) for scene in run_scenes(data, run))
 
 
-def fingerprint_of(data: Where, run: str, scene: str) -> str | None:
-    """Return the fingerprint that a scene's episodes were written with; None where there are none."""
-    paths = store.shards(data, "episodes", scene, run)
-    return store.read_info(data, paths[0]).fingerprint if paths else None
-
-
 def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, Any]], fingerprint: str) -> None:
     """Add finished episodes of a scene to a run's tables."""
     by_task = {record["task_id"]: record for record in records}
@@ -79,20 +72,13 @@ def add_records(data: Where, run: str, scene: str, records: Sequence[dict[str, A
 
 
 def _steps(run: str, scene: str, flown: Sequence[dict[str, Any]]) -> pa.Table:
-    lengths = [len(record["steps"]["action"]) for record in flown]
-    n = sum(lengths)
-    names = [name for name in schemas.STEPS.schema.names if flown and name in flown[0]["steps"]]
-    columns: dict[str, Any] = {
-        name: [value for record in flown for value in record["steps"][name]] for name in names
-    }  # fmt: skip
-    columns |= {
-        "run_id": [run] * n,
-        "scene": [scene] * n,
-        "task_id": np.repeat(np.array([record["task_id"] for record in flown], dtype=object), lengths),
-        "step": np.concatenate([np.arange(k) for k in (0, *lengths)]),
-    }
-    schema = schemas.STEPS.schema
-    return pa.table({f.name: pa.array(columns.get(f.name, []), f.type) for f in schema}, schema=schema)
+    """Join the columns of the episodes' steps."""
+    parts = [schemas.STEPS.schema.empty_table()]
+    for record in flown:
+        own, n = {"run_id": run, "scene": scene, "task_id": record["task_id"]}, len(record["steps"]["action"])
+        columns = {name: [value] * n for name, value in own.items()} | {"step": [*range(n)]} | record["steps"]
+        parts.append(pa.table(columns, schema=schemas.STEPS.schema))
+    return pa.concat_tables(parts)
 
 
 def remove_run(data: Where, run: str) -> None:

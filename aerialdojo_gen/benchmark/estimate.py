@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -105,7 +105,7 @@ def _measure_steps(
     """Fly the first steps of a few tasks; tokens in and out, seconds of a request and of its pictures, how many."""
     sensors = evaluation.sensors or agent.sensors
     body, renderer, hints = evaluation.embodiment, evaluation.renderer, evaluation.hints
-    flight = Flight(root, replace(sensors), embodiment=body, renderer=renderer, hints=hints)
+    flight = Flight(root, sensors, embodiment=body, renderer=renderer, hints=hints)
     # Of one scene: opening another takes longer than all the requests.
     few = rows.filter(pc.equal(rows["scene"], rows["scene"][0].as_py())).slice(0, _TASKS)
     sums = [0.0, 0.0, 0.0, 0.0]
@@ -144,12 +144,8 @@ def _measure_steps(
 
 def _reference_actions(root: DataRoot, rows: pa.Table) -> int:
     """Total actions of the references of all task instances."""
-    total = 0
-    for scene in rows["scene"].unique().to_pylist():
-        mine = rows.filter(pc.equal(rows["scene"], scene))
-        for subset in mine["subset"].unique().to_pylist():
-            routes = store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "n_actions"))
-            counts = dict(zip(routes["nav_id"].to_pylist(), routes["n_actions"].to_pylist(), strict=True))
-            of_subset = mine.filter(pc.equal(mine["subset"], subset))
-            total += sum(counts[nav_id] for nav_id in of_subset["nav_id"].to_pylist())
-    return total
+    counts: dict[str, int] = {}
+    for scene, subset in set(zip(rows["scene"].to_pylist(), rows["subset"].to_pylist(), strict=True)):
+        routes = store.read_scene(root, f"routes/{subset}", scene, ("nav_id", "n_actions"))
+        counts |= zip(routes["nav_id"].to_pylist(), routes["n_actions"].to_pylist(), strict=True)
+    return sum(counts[nav_id] for nav_id in rows["nav_id"].to_pylist())

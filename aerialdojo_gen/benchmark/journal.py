@@ -14,6 +14,7 @@ import secrets
 import shutil
 import time
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -25,7 +26,7 @@ from aerialdojo_gen.store.layout import check_run_name
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """A file of finished episodes, written line by line; a context manager."""
 
     def __init__(self, path: Path) -> None:
@@ -47,10 +48,6 @@ class Journal:
             self._file.flush()
         except OSError as error:
             raise disk_error(error, self._path) from None
-
-    def __enter__(self) -> Journal:
-        """Return itself."""
-        return self
 
     def __exit__(self, *_: object) -> None:
         """Close the file."""

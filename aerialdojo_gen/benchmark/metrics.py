@@ -15,8 +15,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.store.schemas import FAMILIES
 
 
@@ -66,8 +66,7 @@ DEFAULT_PROFILES = ("aerialdojo", "aerialdojo-5m")
 
 def profile_named(name: str) -> Profile:
     """Return a profile by its name."""
-    if name not in PROFILES:
-        raise UsageError(unknown("no profile", name, PROFILES))
+    check_known("no profile", [name], PROFILES)
     return PROFILES[name]
 
 
@@ -299,13 +298,9 @@ def summarize(episodes: Episodes, profile: Profile) -> Summary:
 def success_curve(episodes: Episodes, profile: Profile, radii_m: Floats) -> tuple[Floats, Floats]:
     """Overall SR and OSR, fractions (r,), at radii in metres, everything else by the profile."""
     # An episode's share of the overall mean: its scene's among its family's scenes, its family's among the families.
-    weight = np.empty(len(episodes))
-    families = sorted(set(episodes.family.tolist()))
-    for family in families:
-        scenes = sorted(set(episodes.scene[episodes.family == family].tolist()))
-        for name in scenes:
-            mask = episodes.scene == name
-            weight[mask] = 1.0 / (mask.sum() * len(scenes) * len(families))
+    _, first, scene, flown = np.unique(episodes.scene, return_index=True, return_inverse=True, return_counts=True)
+    families, family, scenes = np.unique(episodes.family[first], return_inverse=True, return_counts=True)
+    weight = (1.0 / (flown * scenes[family] * len(families)))[scene]
     final, nearest = distances(episodes, profile)
     may = may_succeed(episodes, profile)
     return _share_within(final[may], weight[may], radii_m), _share_within(nearest, weight, radii_m)

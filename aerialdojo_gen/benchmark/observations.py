@@ -91,9 +91,14 @@ def render_views(
         if sensors.rgb:
             rgb[view] = pictures[0, v]
         if sensors.depth:
-            depth_m[view] = depths[0, v]
-            np.putmask(depth_m[view], ~(depth_m[view] <= np.float32(sensors.max_depth_m)), np.float32(0.0))
+            depth_m[view] = clip_depth(depths[0, v], sensors)
     return rgb, depth_m
+
+
+def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
+    """Set depth to 0 where nothing is in the sensors' range; in place."""
+    np.putmask(depth_m, ~(depth_m <= np.float32(sensors.max_depth_m)), np.float32(0.0))
+    return depth_m
 
 
 def mosaic(pictures: Pictures) -> NDArray[np.uint8]:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
@@ -23,15 +25,12 @@ def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Text
         named = ", ".join(run.name for run in runs)
         raise UsageError(f"--paired compares two runs, not {len(runs)} ({named}): name two")
     first, second = runs
-    tasks = [np.array(run.table["task_id"].to_pylist(), dtype=np.str_) for run in runs]
-    both = np.intersect1d(tasks[0], tasks[1])
-    if not len(both):
+    tasks = [run.table["task_id"].combine_chunks() for run in runs]
+    both = sorted({*tasks[0].to_pylist()} & {*tasks[1].to_pylist()})
+    if not both:
         raise UsageError(f"{first.name} and {second.name} have no task in common: fly both on the same ones")
-    orders = [np.argsort(ids) for ids in tasks]
-    cut = [
-        run.where(order[np.searchsorted(ids[order], both)])
-        for run, ids, order in zip(runs, tasks, orders, strict=True)
-    ]
+    wanted = pa.array(both, pa.string())
+    cut = [run.where(pc.index_in(wanted, value_set=ids).to_numpy()) for run, ids in zip(runs, tasks, strict=True)]
     return [_table(cut[0], cut[1], profile) for profile in profiles]
 
 

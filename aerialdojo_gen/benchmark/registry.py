@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from aerialdojo_gen.base.constants import MODALITIES
-from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.text_table import TextTable
 from aerialdojo_gen.benchmark import tables
 from aerialdojo_gen.benchmark.difficulty import DIFFICULTY, SEEN
 from aerialdojo_gen.benchmark.metrics import METRICS, at_radius
 from aerialdojo_gen.benchmark.runs import ADAPTED, GROUP_OF, UPPER_BOUND, Run
-from aerialdojo_gen.benchmark.tables import Cell, Cut, ReportRequest, Row, TableSpec, make_table, profile_head
+from aerialdojo_gen.benchmark.tables import Cell, Cut, ReportRequest, Row, make_table, profile_head
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
 
 PARTITIONS = ("ID", "OOD", ADAPTED)
@@ -92,21 +92,17 @@ def _cells(parts: Mapping[str, Cut], measures: Sequence[str]) -> list[Cell]:
     return [Cell(head, name, cut) for head, cut in parts.items() for name in measures]
 
 
-def _by(column: str, heads: Sequence[str] = (), *, gap: str = "") -> Callable[[ReportRequest], list[Cell]]:
+def _by(request: ReportRequest, column: str, heads: Sequence[str] = (), *, gap: str = "") -> list[Cell]:
     """Make columns a value of a column; and the differences of the rates of its first two values."""
     values = _ORDER[column]
     named = heads or [NAMES_OF.get(value, value) for value in values]
     cuts = [Cut(where=((column, value),)) for value in values]
-
-    def columns(request: ReportRequest) -> list[Cell]:
-        parts = dict(zip(named, cuts, strict=True))
-        if ADAPTED not in request.table.values("partition", Cut()):
-            parts.pop(ADAPTED, None)
-        cells = _cells(parts, request.shown())
-        rates = {"sr": "SR", "osr": "OSR"} if gap else {}
-        return cells + [Cell(gap, name, cuts[1], head, (name, cuts[0])) for name, head in rates.items()]
-
-    return columns
+    parts = dict(zip(named, cuts, strict=True))
+    if ADAPTED not in request.table.values("partition", Cut()):
+        parts.pop(ADAPTED, None)
+    rates = {"sr": "SR", "osr": "OSR"} if gap else {}
+    gaps = [Cell(gap, name, cuts[1], head, (name, cuts[0])) for name, head in rates.items()]
+    return _cells(parts, request.shown()) + gaps
 
 
 def _by_run(request: ReportRequest) -> list[Cell]:
@@ -262,11 +258,11 @@ def result_tables(request: ReportRequest) -> list[TextTable]:
                 "The paper's agents flew in its own simulator (Unreal Engine), on other scenes and tasks; its ± fits "
                 "the sample standard deviation over eight maps. Its rows are ranked among themselves."
             )
-        spec = TableSpec(
-            NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), lambda _, own=rows: own,  # type: ignore[misc]
-            partial(_by_profile, metrics=_FURTHER), spread=True, leading=("hints",), headed=False,
+        own = replace(request, runs=runs)
+        table = make_table(
+            own, NAMES_OF[setting] + _PAPER_TABLES.get(setting, ""), rows, _by_profile(own, _FURTHER),
+            leading=("hints",), spread=True, intervals=request.intervals,
         )  # fmt: skip
-        table = make_table(spec, replace(request, runs=runs), intervals=request.intervals)
         if any(not label for label, _ in table.rows):
             notes[0] += " Below: 95 % bootstrap interval, scenes drawn anew within their family."
         made.append(replace(table, notes=[*notes, *caveats(runs)]))
@@ -277,7 +273,8 @@ def radius_tables(request: ReportRequest) -> list[TextTable]:
     """SR and OSR at several radii; notes name the agents whose order changes between radii."""
     profile = request.profiles[0]
     title = f"Success radius{'' if profile.own else f', {profile.name}'}"
-    return [make_table(TableSpec(title, _setting_rows, _by_radius, notes=_radius_notes, headed=False), request)]
+    notes = _radius_notes(request)
+    return [make_table(request, title, _setting_rows(request), _by_radius(request), notes=notes)]
 
 
 def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
@@ -292,62 +289,70 @@ def breakdown_tables(request: ReportRequest, kind: str) -> list[TextTable]:
         note = " ".join(filter(None, (found.note, f"Episodes – {sizes}." if alike else "")))
         cuts = {part: Cut(where=((found.name, part),)) for part in found.parts}
         cells = _cells(cuts, request.shown(_RATES))
-        spec = TableSpec(found.title, run_rows, lambda _, own=cells: own)  # type: ignore[misc]
-        made.append(replace(make_table(spec, request, request.broken_down), notes=[note] if note else []))
+        made += _broken_down(request, found.title, run_rows(request), cells, notes=[note] if note else [])
     return made
 
 
-_TABLES: dict[str, TableSpec | tables.CountSpec | Callable[[ReportRequest], list[TextTable]]] = {
-    "overall": TableSpec(
-        "Overall", _headline_rows, partial(_by_profile, metrics=_RATES), spread=True, leading=("episodes", "hints"),
-        headed=False, notes=lambda r: [_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)],
-    ),
+def _broken_down(
+    request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], **how: Any
+) -> list[TextTable]:
+    title = f"{title}, {profile_head(request.profiles[0])}"
+    return [make_table(request, title, rows, columns, data=request.broken_down, **how)]
+
+
+def visit_tables(request: ReportRequest) -> list[TextTable]:
+    """Count visits that end as failures."""
+    radius = f"{request.profiles[0].radius_m:g} m"
+    groups = {
+        "episodes": ("flown", "visited", "solved", "lost"),
+        "lost: how they ended, %": ("too far", "collided", "ran out", "no Stop"),
+    }
+    note = (
+        f"Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out: of "
+        "actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
+        "averaged."
+    )
+    title, rows = f"Where visits are lost, {radius}", _setting_rows(request)
+    return [tables.count_table(request, title, rows, groups, tables.visit_cells, [note])]
+
+
+_CONDUCT = {
+    "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
+    "service": ("requests", "tokens in", "tokens out", "USD"),
+}  # fmt: skip
+
+
+_TABLES: dict[str, Callable[[ReportRequest], list[TextTable]]] = {
+    "overall": lambda r: [make_table(
+        r, "Overall", _headline_rows(r), _by_profile(r, _RATES), spread=True, leading=("episodes", "hints"),
+        notes=[_MEANS.format("four "), *sample_notes(r, r.runs), *caveats(r.runs)], data=r.broken_down,
+    )],
     "results": result_tables,
-    "partition": TableSpec(
-        "ID and OOD scenes", _setting_rows, _by("partition", gap="OOD − ID, points"),
-        notes=lambda r: _adapted_notes(r.runs),
+    "partition": lambda r: _broken_down(
+        r, "ID and OOD scenes", _setting_rows(r), _by(r, "partition", gap="OOD − ID, points"),
+        notes=_adapted_notes(r.runs),
     ),
-    "family": TableSpec("By family", run_rows, _by("family")),
-    "averages": TableSpec("Two averages", _headline_rows, _by_average, notes=lambda _: [
+    "family": lambda r: _broken_down(r, "By family", run_rows(r), _by(r, "family")),
+    "averages": lambda r: _broken_down(r, "Two averages", _headline_rows(r), _by_average(r), notes=[
         "A family counts a quarter on the left, as much as it has tasks on the right: two different populations."
     ]),
-    "setting": TableSpec("By setting", run_rows, _by("setting")),
-    "goal": TableSpec(
-        "Goal type", _setting_rows, _by("modality", ("Semantic goal", "Image goal"), gap="image − semantic, points")
+    "setting": lambda r: _broken_down(r, "By setting", run_rows(r), _by(r, "setting")),
+    "goal": lambda r: _broken_down(
+        r, "Goal type", _setting_rows(r),
+        _by(r, "modality", ("Semantic goal", "Image goal"), gap="image − semantic, points"),
     ),
-    "modality": TableSpec("By modality", run_rows, _by("modality")),
+    "modality": lambda r: _broken_down(r, "By modality", run_rows(r), _by(r, "modality")),
     "radius": radius_tables,
-    "visits": tables.CountSpec(
-        "Where visits are lost", {
-            "episodes": ("flown", "visited", "solved", "lost"),
-            "lost: how they ended, %": ("too far", "collided", "ran out", "no Stop"),
-        }, _setting_rows, tables.visit_cells,
-        "Visited: within {radius} at some pose. Lost: visited and no success. Too far: stopped outside; ran out: "
-        "of actions, outside; no Stop: ran out of actions within the radius. Episodes are counted, families not "
-        "averaged.",
-        headed=True,
-    ),
+    "visits": visit_tables,
     "difficulty": partial(breakdown_tables, kind=DIFFICULTY),
     "seen": partial(breakdown_tables, kind=SEEN),
-    "conduct": tables.CountSpec(
-        "How episodes went", {
-            "ended by, %": ("Stop", "collision", "budget"), "actions": ("mean", "refused", "unreadable"),
-            "service": ("requests", "tokens in", "tokens out", "USD"),
-        }, run_rows, tables.outcome_cells,
-    ),
-    "type": TableSpec("By scene type", _type_rows, _by_run, "scene type"),
-    "scene": TableSpec("By scene", _scene_rows, _by_run, "scene"),
+    "conduct": lambda r: [tables.count_table(r, "How episodes went", run_rows(r), _CONDUCT, tables.outcome_cells)],
+    "type": lambda r: _broken_down(r, "By scene type", _type_rows(r), _by_run(r), stub="scene type"),
+    "scene": lambda r: _broken_down(r, "By scene", _scene_rows(r), _by_run(r), stub="scene"),
 }  # fmt: skip
 NAMES = tuple(_TABLES)
 # What the paper's split leaves out, and the paper's tables; the others are optional.
 DEFAULT = ("overall", "results")
-
-
-def _made(request: ReportRequest, name: str) -> list[TextTable]:
-    spec = _TABLES[name]
-    if isinstance(spec, TableSpec):
-        return [make_table(spec, request, request.broken_down)]
-    return [tables.count_table(spec, request)] if isinstance(spec, tables.CountSpec) else spec(request)
 
 
 def report_tables(request: ReportRequest, names: Sequence[str] = DEFAULT) -> list[TextTable]:
@@ -363,13 +368,11 @@ def missing_note(request: ReportRequest, names: Sequence[str] = DEFAULT) -> str:
 
 def check_names(names: Sequence[str]) -> Sequence[str]:
     """Return the names; UsageError for an unknown one."""
-    for name in names:
-        if name not in (*NAMES, "all"):
-            raise UsageError(unknown("no table", name, NAMES, besides=("all",)))
+    check_known("no table", names, NAMES, besides=("all",))
     return names
 
 
 def named_tables(request: ReportRequest, names: Sequence[str]) -> dict[str, list[TextTable]]:
     """Make tables by name."""
     check_names(names)
-    return {name: _made(request, name) for name in NAMES if "all" in names or name in names}
+    return {name: _TABLES[name](request) for name in NAMES if "all" in names or name in names}

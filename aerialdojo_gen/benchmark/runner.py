@@ -150,7 +150,8 @@ class RunLog:
                     what = f"other {key}" if key in own else what
                     raise UsageError(f"run {self._name!r} was begun with {what}: {advice}")
         for scene in episodes.run_scenes(self._out, self._name):
-            if episodes.fingerprint_of(self._out, self._name, scene) != self._fingerprint:
+            written = store.shards(self._out, "episodes", scene, self._name)[0]
+            if store.read_info(self._out, written).fingerprint != self._fingerprint:
                 raise UsageError(f"there are episodes of another run {self._name!r} in {self._out}: {advice}")
         with self._folder.commit(_SETTINGS) as temporary:
             temporary.write_text(json.dumps(self._settings, indent=2, sort_keys=True) + "\n", encoding="utf-8")

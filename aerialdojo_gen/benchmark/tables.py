@@ -73,7 +73,9 @@ class OutcomeTable:
         columns["malls"] = np.where(np.isin(columns["scene"], MALLS), "malls", "other scenes")
         columns["run"] = np.repeat(np.arange(len(runs)), [len(run.episodes) for run in runs])
         self.columns = columns | {name: np.concatenate(parts) for name, parts in (labels or {}).items()}
-        self.judged, self.summary, self.intervals = cache(self._judged), cache(self._summary), cache(self._interval)
+        self.judged, self.summary = cache(self._judged), cache(self._summary)
+        # The 95 % intervals of a cut's overall metrics, in the order of `METRICS`.
+        self.intervals = cache(lambda cut: score_intervals(self.summary(cut)))
 
     def _judged(self, profile: Profile, along_way: bool = False) -> Floats:
         """Return the `METRICS` of every episode, (n, 6), by a profile."""
@@ -101,10 +103,6 @@ class OutcomeTable:
         assert cut.profile is not None
         scene, family = (self.columns[name][mask] for name in ("scene", "family"))
         return summarize_values(self.judged(cut.profile, cut.along_way)[mask], scene, family)
-
-    def _interval(self, cut: Cut) -> Sequence[tuple[float, float]]:
-        """Return the 95 % intervals of a cut's overall metrics, in the order of `METRICS`."""
-        return score_intervals(self.summary(cut))
 
     def score(self, cut: Cut) -> Score:
         """Average a cut to one score."""
@@ -174,20 +172,6 @@ class Cell:
     minus: tuple[str, Cut] | None = None
 
 
-@dataclass(frozen=True)
-class TableSpec:
-    """How a table is made: its rows, its columns, its words."""
-
-    title: str
-    rows: Callable[[ReportRequest], Sequence[Row]]
-    columns: Callable[[ReportRequest], Sequence[Cell]]
-    stub: str = "agent"
-    notes: Callable[[ReportRequest], Sequence[str]] = lambda _: ()
-    spread: bool = False  # Whether deviations over scenes are shown
-    leading: tuple[str, ...] = ()  # Headings of columns that are no measures
-    headed: bool = True  # Whether the title names the success rule
-
-
 def profile_head(profile: Profile) -> str:
     """Name a success rule in a heading: its radius, and its name unless it is the benchmark's own."""
     return f"{'' if profile.own else f'{profile.name}, '}{profile.radius_m:g} m"
@@ -204,11 +188,15 @@ def text(measure: str, value: float, signed: bool = False) -> str:
 
 
 def make_table(
-    spec: TableSpec, request: ReportRequest, data: OutcomeTable | None = None, intervals: bool = False
-) -> TextTable:
-    """Evaluate a table: every cell is a measure of its row's and its column's episodes."""
-    data = data or request.table
-    base, columns, rows = Cut(profile=request.profiles[0]), spec.columns(request), spec.rows(request)
+    request: ReportRequest, title: str, rows: Sequence[Row], columns: Sequence[Cell], *, stub: str = "agent",
+    notes: Sequence[str] = (), leading: Sequence[str] = (), spread: bool = False, intervals: bool = False,
+    data: OutcomeTable | None = None,
+) -> TextTable:  # fmt: skip
+    """Evaluate a table: every cell is a measure of its row's and its column's episodes.
+
+    `leading` are headings of columns that are no measures; `spread` shows deviations over scenes.
+    """
+    data, base = data or request.table, Cut(profile=request.profiles[0])
     lines: list[tuple[str, tuple[str, ...]]] = []
     sections: dict[int, str] = {}
     ranked: list[dict[str, list[tuple[float, int]]]] = [{} for _ in columns]
@@ -218,22 +206,21 @@ def make_table(
             sections[len(lines)] = above = row.section
         cells = []
         for column, group in zip(columns, ranked, strict=True):
-            value, spread = _value(data, base, row, column, spec.spread)
-            deviation = "" if math.isnan(spread) else f" ± {text(column.measure, spread)}"
+            value, off = _value(data, base, row, column, spread)
+            deviation = "" if math.isnan(off) else f" ± {text(column.measure, off)}"
             cells.append(text(column.measure, value, signed=column.minus is not None) + deviation)
             if row.rank_group is not None and column.minus is None and not math.isnan(value):
                 figure = MEASURES[column.measure].direction * printed(column.measure, value)
                 group.setdefault(row.rank_group, []).append((figure, len(lines)))
-        lines.append((row.label, (*(row.leading.get(head, NONE) for head in spec.leading), *cells)))
+        lines.append((row.label, (*(row.leading.get(head, NONE) for head in leading), *cells)))
         if intervals and row.result is None:
-            gap = ("",) * len(spec.leading)
+            gap = ("",) * len(leading)
             lines += [(label, gap + ends) for label, ends in _interval_line(data, base | row.cut, columns)]
-    shift = len(spec.leading)
+    shift = len(leading)
     marks = {(i, shift + k): mark for k, groups in enumerate(ranked) for i, mark in _marks(groups).items()}
-    heads = [Column(head) for head in spec.leading]
+    heads = [Column(head) for head in leading]
     heads += [Column(column.head or MEASURES[column.measure].head, column.group) for column in columns]
-    title = f"{spec.title}, {profile_head(request.profiles[0])}" if spec.headed else spec.title
-    return TextTable(spec.stub, heads, lines, title, spec.notes(request), sections, marks)
+    return TextTable(stub, heads, lines, title, notes, sections, marks)
 
 
 def _value(data: OutcomeTable, base: Cut, row: Row, column: Cell, spread: bool) -> tuple[float, float]:
@@ -269,32 +256,21 @@ def _marks(groups: Mapping[str, Sequence[tuple[float, int]]]) -> dict[int, str]:
     return marks
 
 
-@dataclass(frozen=True)
-class CountSpec:
-    """How a table of counts is made, a row a run."""
-
-    title: str
-    groups: Mapping[str, Sequence[str]]
-    rows: Callable[[ReportRequest], Sequence[Row]]
-    cells: Callable[[Run, Profile], tuple[str, ...]]
-    note: str = ""
-    headed: bool = False
-
-
-def count_table(spec: CountSpec, request: ReportRequest) -> TextTable:
+def count_table(
+    request: ReportRequest, title: str, rows: Sequence[Row], groups: Mapping[str, Sequence[str]],
+    cells: Callable[[Run, Profile], tuple[str, ...]], notes: Sequence[str] = (),
+) -> TextTable:  # fmt: skip
     """Make a table of counts, a row a run: visits that end as failures, or how episodes went."""
-    profile, rows = request.profiles[0], spec.rows(request)
+    profile = request.profiles[0]
     lines = []
     for row in rows:
         assert row.cut.run is not None
         run = request.runs[row.cut.run]
         for name, value in row.cut.where:
             run = run.where(getattr(run.episodes, name) == value)
-        lines.append((row.label, spec.cells(run, profile)))
+        lines.append((row.label, cells(run, profile)))
     sections = {k: row.section for k, row in enumerate(rows) if row.section != (rows[k - 1].section if k else "")}
-    heads = [Column(head, group) for group, names in spec.groups.items() for head in names]
-    title = f"{spec.title}, {profile.radius_m:g} m" if spec.headed else spec.title
-    notes = [spec.note.format(radius=f"{profile.radius_m:g} m")] if spec.note else []
+    heads = [Column(head, group) for group, names in groups.items() for head in names]
     return TextTable("agent", heads, lines, title, notes, sections)
 
 

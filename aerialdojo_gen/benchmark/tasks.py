@@ -19,7 +19,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.benchmark.agents.goal import HINTS, Goal, Heading, Rules
 from aerialdojo_gen.dataset.contents import scenes_in_release
@@ -59,14 +59,9 @@ class Selection:
         """Refuse what does not exist, with what there is; give splits their names."""
         names = [name for split in self.splits for name in _USUAL.get(split, (split,))]
         object.__setattr__(self, "splits", tuple(dict.fromkeys(names)))
-        for what, chosen, known in (
-            ("split", self.splits, SUBSETS), ("setting", self.settings, SETTINGS),
-            ("modality", self.modalities, MODALITIES),
-        ):  # fmt: skip
-            for name in chosen:
-                if name not in known:
-                    also = tuple(_USUAL) if what == "split" else ()
-                    raise UsageError(unknown(f"no {what}", name, (*known, *also)))
+        check_known("no split", self.splits, (*SUBSETS, *_USUAL))
+        check_known("no setting", self.settings, SETTINGS)
+        check_known("no modality", self.modalities, MODALITIES)
         check_protocol(self.protocol)
         if self.limit is not None and self.limit < 1:
             raise UsageError(f"a limit is at least 1, not {self.limit}")
@@ -112,20 +107,23 @@ def select(data: Where, selection: Selection) -> pa.Table:
         what = "the paper's sample, test tasks of base and standard," if selection.protocol else "the release"
         raise UsageError(f"no task of {what} fits: widen --split, --setting, --modality or --scene")
     found = found.sort_by([(key, "ascending") for key in TASKS.key])
-    return found if selection.limit is None else _sample(found, selection.limit, selection.seed)
+    if selection.limit is None:
+        return found
+    scenes, ids = (found[column].to_pylist() for column in ("scene", "task_id"))
+    return found.take(pa.array(draw_evenly(scenes, ids, selection.limit, selection.seed, "evaluate")))
 
 
-def _sample(found: pa.Table, limit: int, seed: int) -> pa.Table:
-    """Take the first of every scene in random order, then the second, and so on, up to the limit."""
+def draw_evenly(scenes: Sequence[str], ids: Sequence[str], limit: int, seed: int, stage: str) -> list[int]:
+    """Draw rows, ascending: the first of every scene in random order, then the second, and so on, up to the limit."""
     by_scene: dict[str, list[tuple[int, int]]] = {}
-    for i, (scene, task_id) in enumerate(zip(*(found[c].to_pylist() for c in ("scene", "task_id")), strict=True)):
-        by_scene.setdefault(scene, []).append((rng.rank(seed, "evaluate", task_id), i))
+    for i, (scene, name) in enumerate(zip(scenes, ids, strict=True)):
+        by_scene.setdefault(scene, []).append((rng.rank(seed, stage, name), i))
     keys = [
-        (turn, rng.rank(seed, "evaluate", scene), i)
+        (turn, rng.rank(seed, stage, scene), i)
         for scene, ranked in by_scene.items()
         for turn, (_, i) in enumerate(sorted(ranked)[:limit])
     ]
-    return found.take(pa.array(sorted(i for _, _, i in sorted(keys)[:limit])))
+    return sorted(i for _, _, i in sorted(keys)[:limit])
 
 
 def goals_withheld(root: DataRoot, scene: str, subset: str) -> bool:
@@ -174,9 +172,7 @@ def reference_actions(
 
 def check_hints(hints: Sequence[str]) -> tuple[str, ...]:
     """Return the names of hints in their fixed order; UsageError for an unknown one."""
-    for name in hints:
-        if name not in HINTS:
-            raise UsageError(unknown("no hint", name, HINTS))
+    check_known("no hint", hints, HINTS)
     return tuple(name for name in HINTS if name in hints)
 
 
@@ -236,8 +232,7 @@ _PARAPHRASES = ("task", "random")
 
 def check_paraphrase(choice: str) -> str:
     """Return the choice; UsageError for an unknown one."""
-    if choice not in _PARAPHRASES:
-        raise UsageError(unknown("no choice of paraphrase", choice, _PARAPHRASES))
+    check_known("no choice of paraphrase", [choice], _PARAPHRASES)
     return choice
 
 

@@ -142,6 +142,11 @@ class WorkUnit:
     rows: pa.Table  # Rows of `aerialdojo_gen.benchmark.tasks.select`
     journal: Path  # File for finished episodes
 
+    @property
+    def label(self) -> str:
+        """Name it in messages."""
+        return f"evaluate {self.scene}"
+
 
 @dataclass(frozen=True)
 class Failed:
@@ -164,14 +169,9 @@ class Finished:
 
     def __add__(self, other: Finished) -> Finished:
         """Add later episodes."""
-        return Finished(
-            self.episodes + other.episodes,
-            self.actions + other.actions,
-            self.cost_usd + other.cost_usd,
-            self.tokens + other.tokens,
-            self.flown + other.flown,
-            other.streak if other.flown else self.streak + other.streak,
-        )
+        names = ("episodes", "actions", "cost_usd", "tokens", "flown")
+        sums = {name: getattr(self, name) + getattr(other, name) for name in names}
+        return Finished(**sums, streak=other.streak if other.flown else self.streak + other.streak)
 
 
 @dataclass(frozen=True)
@@ -312,24 +312,19 @@ class Worker:
         near = view is not None and view.viewpoint_distance_m <= radius_m and view.target_in_sight
         copied = ("task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "split", "setting",
                 "modality", "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")  # fmt: skip
+        told = ("stop_called", "termination", "min_distance_m", "min_horizontal_distance_m", "path_length_m",
+                "n_actions", "n_refused", "n_invalid")  # fmt: skip
         return {
             **self._identity,
             **{name: row[name] for name in copied},
+            **{name: getattr(episode, name) for name in told},
             "success": episode.success(radius_m),
             "oracle_success": episode.min_distance_m <= radius_m,
             "collision": episode.termination == "collision",
-            "stop_called": episode.stop_called,
-            "termination": episode.termination,
             "final_distance_m": episode.distance_m,
-            "min_distance_m": episode.min_distance_m,
             "final_horizontal_distance_m": episode.horizontal_distance_m,
-            "min_horizontal_distance_m": episode.min_horizontal_distance_m,
-            "path_length_m": episode.path_length_m,
             "reference_length_m": task.length_m,
             "euclidean_m": task.euclidean_m,
-            "n_actions": episode.n_actions,
-            "n_refused": episode.n_refused,
-            "n_invalid": episode.n_invalid,
             "success_view": None if view is None else episode.termination == "stop" and near,
             "viewpoint_distance_m": None if view is None else view.viewpoint_distance_m,
             "target_in_sight": None if view is None else view.target_in_sight,

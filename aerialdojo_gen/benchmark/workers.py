@@ -6,7 +6,7 @@ import contextlib
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
@@ -53,21 +53,6 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
                 close()
 
 
-@dataclass(frozen=True)
-class _Work:
-    data: DataRoot
-    evaluation: Evaluation
-    unit: WorkUnit
-
-    @property
-    def label(self) -> str:
-        return f"evaluate {self.unit.scene}"
-
-    @property
-    def scene(self) -> str:
-        return self.unit.scene
-
-
 def fly_units(
     data: DataRoot,
     evaluation: Evaluation,
@@ -78,10 +63,8 @@ def fly_units(
 ) -> Iterator[str]:
     """Fly units, and yield a scene when all of its units are finished."""
     left = Counter(unit.scene for unit in units)
-    work = [_Work(data, evaluation, unit) for unit in units]
-    for outcome in executor.map(
-        _fly, work, lambda one: one.scene, channel=ParentChannel(on_finished, stopped), memory_mb=MEMORY_MB
-    ):
+    fly, channel = partial(_fly, data, evaluation), ParentChannel(on_finished, stopped)
+    for outcome in executor.map(fly, units, lambda unit: unit.scene, channel=channel, memory_mb=MEMORY_MB):
         if isinstance(outcome, AerialDojoError):
             raise outcome
         left[outcome] -= 1
@@ -93,12 +76,12 @@ def fly_units(
 _worker_of_process: dict[str, Worker] = {}
 
 
-def _fly(work: _Work, link: WorkerChannel) -> str:
+def _fly(data: DataRoot, evaluation: Evaluation, unit: WorkUnit, link: WorkerChannel) -> str:
     if "worker" not in _worker_of_process:
         stack = contextlib.ExitStack()
         at_end(_worker_of_process.clear)
         at_end(stack.close)
-        _worker_of_process["worker"] = stack.enter_context(worker(work.data, work.evaluation, link))
+        _worker_of_process["worker"] = stack.enter_context(worker(data, evaluation, link))
     unsent, last = Finished(), time.monotonic()
 
     def add(finished: Finished) -> None:
@@ -109,8 +92,8 @@ def _fly(work: _Work, link: WorkerChannel) -> str:
             unsent, last = Finished(), time.monotonic()
 
     try:
-        _worker_of_process["worker"].fly(work.unit, add, link.stopped)
+        _worker_of_process["worker"].fly(unit, add, link.stopped)
     finally:
         if unsent.episodes:
             link.send(unsent)
-    return work.scene
+    return unit.scene

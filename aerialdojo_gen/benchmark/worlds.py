@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
-from aerialdojo_gen.base.names import choose_scenes
+from aerialdojo_gen.base.names import as_names, choose_scenes
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.scenes.worlds.kinds import type_names
@@ -33,8 +33,7 @@ class WorldMaker:
                 f"start_seed and num_worlds: seeds from 0 to {MAX_SEED:,}, and at least 1 world, "
                 f"not {num_worlds} from {start_seed}"
             )
-        patterns = [types] if isinstance(types, str) else list(types)
-        names = choose_scenes(patterns, type_names(home() / "scene_assets"), "type")
+        names = choose_scenes(as_names(types), type_names(home() / "scene_assets"), "type")
         seeds = range(start_seed, start_seed + num_worlds)
         self.worlds = [World(name, seed, dict(knobs or {}), held_out) for seed in seeds for name in names]
         self._n_objects = n_objects

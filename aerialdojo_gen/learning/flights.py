@@ -19,6 +19,7 @@ from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning import checkpoints
 from aerialdojo_gen.learning.encoding import DeadReckoning
 from aerialdojo_gen.learning.geodesic import blocked_actions
+from aerialdojo_gen.learning.labels import scatter_rows
 from aerialdojo_gen.learning.loader import torch_package
 from aerialdojo_gen.learning.parts import DaggerRound, Part, goal_poses, goals_of, offsets, pictures
 from aerialdojo_gen.learning.policy import network_of
@@ -27,12 +28,10 @@ from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.planning.difficulty import agent_actions
 from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
 from aerialdojo_gen.planning.planner import Planner
-from aerialdojo_gen.scenes.context import SEVERAL, SceneContext, open_scene
+from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import STOP
 
-# In the place of an action where the planner finds no way.
-NO_LABEL = N_ACTIONS
 # Goals' cost-to-go that are kept: those of the episodes that are flown side by side.
 _FIELDS_MB = 400.0, 0.0
 
@@ -40,18 +39,12 @@ _FIELDS_MB = 400.0, 0.0
 class Teacher:
     """Says what the reference would do at a pose: the first action of the route that a release has from there."""
 
-    def __init__(self, scene: Scene, config: PlanConfig | None = None, radius_m: float = RADIUS_M) -> None:
+    def __init__(self, scene: Scene, radius_m: float = RADIUS_M) -> None:
         # Who has strayed may be nearer than any task begins, or straight before the goal.
-        own = (config or PlanConfig()).model_copy(update={"min_detour_ratio": 0.0})
-        self._planner = Planner(scene, own, radius_m)
-
-    def labels(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> NDArray[np.int64]:
-        """Planner's actions (n,) for goals and poses (metres, radians, world); `NO_LABEL` where there is no way."""
-        ways = self.ways(goals, poses)
-        return np.array([way[0] if len(way) else NO_LABEL for way in ways], np.int64)
+        self._planner = Planner(scene, PlanConfig().model_copy(update={"min_detour_ratio": 0.0}), radius_m)
 
     def ways(self, goals: Sequence[ArrayLike], poses: Sequence[ArrayLike]) -> list[NDArray[np.int8]]:
-        """Plan from poses: the actions of each route, Stop at its end; none where no way is found."""
+        """Plan to goals from poses (metres, radians, world): the actions of each route, Stop at its end, or none."""
         out = [np.zeros(0, np.int8)] * len(poses)
         keys = [np.asarray(goal, np.float64).tobytes() for goal in goals]
         for key in dict.fromkeys(keys):
@@ -65,11 +58,6 @@ class Teacher:
     def cache_fields(self) -> AbstractContextManager[None]:
         """Keep goals' cost-to-go until the block ends."""
         return self._planner.keeping_fields(*_FIELDS_MB)
-
-
-def teacher_of(context: SceneContext, config: PlanConfig, radius_m: float) -> Teacher:
-    """Return a scene's teacher, a part of its context."""
-    return context.part("teacher", lambda: Teacher(context.scene, config, radius_m), config, radius_m)
 
 
 # Episodes that are flown side by side.
@@ -143,7 +131,8 @@ def flights(part: Part, dagger_round: DaggerRound) -> Steps:
     body = Embodiment()
     mesh = mesh_of(part.data, part.scene)
     space = flight_space(*mesh, body.radius_m)
-    teacher = teacher_of(open_scene(*mesh, SEVERAL), PlanConfig(), body.radius_m)
+    context = open_scene(*mesh, SEVERAL)
+    teacher = context.part("teacher", lambda: Teacher(context.scene, body.radius_m), body.radius_m)
     tensors, about, _ = checkpoints.read(dagger_round.weights)
     network = network_of(about, tensors, str(dagger_round.weights)).eval()
     goals, columns = goal_poses(part, index), goals_of(part, index)
@@ -167,8 +156,7 @@ def _encoded_goal(
     shown: NDArray[np.bool_],
 ) -> Any:  # fmt: skip
     shown = shown | ~columns["semantic"][rows]
-    images = np.zeros((len(rows), *columns["images"].shape[1:]), np.uint8)
-    images[shown] = columns["images"][columns["image"][rows[shown]]]
+    images = scatter_rows(columns["images"][columns["image"][rows[shown]]], shown)
     tokens = np.array(
         [vocabulary.encode(text) for text in columns["text"][rows, 1 - shown.astype(np.int64)].tolist()]
     )

@@ -101,8 +101,7 @@ class Learner:
         self.torch = torch_package()
         self.network = network.to(device)
         self.recipe, self.device = recipe, device
-        self.progress = Progress()
-        self.optimiser = self._optimiser()
+        self.begin(0)
         # Steps of the pool that are not kept back.
         self._about: list[tuple[Pool, Any, NDArray[np.int64]]] = []
 
@@ -128,8 +127,11 @@ class Learner:
 
     def begin(self, phase: int) -> None:
         """Begin a phase, with a new optimiser."""
+        train = self.recipe.train
         self.progress = Progress(phase)
-        self.optimiser = self._optimiser()
+        self.optimiser: Any = self.torch.optim.AdamW(
+            self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
+        )
 
     def share_cores(self) -> None:
         """Use the cores that are ours: sums depend on how many, and who flew in this process before left it one."""
@@ -213,12 +215,6 @@ class Learner:
         rates = [self.torch.cat(one).float() for one in (blocked_at, free)]
         shares = [float(one.mean()) if len(one) else None for one in rates]
         return Assessment(float(self.torch.cat(right).float().mean()), *median, *shares)
-
-    def _optimiser(self) -> Any:
-        train = self.recipe.train
-        return self.torch.optim.AdamW(
-            self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
-        )
 
     def rate(self, done: int, total: int, highest: float) -> float:
         """Learning rate after so many of all batches of a phase."""

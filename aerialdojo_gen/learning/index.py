@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.rng import rank
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.tasks import Selection, check_paraphrase, select, texts_of_tasks
@@ -108,8 +108,8 @@ def read_index(
     paraphrase: str = "task",
 ) -> Index:  # fmt: skip
     """Read the references of a selection, or the successful flights of runs; paraphrases are drawn by its seed."""
-    if target_split is not None and target_split not in _SIDES:
-        raise UsageError(unknown("no side of the split by objects", target_split, _SIDES))
+    if target_split is not None:
+        check_known("no side of the split by objects", [target_split], _SIDES)
     chosen = select(root, selection)
     if check_paraphrase(paraphrase) == "random":
         chosen = _paraphrased(root, chosen, selection.seed)
@@ -172,12 +172,11 @@ def _flown(root: DataRoot, runs: Sequence[str]) -> dict[str, NDArray[np.int8]]:
         moved = pc.and_(pc.invert(steps["refused"]), pc.is_valid(steps["action"]))
         steps = steps.filter(pc.and_(moved, pc.is_in(steps["task_id"], pa.array(own, pa.string()))))
         steps = steps.sort_by([("task_id", "ascending"), ("step", "ascending")])
-        task_ids, actions = steps["task_id"].to_pylist(), steps["action"].to_numpy()
-        begins = [k for k, task_id in enumerate(task_ids) if not k or task_id != task_ids[k - 1]]
-        for begin, end in zip(begins, [*begins[1:], len(task_ids)], strict=True):
-            nav_id = own[task_ids[begin]]
-            if nav_id not in found or end - begin < len(found[nav_id]):
-                found[nav_id] = actions[begin:end].astype(np.int8)
+        flights = steps.group_by("task_id", use_threads=False).aggregate([("action", "list")])
+        for task_id, actions in zip(*(flights[name].to_pylist() for name in ("task_id", "action_list")), strict=True):
+            nav_id = own[task_id]
+            if nav_id not in found or len(actions) < len(found[nav_id]):
+                found[nav_id] = np.array(actions, np.int8)
     return found
 
 

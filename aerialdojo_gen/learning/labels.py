@@ -68,10 +68,14 @@ class Labels:
 
 def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
-    c, s = np.cos(poses[0, 3]), np.sin(poses[0, 3])
-    away = poses[:, :3] - poses[0, :3]
-    turned = wrap_angle_rad(poses[:, 3] - poses[0, 3])
-    return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2], turned])
+    return np.column_stack([seen_from(poses[:1], poses[:, :3]), wrap_angle_rad(poses[:, 3] - poses[0, 3])])
+
+
+def seen_from(poses: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (n, 3) in the frames of bodies (n, 4) or (1, 4): ahead, left, up, metres."""
+    away = places - poses[:, :3]
+    c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
+    return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2]])
 
 
 # What a sample has once, and not for every step.

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import renderer_for
+from aerialdojo_gen.benchmark.observations import clip_depth, renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.labels import odometry
-from aerialdojo_gen.learning.pictures import clip_depth
+from aerialdojo_gen.learning.labels import odometry, seen_from
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.planning.flight_space import flight_space
@@ -127,10 +126,7 @@ def blocked_at(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:
     """Goals (n, 3) in the frames of bodies (n, 4): ahead, left, up, metres."""
-    away = goals - poses[:, :3]
-    c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
-    found = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s, away[:, 2]])
-    return found.astype(np.float32)
+    return seen_from(poses, goals).astype(np.float32)
 
 
 def goals_of(part: Part, index: Index) -> dict[str, Any]:

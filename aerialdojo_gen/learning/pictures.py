@@ -14,7 +14,6 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,7 +26,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import RenderError, StoreError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.observations import renderer_for, renderer_name
+from aerialdojo_gen.benchmark.observations import clip_depth, renderer_for, renderer_name
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.learning.index import Index
 from aerialdojo_gen.pipeline.code_digest import code_of
@@ -45,24 +44,15 @@ _ENTRY = struct.Struct("<QII")
 _RECOUNT = 256 << 20
 
 
-@dataclass(frozen=True)
-class CacheOptions:
-    """Where pictures are kept."""
-
-    base: Path  # Pictures that are made in another way have another folder in it
-    most_bytes: int  # How large the folder of one way may grow
-    source: str  # Where pictures come from, and what draws them
-    renderer: str
-
-
 class CachedFrames:
-    """Pictures of a source, kept in a folder."""
+    """Pictures of a source, kept in a folder of `base`, one for each way to make them, that grows to `most_bytes`."""
 
     def __init__(
-        self, source: Source, index: Index, sensors: Sensors, store: CacheOptions, meshes: dict[str, str]
-    ) -> None:
-        self._source, self._index, self._sensors = source, index, sensors
-        self._store, self._meshes = store, meshes
+        self, source: Source, index: Index, sensors: Sensors, meshes: dict[str, str], base: Path, most_bytes: int,
+        drawn: dict[str, str],
+    ) -> None:  # fmt: skip
+        self._source, self._index, self._sensors, self._meshes = source, index, sensors, meshes
+        self._base, self._most_bytes, self._drawn = base, most_bytes, drawn
         self._full = False
         self._used: int | None = None
         self._since = 0
@@ -94,8 +84,17 @@ class CachedFrames:
 
     @cached_property
     def _folder(self) -> Path:
-        # In the process that reads: to find out which renderer works here is to draw.
-        return pictures_folder(self._store, self._sensors)
+        s, modules = self._sensors, ("bodies", "gl", "world", "reader")
+        facts = {
+            "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in modules],
+            "source": self._drawn["source"],
+            # In the process that reads: to find out which renderer works here is to draw.
+            "renderer": renderer_name(self._drawn["renderer"]), "views": s.views, "rgb": s.rgb, "depth": s.depth,
+            "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,
+        }  # fmt: skip
+        folder = self._base / hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+        make_folder(folder)
+        return folder
 
     def _path(self, k: int) -> Path:
         index = self._index
@@ -143,7 +142,7 @@ class CachedFrames:
         head = b"".join(_ENTRY.pack(int(at), len(p), zlib.crc32(p)) for at, p in zip(starts, packed, strict=False))
         path = self._path(k)
         size = int(starts[-1])
-        if self._used is not None and self._used + size > self._store.most_bytes:
+        if self._used is not None and self._used + size > self._most_bytes:
             self._full = True
             return
         make_folder(path.parent)
@@ -163,22 +162,7 @@ class CachedFrames:
     def _room(self) -> bool:
         if self._used is None or self._since > _RECOUNT:
             self._used, self._since = sum(_sizes(self._folder)), 0
-        return self._used < self._store.most_bytes
-
-
-def pictures_folder(store: CacheOptions, sensors: Sensors) -> Path:
-    """Return the folder of pictures that are made in one way, made where it is not there."""
-    s = sensors
-    facts = {
-        "code": [code_of(f"aerialdojo_gen.rendering.{name}").digest for name in ("bodies", "gl", "world", "reader")],
-        "source": store.source,
-        "renderer": renderer_name(store.renderer), "views": s.views, "rgb": s.rgb, "depth": s.depth,
-        "width": s.width, "height": s.height, "fov_deg": s.fov_deg, "max_depth_m": s.max_depth_m,
-    }  # fmt: skip
-    text = json.dumps(facts, sort_keys=True)
-    folder = store.base / hashlib.sha256(text.encode()).hexdigest()[:16]
-    make_folder(folder)
-    return folder
+        return self._used < self._most_bytes
 
 
 def _sizes(folder: Path) -> Iterator[int]:
@@ -258,17 +242,14 @@ class RecordedFrames:
     def frames(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         """Read; see `Source`."""
         known = np.array([self.has(int(k)) for k in trajectories])
-        parts: list[tuple[NDArray[np.int64], Frames]] = []
-        if not known.all():
-            rows = np.flatnonzero(~known)
-            parts.append((rows, self._drawn.frames(trajectories[rows], steps[rows])))
-        if known.any():
-            # Frame after frame of each: a seek decodes from the key frame on.
-            rows = np.flatnonzero(known)
-            rows = rows[np.lexsort((steps[rows], trajectories[rows]))]
-            parts.append((rows, self._read(trajectories[rows], steps[rows])))
-        back = np.argsort(np.concatenate([rows for rows, _ in parts]))
-        return take(join([frames for _, frames in parts]), back)
+        # Frame after frame of each: a seek decodes from the key frame on.
+        order = np.lexsort((steps, trajectories))
+        out = empty_frames(self._sensors, len(steps))
+        for rows, read in ((order[known[order]], self._read), (order[~known[order]], self._drawn.frames)):
+            if len(rows):
+                for name, seen in read(trajectories[rows], steps[rows]).items():
+                    out[name][rows] = seen
+        return out
 
     def _read(self, trajectories: NDArray[np.int64], steps: NDArray[np.int64]) -> Frames:
         index, s = self._index, self._sensors
@@ -286,12 +267,6 @@ class RecordedFrames:
         if s.depth:
             clip_depth(out["depth_m"], s)
         return out
-
-
-def clip_depth(depth_m: NDArray[np.float32], sensors: Sensors) -> NDArray[np.float32]:
-    """Set depth to 0 where nothing is in the sensors' range; in place."""
-    np.putmask(depth_m, ~(depth_m <= np.float32(sensors.max_depth_m)), np.float32(0.0))
-    return depth_m
 
 
 def recorded_frames(root: DataRoot, scene: str, sensors: Sensors) -> dict[str, int]:

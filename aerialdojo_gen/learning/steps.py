@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import StoreError
+from aerialdojo_gen.learning.labels import scatter_rows
 from aerialdojo_gen.learning.words import Vocabulary
 from aerialdojo_gen.store.atomic import atomic_folder, make_folder
 
@@ -142,14 +143,11 @@ class Pool:
         rows = (self.first[episodes][:, None] + np.arange(window)[None])[mask]
         out: dict[str, NDArray[Any]] = {"rows": rows, "mask": mask}
         for name in ("label", "odometry", "offset", "pose", "blocked"):
-            values = j[name]
-            out[name] = np.zeros((*mask.shape, *values.shape[1:]), values.dtype)
-            out[name][mask] = values[rows]
+            out[name] = scatter_rows(j[name][rows], mask)
         image = j["image"][episodes]
         shown = (by_image | ~j["semantic"][episodes]) & (image >= 0)
         out["goal_by_image"] = shown
         out["scene"] = self._scene[episodes]
         out["tokens"] = j["tokens"][episodes, 1 - shown.astype(np.int64)]
-        out["images"] = np.zeros((len(episodes), *j["images"].shape[1:]), np.uint8)
-        out["images"][shown] = j["images"][image[shown]]
+        out["images"] = scatter_rows(j["images"][image[shown]], shown)
         return out

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import Malformed, UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.base.safe_parse import loads_json, read_json
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.tasks import Selection
@@ -108,8 +108,7 @@ def train(
     StoreError
         There is no release, or a scene's mesh is missing.
     """
-    if device not in ("auto", "cpu", "cuda"):
-        raise UsageError(unknown("no device", device, ("auto", "cpu", "cuda")))
+    check_known("no device", [device], ("auto", "cpu", "cuda"))
     root = open_root(data)
     # A missing release is reported before a missing package.
     release_fingerprint(root)
@@ -199,14 +198,14 @@ class _Training:
                 f"{len(about.scenes) - scenes:,}; words known: {words:,}, new: {len(about.vocabulary) - words:,}"
             )
         self._tensorboard = _tensorboard(self._folder / "tensorboard")
-        parts = self._collect(index, None, "drawing references")
+        parts = self._collect(self._parts(index, None), "drawing references")
         self._exploration = self._explore()
         for phase in range(self._first, recipe.dagger.rounds + 1):
             if phase > 0:
                 flown = self._weights(phase - 1)
                 share = recipe.dagger.teacher_share
                 flying = DaggerRound(flown, file_digest(flown), recipe.seed, phase, share)
-                parts += self._collect(self._drawn(phase), flying, f"round {phase}: flying")
+                parts += self._collect(self._parts(self._drawn(phase), flying), f"round {phase}: flying")
             if phase < learner.progress.phase or self._weights(phase).is_file():
                 continue
             if phase > learner.progress.phase:
@@ -251,10 +250,7 @@ class _Training:
         )  # fmt: skip
         return [replace(part, runs=self._recipe.data.runs) for part in parts]
 
-    def _collect(self, index: Index, dagger_round: DaggerRound | None, what: str) -> list[Steps]:
-        return self._collected(self._parts(index, dagger_round), what)
-
-    def _collected(self, parts: list[Part], what: str) -> list[Steps]:
+    def _collect(self, parts: list[Part], what: str) -> list[Steps]:
         with make_executor("local", self._workers) as executor:
             return collect(parts, executor, self._reporter, what)
 
@@ -264,7 +260,7 @@ class _Training:
             return None
         like = self._parts(self._index, None)[0]
         parts = view_parts(self._root, scenes, self._cache, d.split, d.target_split, d.looks, self._recipe.seed, like)
-        return self._pool(self._collected(parts, "rendering extra views"))
+        return self._pool(self._collect(parts, "rendering extra views"))
 
     def _pool(self, parts: list[Steps]) -> Pool:
         return Pool(parts, self._about.scenes, self._about.vocabulary)

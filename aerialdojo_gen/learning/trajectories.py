@@ -16,16 +16,15 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import as_names, check_known
 from aerialdojo_gen.benchmark.agents.goal import Sensors
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
+from aerialdojo_gen.benchmark.tasks import Selection, draw_evenly, mesh_of, reference_image
 from aerialdojo_gen.benchmark.worlds import make_worlds
 from aerialdojo_gen.learning.index import Index, read_indices
 from aerialdojo_gen.learning.labels import PRIVILEGED, Labels, scatter_rows, split_batch
 from aerialdojo_gen.learning.order import Order
 from aerialdojo_gen.learning.pictures import (
     CachedFrames,
-    CacheOptions,
     Frames,
     RecordedFrames,
     RenderedFrames,
@@ -36,7 +35,6 @@ from aerialdojo_gen.learning.pictures import (
 from aerialdojo_gen.learning.words import PADDING, Vocabulary
 from aerialdojo_gen.store.cache import cache_folder
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
-from aerialdojo_gen.store.schemas import VIEWS
 
 GOALS = ("text", "tokens", "image")
 SOURCES = ("render", "recordings", "auto")
@@ -78,8 +76,7 @@ class SampleOptions:
 
     def __post_init__(self) -> None:
         """Check what no list of names checks."""
-        if self.source not in SOURCES:
-            raise UsageError(unknown("no source", self.source, SOURCES))
+        check_known("no source", [self.source], SOURCES)
         if self.run and self.source != "render":
             raise UsageError(
                 f"recordings are of the references: choose source='render' beside run, not {self.source!r}"
@@ -91,8 +88,7 @@ class SampleOptions:
     def sensors(self) -> Sensors:
         """What the body sees."""
         width, height = (self.size, self.size) if isinstance(self.size, int) else self.size
-        views = _chosen("view", self.views, VIEWS, keep=True)
-        return Sensors(views, self.rgb, self.depth, width, height, max_depth_m=self.max_depth_m)
+        return Sensors(as_names(self.views), self.rgb, self.depth, width, height, max_depth_m=self.max_depth_m)
 
 
 class Trajectories:
@@ -163,9 +159,9 @@ class Trajectories:
         self.sensors, self.past, self.stride = own.sensors, own.past, own.stride
         # One modality alone where it is the only one asked for: both instances have the same trajectory.
         modalities = ("image",) if self.goal == ("image",) else ()
-        chosen = Selection(_names(split), _names(own.setting), modalities, _names(own.scene), None, own.seed)
+        chosen = Selection(as_names(split), as_names(own.setting), modalities, as_names(own.scene), None, own.seed)
         roots = _roots(release, worlds, of_worlds)
-        self.index = read_indices(roots, chosen, own.target_split, _names(own.run), own.paraphrase)
+        self.index = read_indices(roots, chosen, own.target_split, as_names(own.run), own.paraphrase)
         if own.limit is not None:
             self.index = self.index.take(sample_evenly(self.index, own.limit, own.seed))
         self._source = None if self.sensors.blind else self._open_source(own)
@@ -191,8 +187,8 @@ class Trajectories:
         if not own.cache_gb:
             return source
         base = Path(own.cache_dir) if own.cache_dir is not None else cache_folder() / "learning"
-        store = CacheOptions(base, int(own.cache_gb * 1e9), own.source, own.renderer)
-        return CachedFrames(source, self.index, self.sensors, store, meshes)
+        drawn = {"source": own.source, "renderer": own.renderer}
+        return CachedFrames(source, self.index, self.sensors, meshes, base, int(own.cache_gb * 1e9), drawn)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -329,12 +325,8 @@ def sample_evenly(index: Index, limit: int, seed: int) -> NDArray[np.int64]:
     """Draw rows of the index, ascending, spread evenly over the scenes; a larger limit only adds to them."""
     if limit < 1:
         raise UsageError(f"a limit is at least 1, not {limit}")
-    lots: list[tuple[int, int, int]] = []
-    for number, scene in enumerate(index.scenes):
-        own = np.flatnonzero(index.scene == number).tolist()
-        ranked = sorted((sampling_key(seed, index.nav_id[k]), k) for k in own)[:limit]
-        lots += [(turn, rng.rank(seed, "learning", scene), k) for turn, (_, k) in enumerate(ranked)]
-    return np.array(sorted(k for _, _, k in sorted(lots)[:limit]), np.int64)
+    scenes = [index.scenes[number] for number in index.scene]
+    return np.array(draw_evenly(scenes, index.nav_id, limit, seed, "learning"), np.int64)
 
 
 def sampling_key(seed: int, nav_id: str) -> int:
@@ -342,13 +334,7 @@ def sampling_key(seed: int, nav_id: str) -> int:
     return rng.rank(seed, "learning", nav_id)
 
 
-def _names(given: str | Sequence[str]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(given)
-
-
-def _chosen(what: str, given: str | Sequence[str], known: Sequence[str], keep: bool = False) -> tuple[str, ...]:
-    names = _names(given)
-    for name in names:
-        if name not in known:
-            raise UsageError(unknown(f"no {what}", name, known))
-    return names if keep else tuple(name for name in known if name in names)
+def _chosen(what: str, given: str | Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
+    names = as_names(given)
+    check_known(f"no {what}", names, known)
+    return tuple(name for name in known if name in names)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.flying import town
 from support.handmade import box, instance, scene
 
 import aerialdojo_gen
@@ -186,12 +185,7 @@ class Seer:
         return Observation(episode.n_actions, episode.remaining_actions, episode.refused, rgb or {}, depth)
 
 
-@pytest.fixture(scope="module")
-def village():
-    return FlightSpace(town(), 0.25)
-
-
-def test_the_map_knows_a_wall_from_the_open(village):
+def test_the_map_knows_a_wall_from_the_open():
     wall = instance("wall", box((5, -9, 0), (6, 9, 6)))
     space = FlightSpace(scene(wall, half=12.0, ceiling=8.0), 0.25)
     episode = Episode(space, (0.0, 0.0, 3.0, 0.0), (9.0, 0.0, 3.0), 90)

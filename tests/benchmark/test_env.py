@@ -10,7 +10,6 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.flying import town
 from support.handmade import box, instance, scene
 
 from aerialdojo_gen.base.errors import RenderError, StoreError, UsageError
@@ -32,11 +31,6 @@ def yard():
     wall = instance("wall", box((5, -3, 0), (6, 3, 4)))
     sheet = instance("sheet", box((-5.001, -3, 0), (-5, 3, 4)))
     return FlightSpace(scene(wall, sheet, half=10.0, ceiling=8.0), RADIUS)
-
-
-@pytest.fixture(scope="module")
-def village():
-    return FlightSpace(town(), RADIUS)
 
 
 def fly(space, *names, start=(0.0, 0.0, 2.0, 0.0), goal=(3.0, 0.0, 2.0), budget=90):

@@ -28,13 +28,7 @@ from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, loa
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
 
-
-@pytest.fixture(autouse=True)
-def _keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
-        monkeypatch.setenv(name, KEY)
-    for name in ("OPENAI_BASE_URL", "ANTHROPIC_BASE_URL"):
-        monkeypatch.delenv(name, raising=False)
+pytestmark = pytest.mark.usefixtures("keys")
 
 
 def parts_of(request: dict[str, Any]) -> list[dict[str, Any]]:

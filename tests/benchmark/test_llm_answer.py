@@ -16,7 +16,8 @@ from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, eight, parse_answer
-from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
+from aerialdojo_gen.benchmark.llm.options import Options
+from aerialdojo_gen.benchmark.llm.prompt import Turn, goal_text, repair_text, step_text, system_prompt
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 
@@ -87,7 +88,7 @@ IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 
 
 
 def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
-    told = system_prompt(SEMANTIC, Sight(past_pictures=1))
+    told = system_prompt(SEMANTIC, Options(model="m"))
     for name in SIXTEEN.names:
         assert f"- {name}: " in told
     assert "fly 5 m forward" in told
@@ -103,8 +104,8 @@ def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
     assert json.dumps(SIXTEEN.schema()) in told
     assert "left (looks" not in told
     assert "Approach" not in told
-    assert "depth" not in system_prompt(SEMANTIC, Sight(depth=False))
-    assert "shown again" not in system_prompt(SEMANTIC, Sight())
+    assert "depth" not in system_prompt(SEMANTIC, Options(model="m", depth=False))
+    assert "shown again" not in system_prompt(SEMANTIC, Options(model="m", history_images=0))
     # Its own example of an answer is one, once the blanks are filled.
     example = told.splitlines()[-1].replace("<one name from the list above>", "TurnLeft15")
     assert parse_answer(example).action == "TurnLeft15"
@@ -116,13 +117,14 @@ def test_the_papers_eight_actions_have_common_magnitudes() -> None:
         "Stop": "Stop", "MoveForward": "MoveForward5", "MoveLeft": "MoveLeft5", "MoveRight": "MoveRight5",
         "MoveUp": "MoveUp2", "MoveDown": "MoveDown2", "TurnLeft": "TurnLeft15", "TurnRight": "TurnRight15",
     }  # fmt: skip
-    told = system_prompt(SEMANTIC, Sight(), actions)
+    options = Options(model="m", actions="eight", move_m=5, climb_m=2)
+    told = system_prompt(SEMANTIC, options)
     assert "- MoveForward: fly 5 m forward" in told
     assert "MoveForward5" not in told
     assert parse_answer('{"action": "MoveUp"}', actions.names).action == "MoveUp"
     with pytest.raises(InvalidAnswer, match="'MoveUp2' is none of the actions"):
         parse_answer('{"action": "MoveUp2"}', actions.names)
-    assert 'Call the tool "act"' in system_prompt(SEMANTIC, Sight(), actions, "tool")
+    assert 'Call the tool "act"' in system_prompt(SEMANTIC, options, "tool")
 
 
 def test_the_goal_is_told_as_its_modality_has_it() -> None:

@@ -14,15 +14,7 @@ from aerialdojo_gen.base.llm_client import service as services
 from aerialdojo_gen.base.llm_client.http import retry_after_s
 from aerialdojo_gen.benchmark.agents import AgentUnavailable, ServiceDown
 
-
-@pytest.fixture(autouse=True)
-def _keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
-        monkeypatch.setenv(name, KEY)
-    for name in ("OPENAI_BASE_URL", "ANTHROPIC_BASE_URL"):
-        monkeypatch.delenv(name, raising=False)
-
-
+pytestmark = pytest.mark.usefixtures("keys")
 LARGE = b'{"choices": [], "usage": {"prompt_tokens": ' + b"9" * 5_000 + b"}}"
 DEEP = b'{"a":' * 100_000 + b"1" + b"}" * 100_000
 TOO_LONG = "This model's maximum context length is 4096 tokens"

@@ -16,7 +16,6 @@ def drawn(env, episodes=12):
     return [first, *(env.reset()[0]["goal"]["description"] for _ in range(episodes - 1))]
 
 
-@pytest.mark.pipeline
 @pytest.mark.parametrize("subset", ["train", "test"])
 def test_an_episode_has_a_text_of_its_side(smoke, subset):
     texts = texts_of_tasks(open_root(smoke), SCENE, subset)
@@ -29,7 +28,6 @@ def test_an_episode_has_a_text_of_its_side(smoke, subset):
     assert found == drawn(env)
 
 
-@pytest.mark.pipeline
 def test_sides_share_no_text_and_a_task_keeps_its_own(smoke):
     sides = [
         {text for own in texts_of_tasks(open_root(smoke), SCENE, s).values() for text in own}
@@ -41,7 +39,6 @@ def test_sides_share_no_text_and_a_task_keeps_its_own(smoke):
     assert len(set(drawn(AerialDojoEnv(smoke, split="ood_test", limit=1, **CHOICE)))) == 1
 
 
-@pytest.mark.pipeline
 def test_trajectories_draw_by_their_seed(smoke):
     how = {"views": (), "rgb": False, "depth": False, "scene": SCENE, "paraphrase": "random"}
     texts = [Trajectories(smoke, "train", seed=seed, **how).index.goal_columns["description"] for seed in (1, 1, 2)]

@@ -63,10 +63,7 @@ def test_every_part_is_the_one_that_a_join_finds(planted: Planted) -> None:
                           labels=["0 to 1", "1 to 3", "3 to 6", "6 and more"]),
         "target_visible_at_start": (rows.target_visible_at_start > 0).map({True: "in view", False: "out of view"}),
         "straight_line_free": rows.straight_line_free.map({True: "free", False: "blocked"}),
-        "target_seen_in_train": rows.target_seen_in_train.map({True: "seen in training", False: "unseen"}),
-        "start_seen_in_train": rows.start_seen_in_train.map({True: "seen in training", False: "unseen"}),
-        "pair_seen_in_train": rows.pair_seen_in_train.map({True: "seen in training", False: "unseen"}),
-        "shape_seen_in_train": rows.shape_seen_in_train.map({True: "seen in training", False: "unseen"}),
+        **{name: rows[name].map({True: "seen in training", False: "unseen"}) for name in SEEN[:4]},
         "target_split": rows.target_split,
         "target_held_out and start_held_out": (2 * rows.target_held_out + rows.start_held_out).map(
             {0: "neither", 1: "start alone", 2: "target alone", 3: "target and start"}

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -189,15 +192,9 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
     assert [head for head, _ in detour.groups] == ["1.1 to 1.25", "1.25 to 1.5"]
     assert cells(detour, "package:Alpha")[::3] == ("25.00", "18.75")
     # A log or a release that has the column has the table.
-    shown = [
-        Run(
-            **{
-                **vars(run),
-                "table": run.table.append_column("target_seen_in_train", [[k % 2 == 0 for k in range(18)]]),
-            }
-        )
-        for run in load_runs(log, ["alpha", "beta"])
-    ]
+    column = [[k % 2 == 0 for k in range(18)]]
+    loaded = load_runs(log, ["alpha", "beta"])
+    shown = [replace(run, table=run.table.append_column("target_seen_in_train", column)) for run in loaded]
     seen = made("seen", shown, log)
     assert [head for head, _ in seen.groups] == ["seen in training", "unseen"]
     # Every second task is one with a semantic goal.
@@ -293,15 +290,10 @@ def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
 
 def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
-    lines = score_rows.as_csv(request).splitlines()
-    head = lines[0].split(",")
-    (row,) = [line.split(",") for line in lines if line.startswith("paper,Claude Opus 5,aerialdojo,3.0,base")]
-    assert dict(zip(head, row, strict=True))["osr"] == "0.0784"
-    assert dict(zip(head, row, strict=True))["dts_m_sd"] == "5.97"
-    assert sum(line.startswith("paper,") for line in lines) == 22
-    (row,) = [
-        line.split(",")
-        for line in lines
-        if line.startswith("alpha,package:Alpha,aerialdojo,3.0,all,all,partition,OOD")
-    ]
-    assert dict(zip(head, row, strict=True))["sr"] == "0.25"
+    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
+    keys = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name")
+    found = {tuple(row[key] for key in keys): row for row in rows}
+    opus = found["paper", "Claude Opus 5", "aerialdojo", "3.0", "base", "all", "overall", "overall"]
+    assert (opus["osr"], opus["dts_m_sd"]) == ("0.0784", "5.97")
+    assert sum(row["run"] == "paper" for row in rows) == 22
+    assert found["alpha", "package:Alpha", "aerialdojo", "3.0", "all", "all", "partition", "OOD"]["sr"] == "0.25"

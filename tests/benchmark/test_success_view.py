@@ -38,11 +38,6 @@ AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NEW = ("success_view", "viewpoint_distance_m", "target_in_sight", "told")
 
 
-@pytest.fixture(scope="module")
-def court(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_walled(tmp_path_factory.mktemp("walled"))
-
-
 def flown(data: Path, out: Path, actions: str, run: str = "r") -> pd.DataFrame:
     evaluate(data, Evaluation(run, "constant", {"actions": actions}), out=out)
     return read_run(out, run).to_pandas().set_index("nav_id")

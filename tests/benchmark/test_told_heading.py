@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.walled import write_walled
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark import AerialDojoEnv
 from aerialdojo_gen.benchmark.agents import AgentBase
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observation, Rules
 from aerialdojo_gen.benchmark.episodes import read_run
-from aerialdojo_gen.benchmark.llm.prompt import Sight, goal_text, system_prompt
+from aerialdojo_gen.benchmark.llm.options import Options
+from aerialdojo_gen.benchmark.llm.prompt import goal_text, system_prompt
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
@@ -41,11 +41,6 @@ class Listener(AgentBase):
 
     def act(self, observation: Observation) -> int:
         return 0
-
-
-@pytest.fixture(scope="module")
-def court(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_walled(tmp_path_factory.mktemp("walled"))
 
 
 @given(st.floats(-20.0, 20.0))
@@ -84,8 +79,9 @@ def test_it_is_told_where_it_is_asked_for_and_logged(court: Path, tmp_path: Path
     assert "faces west: a compass would show 270°" in goal_text(told)
     assert goal_text(told).endswith("Description: A crate.")
     assert "compass" not in goal_text(plain)
-    assert "no compass. Find" in system_prompt(plain, Sight())
-    assert "no compass, but you are told which way the drone faces at the start. Find" in system_prompt(told, Sight())
+    options = Options(model="m")
+    assert "no compass. Find" in system_prompt(plain, options)
+    assert "no compass, but you are told which way the drone faces at the start. Find" in system_prompt(told, options)
     assert read_run(tmp_path, "plain")["told"].to_pylist() == [""] * 3
     assert read_run(tmp_path, "told")["told"].to_pylist() == ["heading"] * 3
     runs = load_runs(tmp_path, ["plain", "told"])

@@ -55,11 +55,6 @@ recipe = partial(recipe_of, TEXT)
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("drawn")
-
-
-@pytest.fixture(scope="module")
 def learned(smoke, cache, tmp_path_factory):
     """Weights of the ID scene."""
     out = tmp_path_factory.mktemp("id")

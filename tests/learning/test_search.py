@@ -133,29 +133,31 @@ def test_who_sees_the_goal_is_led_to_it(looks):
     assert np.quantile(off, 0.85) < 3.0
 
 
-def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby():
-    wanted = word_targets(["red van"], WORDS)[0]
-    search, start = Search(wanted, SENSORS), np.zeros(4, np.float32)
-    rays = patch_rays(SENSORS)
-    # One patch ahead and one to the left, 9 m away; what is ahead is red, what is to the left is a red van.
-    ahead = int(np.linalg.norm(rays - [1.0, 0.0, 0.0], axis=1).argmin())
-    left = int(np.linalg.norm(rays - [0.0, 1.0, 0.0], axis=1).argmin())
-    chances = np.full((256, 4), 1e-3)
-    chances[:, -1] = 0.997
-    chances[ahead] = [0.01, 0.9, 0.04, 0.05]
-    chances[left] = [0.01, 0.45, 0.45, 0.09]
+# The patches ahead and to the left.
+AHEAD, LEFT = (int(np.linalg.norm(patch_rays(SENSORS) - way, axis=1).argmin()) for way in ([1, 0, 0], [0, 1, 0]))
+
+
+def looking(search, odometry, distance_m, chances):
+    """Observe patches with these chances at a distance; the others show nothing."""
+    seen = np.full((256, 4), 1e-3)
+    seen[:, -1] = 0.997
+    for patch, own in chances.items():
+        seen[patch] = own
     pictures = np.zeros((4, 32, 32, 4), np.uint8)
-    pictures[..., 3] = round(255 * np.sqrt(9.0 / SENSORS.max_depth_m))
-    search.observe(np.log(chances).astype(np.float32), pictures, start)
+    pictures[..., 3] = round(255 * np.sqrt(distance_m / SENSORS.max_depth_m))
+    search.observe(np.log(seen).astype(np.float32), pictures, odometry)
+
+
+def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby():
+    search, start = Search(word_targets(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
+    # 9 m away; what is ahead is red, what is to the left is a red van.
+    looking(search, start, 9.0, {AHEAD: [0.01, 0.9, 0.04, 0.05], LEFT: [0.01, 0.45, 0.45, 0.09]})
     first = search.towards(start, 60)
     assert first[1] > 5.0 > abs(first[0])
     # From nearby it is no van: what is ahead is more like one now.
     there = np.array([0.0, 6.0, 0.0, np.pi / 2], np.float32)
-    pictures[..., 3] = round(255 * np.sqrt(3.0 / SENSORS.max_depth_m))
-    chances[left] = chances[0]
-    chances[ahead] = [0.9, 0.01, 0.001, 0.089]
     for _ in range(3):
-        search.observe(np.log(chances).astype(np.float32), pictures, there)
+        looking(search, there, 3.0, {AHEAD: [0.9, 0.01, 0.001, 0.089]})
     second = search.towards(start, 60)
     assert second[0] > 5.0 > abs(second[1])
 
@@ -192,18 +194,8 @@ def test_the_ring_is_flown_round_once_in_its_order():
 def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
     """Whatever is seen on it: who changes his mind arrives nowhere."""
     search, odometry = Search(word_targets(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
-    left = int(np.linalg.norm(patch_rays(SENSORS) - [0.0, 1.0, 0.0], axis=1).argmin())
-    ahead = int(np.linalg.norm(patch_rays(SENSORS) - [1.0, 0.0, 0.0], axis=1).argmin())
-    pictures = np.zeros((4, 32, 32, 4), np.uint8)
-    pictures[..., 3] = round(255 * np.sqrt(9.0 / SENSORS.max_depth_m))
-
-    def see(patch):
-        chances = np.full((256, 4), 1e-3)
-        chances[:, -1] = 0.997
-        chances[patch] = [0.01, 0.45, 0.45, 0.09]
-        search.observe(np.log(chances).astype(np.float32), pictures, odometry)
-
-    see(left)
+    van = [0.01, 0.45, 0.45, 0.09]
+    looking(search, odometry, 9.0, {LEFT: van})
     # It has looked at it, in vain, and is as far from it as it was: round the start, until the way there is due.
     first = search.towards(odometry, 90)
     for _ in range(13):
@@ -213,5 +205,5 @@ def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
     assert due == list(range(due[0], 10, -1)), "for good"
     assert 20 <= due[0] <= 40
     for _ in range(8):
-        see(ahead)
+        looking(search, odometry, 9.0, {AHEAD: van})
     assert np.allclose(search.towards(odometry, 9), first)

@@ -50,11 +50,6 @@ rounds = 0
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("drawn")
-
-
-@pytest.fixture(scope="module")
 def trained(smoke, cache, tmp_path_factory):
     """A training by its number of epochs of sight."""
     known = {}

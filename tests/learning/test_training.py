@@ -22,7 +22,7 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
-from aerialdojo_gen.learning.flights import NO_LABEL, Teacher
+from aerialdojo_gen.learning.flights import Teacher
 from aerialdojo_gen.learning.index import read_index
 from aerialdojo_gen.learning.parts import pictures
 from aerialdojo_gen.learning.recipe import load_recipe
@@ -72,11 +72,6 @@ rounds = 0
 # A model that can learn eight trajectories by heart, or a map.
 LARGER = {"channels": (16, 16, 32), "features": 64, "word_features": 32, "hidden": 128}
 recipe = partial(recipe_of, TEXT)
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory):
-    return tmp_path_factory.mktemp("drawn")
 
 
 @pytest.fixture(scope="module")
@@ -331,17 +326,17 @@ def test_the_teachers_labels_are_the_planners_own_plan():
             free.append(np.array([*p, draw.uniform(-np.pi, np.pi)]))
     goal, starts = free[0], free[1:]
     with teacher.cache_fields():
-        labels = teacher.labels([goal] * len(starts), starts)
-        for start, label in zip(starts, labels, strict=True):
+        ways = teacher.ways([goal] * len(starts), starts)
+        for start, way in zip(starts, ways, strict=True):
             route = planner.plan_one(goal, start)
             assert route.outcome == "SOLVED"
-            assert label == agent_actions(route.actions)[0]
+            assert way[0] == agent_actions(route.actions)[0]
             episode = Episode(FlightSpace(world, 0.25), tuple(start), tuple(goal[:3]), 300)
             while episode.termination is None:
                 pose = np.array([*episode.position, episode.yaw_rad])
-                (action,) = teacher.labels([goal], [pose])
-                assert action != NO_LABEL
-                episode.step(int(action))
+                (way,) = teacher.ways([goal], [pose])
+                assert len(way)
+                episode.step(int(way[0]))
             assert episode.termination == "stop"
             assert episode.distance_m <= 1.0 + 1e-6
             assert episode.path_length_m <= route.length_m * 1.02 + 0.1

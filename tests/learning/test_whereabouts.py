@@ -168,10 +168,16 @@ def episode():
     return network, goal, given
 
 
+@pytest.fixture
+def thought(episode):
+    network, goal, given = episode
+    return network(goal=goal, **given)[0]
+
+
 def test_flown_step_by_step_it_chooses_as_it_learned(episode):
     network, goal, given = episode
     with torch.no_grad():
-        all_at_once, end = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+        all_at_once, end = network(goal=goal, **given)
         memory, pictures = None, given["pictures"].reshape(2, T, 1, 32, 32, 4)
         for k in range(T):
             at = [given[name][:, k : k + 1] for name in ("odometry", "mask")]
@@ -183,15 +189,13 @@ def test_flown_step_by_step_it_chooses_as_it_learned(episode):
 
 def test_choices_teach_the_guess_nothing(episode):
     network, goal, given = episode
-    thought, _ = network(given["pictures"], goal.detach(), *[given[n] for n in list(given)[1:]])
+    thought, _ = network(goal=goal.detach(), **given)
     thought.logits.sum().backward()
     assert all(p.grad is None or not p.grad.any() for p in network.whereabouts.parameters())
     assert network.choice[0].weight.grad.any()
 
 
-def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
-    network, goal, given = episode
-    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(thought):
     logits = thought.logits.detach().clone()
     logits[..., 0] = 50.0
     away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
@@ -204,10 +208,8 @@ def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(episode):
     assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
 
 
-def test_who_would_come_back_goes_on(episode):
+def test_who_would_come_back_goes_on(thought):
     """The likeliest translation in the place of a turn that leads back; what does not lead back is left."""
-    network, goal, given = episode
-    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
     logits = thought.logits.detach().clone()
     logits[..., 14:] = 50.0
     logits[..., 14] = 51.0
@@ -273,9 +275,7 @@ def test_only_what_leads_back_is_said_to(actions, last):
         assert reckoning.back[last] == same
 
 
-def test_of_likely_actions_it_takes_one_that_is_free(episode):
-    network, goal, given = episode
-    thought, _ = network(given["pictures"], goal, *[given[n] for n in list(given)[1:]])
+def test_of_likely_actions_it_takes_one_that_is_free(thought):
     logits, blocked = torch.zeros(2, T, 16), torch.full((2, T, 16), -20.0)
     logits[..., 3], logits[..., 2], logits[..., 1] = 9.0, 8.0, 4.0
     # The likeliest is surely blocked, the next one perhaps: 1 in 100, then 9 in 10.

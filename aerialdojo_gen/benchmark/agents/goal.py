@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.constants import FOV_DEG, RADIUS_M, WHEELBASE_M
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import as_names, check_known
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.scenes.light import LIGHTS, OWN
 from aerialdojo_gen.store.schemas import APPROACH, VIEWS
@@ -52,14 +52,11 @@ class Sensors:
 
     def __post_init__(self) -> None:
         """Refuse what no body carries; give views their one form."""
-        object.__setattr__(self, "views", (self.views,) if isinstance(self.views, str) else tuple(self.views))
-        for view in self.views:
-            if view not in VIEWS:
-                raise UsageError(unknown("no view", view, VIEWS))
+        object.__setattr__(self, "views", as_names(self.views))
+        check_known("no view", self.views, VIEWS)
         if len(set(self.views)) != len(self.views):
             raise UsageError(f"duplicate view in {', '.join(self.views)}")
-        if self.light not in LIGHTS:
-            raise UsageError(unknown("no light", self.light, LIGHTS))
+        check_known("no light", [self.light], LIGHTS)
         if self.max_depth_m <= 0.0:
             raise UsageError(f"a range of depth is above 0 m, not {self.max_depth_m} m")
         try:

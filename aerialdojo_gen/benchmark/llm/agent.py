@@ -21,7 +21,7 @@ from aerialdojo_gen.benchmark.agents.base import AgentBase, InvalidAnswer, Usage
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import parse_answer
 from aerialdojo_gen.benchmark.llm.options import Form, Options
-from aerialdojo_gen.benchmark.llm.prompt import Sight, Turn, goal_text, repair_text, step_text, system_prompt
+from aerialdojo_gen.benchmark.llm.prompt import Turn, goal_text, repair_text, step_text, system_prompt
 
 # By the kind of a failure that is met in the check before a run.
 _BY_KIND = {
@@ -222,15 +222,10 @@ class LanguageModelAgent(AgentBase):
     def reset(self, goal: Goal) -> None:
         """Begin an episode."""
         self._begin()
-        o = self.options
-        sensors = goal.rules.sensors
-        scale = min(1.0, o.image_size_px / max(sensors.width, sensors.height))
-        size = round(sensors.width * scale), round(sensors.height * scale)
-        sight = Sight(o.views, o.depth, o.max_depth_m, sensors.fov_deg, *size, o.history_images)
-        self._system = system_prompt(goal, sight, o.action_set, self.form)
+        self._system = system_prompt(goal, self.options, self.form)
         self._goal: tuple[str | Picture, ...] = (goal_text(goal),)
         if goal.image is not None:
-            self._goal += (colour_picture(goal.image, o.image_size_px),)
+            self._goal += (colour_picture(goal.image, self.options.image_size_px),)
 
     def _begin(self) -> None:
         self._turns: deque[Turn] = deque(maxlen=self.options.history)

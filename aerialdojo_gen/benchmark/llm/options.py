@@ -9,9 +9,8 @@ from typing import Any, Literal
 import tomli
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.llm_client.service import check_url
-from aerialdojo_gen.base.names import unknown
+from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet, eight
 
 View = Literal["front", "left", "right", "down"]
@@ -114,7 +113,5 @@ def presets() -> dict[str, Preset]:
 
 def preset(name: str) -> Preset:
     """Find a preset."""
-    known = presets()
-    if name not in known:
-        raise UsageError(unknown("no preset", name, known))
-    return known[name]
+    check_known("no preset", [name], presets())
+    return presets()[name]

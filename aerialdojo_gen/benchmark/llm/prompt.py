@@ -10,9 +10,9 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from aerialdojo_gen.base.constants import FOV_DEG
-from aerialdojo_gen.benchmark.agents.goal import Goal, Observation
+from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Sensors
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet
+from aerialdojo_gen.benchmark.llm.options import Options
 
 _VIEW_DIRECTIONS = {"front": "ahead", "left": "to the left", "right": "to the right", "down": "straight down"}
 
@@ -26,22 +26,9 @@ class Turn:
     thought: str = ""  # What the model said of it
 
 
-@dataclass(frozen=True)
-class Sight:
-    """What is sent of what the cameras see."""
-
-    views: tuple[str, ...] = ("front",)  # Cameras whose pictures are sent
-    depth: bool = True  # Whether depth pictures go with them
-    max_depth_m: float = 50.0  # Depth that is drawn white; horizontal field of view
-    fov_deg: float = FOV_DEG
-    width: int = 640  # Of the pictures, pixels
-    height: int = 640
-    past_pictures: int = 0  # Of how many earlier steps the first camera's colour picture is sent again
-
-
-def system_prompt(goal: Goal, sight: Sight, actions: ActionSet = SIXTEEN, form: str = "text") -> str:
+def system_prompt(goal: Goal, options: Options, form: str = "text") -> str:
     """Write what holds for the whole episode (paper, Appendix A)."""
-    rules = goal.rules
+    rules, actions = goal.rules, options.action_set
     hint = ", but you are told which way the drone faces at the start" if goal.heading is not None else ""
     return f"""\
 You pilot a small drone that searches for one target object in a large outdoor scene. You know the scene only from \
@@ -53,7 +40,7 @@ The drone is a quadrotor with a wheelbase of {rules.wheelbase_m:g} m. It collide
 {rules.radius_m:g} m of its centre, also while it moves from one place to the next. It always hovers level.
 
 SENSORS
-{_sensors(sight)}
+{_cameras(options, rules.sensors)}
 
 ACTIONS
 {actions.describe()}
@@ -71,23 +58,23 @@ ANSWER
 {_form(actions, form)}"""
 
 
-def _sensors(sight: Sight) -> str:
-    if not sight.views:
-        return "You see nothing."
-    cameras = ", ".join(f"{view} (looks {_VIEW_DIRECTIONS[view]})" for view in sight.views)
+def _cameras(options: Options, sensors: Sensors) -> str:
+    cameras = ", ".join(f"{view} (looks {_VIEW_DIRECTIONS[view]})" for view in options.views)
+    scale = min(1.0, options.image_size_px / max(sensors.width, sensors.height))
     text = (
         f"Before every action you see a colour picture from each of these cameras: {cameras}. Each picture has "
-        f"{sight.width} x {sight.height} pixels and a horizontal field of view of {sight.fov_deg:g}°."
+        f"{round(sensors.width * scale)} x {round(sensors.height * scale)} pixels and a horizontal field of view of "
+        f"{sensors.fov_deg:g}°."
     )
-    if sight.depth:
+    if options.depth:
         text += (
             " With each comes a depth map of the same view and size, in grey: the value of a pixel is its distance"
-            f" along the optical axis, linear from black at 0 m to white at {sight.max_depth_m:g} m; what is farther,"
-            f" or open sky, is white. A pixel of value v is v / 255 x {sight.max_depth_m:g} m away."
+            f" along the optical axis, linear from black at 0 m to white at {options.max_depth_m:g} m; what is"
+            f" farther, or open sky, is white. A pixel of value v is v / 255 x {options.max_depth_m:g} m away."
         )
-    if sight.past_pictures:
-        steps = "the step before" if sight.past_pictures == 1 else f"up to {sight.past_pictures} earlier steps"
-        text += f" The {sight.views[0]} camera's colour picture of {steps} is shown again."
+    if options.history_images:
+        steps = "the step before" if options.history_images == 1 else f"up to {options.history_images} earlier steps"
+        text += f" The {options.views[0]} camera's colour picture of {steps} is shown again."
     return text
 
 
