@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.rng import rank
-from aerialdojo_gen.imports.map_tags import Tags, below_ground, colour, count, metres
+from aerialdojo_gen.imports.map_tags import TABLES, Tags, below_ground, by_word, colour, count, metres
 from aerialdojo_gen.imports.osm import Feature
 from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.ground import polygons_of
@@ -34,40 +34,8 @@ _MAX_RISE_M = 5.0
 _PARTED = 0.85
 _SHOP_NEAR_M = 2.5
 
-_CATEGORY = {
-    **dict.fromkeys(("apartments", "residential", "dormitory", "terrace"), "apartment_building"),
-    **dict.fromkeys(("house", "detached", "semidetached_house", "bungalow", "villa", "cabin", "farm"), "house"),
-    **dict.fromkeys(("office", "commercial", "bank"), "office_building"),
-    **dict.fromkeys(("retail", "supermarket", "shop", "mall", "kiosk"), "shop_building"),
-    **dict.fromkeys(("industrial", "warehouse", "factory", "hangar"), "factory_building"),
-    **dict.fromkeys(("church", "cathedral", "chapel"), "church"),
-    **dict.fromkeys(("school", "university", "college", "kindergarten"), "school"),
-    **dict.fromkeys(("public", "civic", "government", "townhall", "courthouse", "library"), "public_building"),
-    **dict.fromkeys(("garage", "garages", "carport"), "garage_building"),
-    **dict.fromkeys(("shed", "hut", "greenhouse", "service", "toilets", "transformer_tower"), "outbuilding"),
-    "hotel": "hotel", "hospital": "hospital", "train_station": "station_building", "museum": "museum",
-    "theatre": "theatre", "mosque": "mosque", "synagogue": "synagogue", "temple": "temple", "roof": "canopy",
-}  # fmt: skip
-_LEVELS = {
-    "apartment_building": 5, "house": 2, "office_building": 5, "shop_building": 2, "factory_building": 2, "church": 4,
-    "school": 3, "public_building": 4, "garage_building": 1, "outbuilding": 1, "hotel": 6, "hospital": 5,
-    "station_building": 3, "canopy": 1,
-}  # fmt: skip
-_PLASTER = (
-    "#d9bd74", "#e3d6b0", "#c98f6a", "#d8c7b4", "#b9c2b0", "#cfa79c", "#c4b49a", "#e6e0d2",
-    "#b08a6a", "#a9b4bb",
-)  # fmt: skip
-_BRICK = ("#8f4a3c", "#a4614a", "#7d5546")
-_OFFICE = ("facade_office:#b8b4ac", "facade_office:#97a1a8", "facade_office:#c9bfae", "curtain_wall:#6f95ad",
-           "curtain_wall:#7f958c", "facade_office:#a08c78")  # fmt: skip
-_METAL = ("sheet_metal:#4f5a55", "sheet_metal:#5f4a44", "sheet_metal:#464b50", "sheet_metal:#6f7d74")
-_TILES = ("roof_tiles:#8a4a38", "roof_tiles:#a05a40", "shingles:#55504c")
-_FLAT = ("concrete:#77787a", "gravel:#8b877f", "concrete:#63656a")
-_ROOFS = {
-    **dict.fromkeys(("gabled", "gambrel", "saltbox", "half-hipped"), "gabled"),
-    **dict.fromkeys(("hipped", "pyramidal", "mansard", "cone", "side_hipped"), "hipped"),
-    **dict.fromkeys(("dome", "onion", "round"), "dome"), "flat": "flat", "skillion": "flat",
-}  # fmt: skip
+_CATEGORY, _ROOFS = by_word(TABLES["buildings"]), by_word(TABLES["roofs"])
+_MATERIALS = {kind: specs.split() for kind, specs in TABLES["materials"].items()}
 
 
 @dataclass
@@ -204,7 +172,7 @@ def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | Non
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
     if levels is None:
         small = 1 if plan.area < 60.0 else 2 if plan.area < 160.0 else usual
-        levels_used = _LEVELS.get(kind, small)
+        levels_used = TABLES["levels"].get(kind, small)
     else:
         levels_used = levels
     if summary is not None:
@@ -235,26 +203,26 @@ def _usual_roof(area: Feature, kind: str, levels: int) -> str:
     if kind in ("house", "church"):
         return "gabled"
     old = kind in ("apartment_building", "building", "public_building", "school", "hotel") and 2 <= levels <= 8
-    return "hipped" if old and _pick(area, "roof", 10) < 6 else "flat"
+    return "hipped" if old and _rank(area, "roof") % 10 < 6 else "flat"
 
 
 def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     """Material of the walls, and their colour word, empty for glass."""
     tags = area.tags
     given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
-    paint = given or _PLASTER[_pick(area, "plaster", len(_PLASTER))]
-    brick = given or _BRICK[_pick(area, "brick", len(_BRICK))]
+    paint = given or _pick(area, "plaster")
+    brick = given or _pick(area, "brick")
     if material == "glass" or (
         kind == "office_building" and not given and material in ("", "glass", "steel", "metal")
     ):
-        spec = "curtain_wall" if material == "glass" else _OFFICE[_pick(area, "office", len(_OFFICE))]
+        spec = "curtain_wall" if material == "glass" else _pick(area, "office")
     elif material == "wood":
         spec = f"planks:{given or '#b59468'}"
     elif kind in ("church", "outbuilding", "garage_building", "canopy") or top_m < 2.8:
         spec = f"brick:{brick}" if material == "brick" else f"plaster:{paint}"
     elif kind == "factory_building":
         spec = f"facade_industrial:{given}" if given else "facade_industrial"
-    elif material == "brick" or (not material and not given and _pick(area, "wall", 10) < 2):
+    elif material == "brick" or (not material and not given and _rank(area, "wall") % 10 < 2):
         spec = f"facade_brick:{brick}"
     else:
         spec = f"facade_flats:{paint}"
@@ -268,16 +236,20 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
 def _roofing(area: Feature, pitched: bool, kind: str) -> str:
     given, material = colour(area.tags, "roof:colour", "roof:color"), area.tags.get("roof:material", "")
     if not pitched:
-        return f"concrete:{given}" if given else _FLAT[_pick(area, "flat", len(_FLAT))]
+        return f"concrete:{given}" if given else _pick(area, "flat")
     tiled = material in ("roof_tiles", "tile", "tiles") or (not material and kind == "house")
     if given:
         return f"{'roof_tiles' if tiled else 'sheet_metal'}:{given}"
     if material == "copper":
         return "sheet_metal:#6fa08c"
-    choice = _TILES if tiled else _METAL
-    return choice[_pick(area, "roofing", len(choice))]
+    return _pick(area, "tiles" if tiled else "metal", "roofing")
 
 
-def _pick(area: Feature, what: str, n: int) -> int:
-    """Choose by the building's position alone: independent of ids, other buildings and the bounding box."""
-    return rank(0, "add-map", area.key, what) % n
+def _pick(area: Feature, kind: str, what: str = "") -> str:
+    """Choose a material of a kind."""
+    return _MATERIALS[kind][_rank(area, what or kind) % len(_MATERIALS[kind])]
+
+
+def _rank(area: Feature, what: str) -> int:
+    """Draw by the building's position alone: independent of ids, other buildings and the bounding box."""
+    return rank(0, "add-map", area.key, what)

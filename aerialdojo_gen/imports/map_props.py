@@ -11,33 +11,9 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.map_buildings import MapSummary
-from aerialdojo_gen.imports.map_tags import Tags, bearing_deg, below_ground, metres
+from aerialdojo_gen.imports.map_tags import TABLES, Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
-# By key and value; the first match counts.
-_THINGS: dict[str, dict[str, str]] = {
-    "natural": {"tree": "urban_tree", "shrub": "bush", "stone": "boulder"},
-    "highway": {"street_lamp": "street_lamp", "bus_stop": "bus_shelter", "stop": "stop_sign"},
-    "amenity": {
-        "bench": "bench", "waste_basket": "litter_bin", "waste_disposal": "dumpster", "recycling": "recycling_bin",
-        "post_box": "mailbox", "bicycle_parking": "bicycle_rack", "bicycle_rental": "bicycle_rack",
-        "telephone": "phone_booth", "vending_machine": "vending_machine", "atm": "atm_kiosk", "fountain": "fountain",
-        "charging_station": "ev_charger", "motorcycle_parking": "motorcycle", "taxi": "sedan", "bbq": "barbecue",
-        "ice_cream": "ice_cream_cart", "photo_booth": "photo_booth", "marketplace": "market_stall",
-    },
-    "emergency": {"fire_hydrant": "fire_hydrant"},
-    "historic": {"memorial": "statue", "monument": "statue", "statue": "statue"},
-    "tourism": {"artwork": "statue"},
-    "advertising": {"column": "advertising_column", "billboard": "billboard", "poster_box": "a_board",
-                    "totem": "advertising_column"},
-    "leisure": {"picnic_table": "picnic_set"},
-    "playground": {"slide": "playground_slide", "swing": "swing_set", "springy": "spring_rider", "seesaw": "seesaw",
-                   "sandpit": "sandbox", "carousel": "carousel"},
-    "man_made": {"flagpole": "flagpole", "water_tower": "water_tower", "street_cabinet": "vending_machine",
-                 "obelisk": "obelisk", "mast": "radio_mast"},
-    "barrier": {"bollard": "bollard", "block": "planter", "planter": "planter", "lift_gate": "boom_gate"},
-    "shop": {"kiosk": "kiosk"},
-}  # fmt: skip
 _PLATE = ("plaque", "stolperstein", "plate")
 _SMALL_ART = ("mural", "graffiti", "relief", "mosaic", "plaque", "painting")
 _PARKING_METER = ("parking_tickets", "parking")
@@ -115,7 +91,7 @@ def _category(tags: Tags) -> str | None:
         conifer = "conifer" in (tags.get("type"), tags.get("wood")) or tags.get("leaf_type") == "needleleaved"
         tall = (metres(tags, "height") or 0.0) > 9.0
         return "spruce_tree" if conifer else "oak_tree" if tall else "urban_tree"
-    for key, values in _THINGS.items():
+    for key, values in TABLES["things"].items():
         if tags.get(key) in values:
             return values[tags[key]]
     return None

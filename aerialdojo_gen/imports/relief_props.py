@@ -8,19 +8,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
 
-_LANDMARKS = ("summit_cross", "fire_tower", "radio_mast")
-# Category, least distance, most of them, on which ground.
-_GROWTH = (
-    ("spruce_tree", 7.0, 70, "grass"), ("oak_tree", 12.0, 18, "grass"), ("birch_tree", 9.0, 24, "grass"),
-    ("bush", 6.0, 40, "grass"), ("boulder", 9.0, 36, "rock"), ("boulder", 16.0, 16, "grass"),
-    ("dead_tree", 26.0, 8, "rock"), ("tree_stump", 20.0, 10, "grass"), ("fallen_log", 22.0, 8, "grass"),
-    ("driftwood", 18.0, 8, "sand"), ("reed_clump", 6.0, 20, "sand"),
-)  # fmt: skip
-_CAMP = ("picnic_set", "log_bench", "backpack", "direction_sign", "cooler_box", "camp_chair")
+_COUNTRY = TABLES["country"]
+_CAMP = _COUNTRY["camp"].split()
 
 
 def place_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float | None) -> None:
@@ -37,7 +31,7 @@ def place_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float
     for k, (x, y) in enumerate(_level_places(placer, free["grass"])):
         placer.place(_CAMP[k % len(_CAMP)], Pose(x, y, 37.0 * k))
     placer.begin("Trees, bushes and stones")
-    for category, spacing, most, kind in _GROWTH:
+    for category, spacing, most, kind in _COUNTRY["growth"]:
         area = free[kind].intersection(site.extent.buffer(-1.5))
         for x, y, yaw in poisson_disc(area, spacing, site.rng_for("grow", category, kind), limit=most):
             placer.place(category, Pose(x, y, yaw), drawn=True)
@@ -47,7 +41,7 @@ def _landmarks(placer: Placer, water_z_m: float | None) -> None:
     site = placer.site
     corners = site.terrain.corners()
     spots = corners[shapely.contains_xy(site.extent.buffer(-8.0), corners[:, 0], corners[:, 1])]
-    for k, category in enumerate(_LANDMARKS):
+    for k, category in enumerate(_COUNTRY["landmarks"].split()):
         dry = spots if water_z_m is None else spots[spots[:, 2] > water_z_m + 1.0]
         if not len(dry):
             return
