@@ -22,6 +22,7 @@ from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import Object, parse_annotations, write_annotations
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.words import LISTS
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AgentUnavailable, AnnotationError, UsageError
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
@@ -56,17 +57,6 @@ _MAX_FAILURES = 3
 _PER_LETTER = 0.25  # Tokens
 _ANSWER_TOKENS = 60
 _RELATIONS = {"front": "in front of", "against": "right against"}
-# Words that say nothing of a thing.
-_FREE = frozenset(re.findall(
-    r"[a-z']+",
-    "a an the and or of to with there there's here where this that these one ones it it's its you you'll your who "
-    "which find finding look looking for search go going head see seeing will target be is are was can tell know "
-    "notice spot watch out want get reach come has have having stand stands standing sit sits sitting lie lies lying "
-    "park parked parks grow grows growing hang hangs hanging wait waits waiting rest rests resting in on at by from "
-    "also as just right next beside near close under beneath behind front between above over top side just stop when "
-    "then until past toward towards around it'll is's do what need should try simply same place object thing called "
-    "located found seen visible up down",
-))  # fmt: skip
 # Words that must be the facts' own, letter by letter.
 _EXACT = frozenset({*SHADES, *DIRECTIONS, "no", "not", "without", "never", "left", "right-hand"})
 _STEM = 4
@@ -233,7 +223,7 @@ def _needed(claim: Claim) -> set[str]:
     """Words of which a text has to have one if it says a fact."""
     if claim.things:
         return {_tokens(m.noun)[-1] for m in claim.things}
-    return {word for word in _tokens(claim.key.rpartition("=")[2]) if word not in _FREE}
+    return {word for word in _tokens(claim.key.rpartition("=")[2]) if word not in LISTS["free"]}
 
 
 def _tokens(text: str) -> list[str]:
@@ -242,7 +232,7 @@ def _tokens(text: str) -> list[str]:
 
 
 def _is_allowed(word: str, facts: set[str]) -> bool:
-    if word in facts or word in _FREE:
+    if word in facts or word in LISTS["free"]:
         return True
     if word in _EXACT or len(word) <= _STEM or any(word.startswith(d) for d in ("north", "south", "east", "west")):
         return False
