@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from aerialdojo_gen.base import environment_errors
 from aerialdojo_gen.base.errors import AssetError
@@ -87,6 +86,8 @@ class SiblingFiles:
             self.loaded[name] = path.read_bytes()
         return self.loaded[name]
 
+    __getitem__ = get  # trimesh reads files by name
+
     def _resolve(self, name: str) -> Path | None:
         """Resolve a name; absolute paths of other machines by their last part, as exporters write them."""
         plain = name.replace("\\", "/")
@@ -99,18 +100,6 @@ class SiblingFiles:
             except (OSError, ValueError):
                 continue
         return None
-
-    def keys(self) -> list[str]:
-        """Return nothing: files are looked up by name only."""
-        return []
-
-    def namespaced(self, namespace: str) -> Any:
-        """Return itself: there is one folder."""
-        return self
-
-    def write(self, name: str, data: bytes) -> None:
-        """Not supported."""
-        raise PermissionError(name)
 
 
 _HEAD = 1024
