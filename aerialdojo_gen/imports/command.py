@@ -67,12 +67,11 @@ def add_tiles(
         tiles = list(make_tiles(name, source, edge_m, options))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: every tile of the mesh is nearly empty")
-    check_free([tile.name for tile in tiles], project, force)
+    check_free([scene.name for _, scene, _ in tiles], project, force)
     source_digest, out = _file_digest(mesh), []
-    for tile in tiles:
-        (x0, y0), (x1, y1) = tile.region.low.tolist(), tile.region.high.tolist()
-        recipe = _recipe(source_digest, tile.scene, tile.repairs, options, (x0, y0, x1, y1))
-        out.append(_write_scene(tile.scene, tile.repairs, project, recipe, None))
+    for region, scene, repairs in tiles:
+        recipe = _recipe(source_digest, scene, repairs, options, (*region.low.tolist(), *region.high.tolist()))
+        out.append(_write_scene(scene, repairs, project, recipe, None))
         on_added(out[-1])
     return out
 

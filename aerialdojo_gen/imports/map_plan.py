@@ -17,6 +17,7 @@ from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_p
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows, plan_of
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M, HeightTable, PlacePlan
@@ -188,18 +189,11 @@ def _barriers(barriers: Sequence[Mapping[str, Any]], site: shapely.Polygon) -> l
             if isinstance(leg, LineString) and leg.length > 0.6:
                 points = [[round(x, 2), round(y, 2)] for x, y in leg.simplify(0.1).coords]
                 groups.setdefault((barrier["kind"], barrier["height_m"]), []).append(points)
-    made = {
-        "wall": lambda lines, high: {
-            "make": "walls",
-            "height_m": high,
-            "material": "stone",
-            "category": "garden_wall",
-            "lines": lines,
-        },
-        "fence": lambda lines, high: {"make": "bar_fences", "height_m": high, "lines": lines},
-        "hedge": lambda lines, high: {"make": "fence_panels", "of": "hedge_block", "panel_m": 4, "lines": lines},
-    }
-    return [made[kind](lines, high) for (kind, high), lines in groups.items()]
+    made = []
+    for (kind, high), lines in groups.items():
+        entry = TABLES["barriers"][kind]["entry"]
+        made.append({key: high if key == "height_m" else value for key, value in entry.items()} | {"lines": lines})
+    return made
 
 
 def _street(road: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.ground import Ground
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.imports.naming import words_in
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.catalogue import single
@@ -32,7 +34,6 @@ _LARGE_M = 100.0
 _HOLLOW, _SHELL = 0.4, 0.95
 # Share of columns over the content that a dome must cover.
 _ROOFED = 0.9
-_PROBES = 12
 _GROUND = (122, 132, 108)
 
 
@@ -72,14 +73,17 @@ def _is_hollow(body: RawNode) -> bool:
 
 def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
     """Whether vertical rays from the top of a box hit the body."""
-    from aerialdojo_gen.geometry.rays import TriangleRayCaster
-
-    at = (np.arange(_PROBES) + 0.5) / _PROBES
-    x, y = np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * at), indexing="ij")
-    origins = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, high[2] - 1e-6)])
     caster = TriangleRayCaster(body.vertices, body.faces.astype(np.int32))
-    hit, _ = caster.first_hit(origins, np.tile([0.0, 0.0, 1.0], (len(origins), 1)))
-    return bool(np.isfinite(hit).mean() >= _ROOFED)
+    return _vertical_hits(caster, low, high, high[2] - 1e-6, 1.0, 12) >= _ROOFED
+
+
+def _vertical_hits(caster: TriangleRayCaster, low: Floats, high: Floats, z: float, way: float, n: int) -> float:
+    """Share of n by n rays from a height, upwards or downwards, that hit something."""
+    shares = (np.arange(n) + 0.5) / n
+    x, y = np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * shares), indexing="ij")
+    origins = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
+    hit, _ = caster.first_hit(origins, np.tile([0.0, 0.0, way], (len(origins), 1)))
+    return float(np.isfinite(hit).mean())
 
 
 def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
@@ -117,16 +121,7 @@ def describe_surfaces(scene: Scene) -> list[str]:
 
 def ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
     """Share of a grid of vertical rays that hit the mesh."""
-    from aerialdojo_gen.geometry.rays import RayCaster
-
-    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
-    fractions = (np.arange(24) + 0.5) / 24
-    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
-        -1, 2
-    )
-    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
-    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
-    return float(np.isfinite(hit).mean())
+    return _vertical_hits(TriangleRayCaster(*soup(instances)), low, high, high[2] + 1.0, -1.0, 24)
 
 
 def ground_plane(low: Floats, high: Floats, margin_m: float, materials: dict[str, Material]) -> Instance:

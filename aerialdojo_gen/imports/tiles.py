@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +20,10 @@ _MAX_TILES = 400
 _MIN_SHARE = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class Tile:
-    """A tile of a mesh as a scene."""
-
-    name: str  # Name with column from the west and row from the south, ``"City-x0y2"``
-    region: Region  # The square, in the file's axes, metres
-    scene: Scene  # In the frame shared by all tiles
-    repairs: Repairs  # Repairs; `origin_m` is the same for all tiles
-
-
-def make_tiles(name: str, source: SourceMesh, edge_m: float, options: MeshOptions) -> Iterator[Tile]:
-    """Cut a mesh into squares of `edge_m` metres, west to east and south to north; yields those with content."""
+def make_tiles(
+    name: str, source: SourceMesh, edge_m: float, options: MeshOptions
+) -> Iterator[tuple[Region, Scene, Repairs]]:
+    """Cut a mesh into squares of `edge_m` metres, in one frame; yields those with content, from south-west on."""
     if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
         raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
     low, high = source.low, source.high
@@ -53,13 +44,11 @@ def make_tiles(name: str, source: SourceMesh, edge_m: float, options: MeshOption
             )
             if not near.any() or not _has_content(part, region, edge_m):
                 continue
-            tile = tile_name(name, column, row)
-            scene, repairs = make_scene(tile, part, options, region, origin)
-            yield Tile(tile, region, scene, repairs)
+            yield region, *make_scene(tile_name(name, column, row), part, options, region, origin)
 
 
 def tile_name(name: str, column: int, row: int) -> str:
-    """Name a tile; a partition suffix stays last."""
+    """Name a tile by its column from the west and its row from the south; a partition suffix stays last."""
     for suffix in ("_0", "_1"):
         if name.endswith(suffix):
             return f"{name[: -len(suffix)]}-x{column}y{row}{suffix}"
