@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from statistics import median_low
 from typing import Any
 
@@ -38,18 +37,7 @@ _CATEGORY, _ROOFS = by_word(TABLES["buildings"]), by_word(TABLES["roofs"])
 _MATERIALS = {kind: specs.split() for kind, specs in TABLES["materials"].items()}
 
 
-@dataclass
-class MapSummary:
-    """Counts of what was made of the map, for the user."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-
-    def add(self, what: str, n: int = 1) -> None:
-        """Count an item."""
-        self.counts[what] += n
-
-
-def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> list[Polygon]:
+def plans_of(shape: BaseGeometry, tolerance_m: float, summary: Counter[str]) -> list[Polygon]:
     """Simplify an area and round it to centimetres; count what becomes invalid."""
     out = []
     for piece in polygons_of(shape):
@@ -60,7 +48,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> li
             rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
         valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MAX_POINTS]
         if len(valid) < len(rounded):
-            summary.add(_LEFT_OUT, len(rounded) - len(valid))
+            summary[_LEFT_OUT] += len(rounded) - len(valid)
         out += valid
     return out
 
@@ -79,7 +67,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
 
 
 def buildings(
-    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: MapSummary
+    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's buildings from map areas in metres."""
     outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
@@ -108,7 +96,7 @@ def buildings(
         if not bodies:
             continue
         out.append((area.key, _building(area, bodies, shop_points)))
-    summary.add("buildings", len(out))
+    summary["buildings"] += len(out)
     return [made for _, made in sorted(out, key=lambda item: item[0])]
 
 
@@ -152,7 +140,7 @@ def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry |
 
 
 def _bodies(
-    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, summary: MapSummary, *, part: bool = False
+    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, summary: Counter[str], *, part: bool = False
 ) -> list[dict[str, Any]]:
     out = []
     for plan in plans_of(shape.intersection(site), 0.12, summary):
@@ -166,7 +154,9 @@ def _bodies(
     return out
 
 
-def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | None) -> tuple[float, float, str, float]:
+def _heights(
+    area: Feature, plan: Polygon, usual: int, summary: Counter[str] | None
+) -> tuple[float, float, str, float]:
     """Base, top, roof shape and roof rise, metres above ground."""
     tags, kind = area.tags, category(area.tags)
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
@@ -176,7 +166,7 @@ def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | Non
     else:
         levels_used = levels
     if summary is not None:
-        summary.add("height" if height else "levels" if levels else "rule")
+        summary["height" if height else "levels" if levels else "rule"] += 1
     form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
     # The roof slope spans half the narrower side.
     half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import MapSummary, plans_of, rings_of
+from aerialdojo_gen.imports.map_buildings import plans_of, rings_of
 from aerialdojo_gen.imports.map_tags import SURFACES, TABLES, Tags, below_ground, by_word, count, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -21,7 +22,7 @@ _LEAST_AREA_M2 = 2.0
 _BARRIERS = by_word({kind: table["tags"] for kind, table in TABLES["barriers"].items()})
 
 
-def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> list[dict[str, Any]]:
+def streets(lines: Sequence[Feature], window: Polygon, summary: Counter[str]) -> list[dict[str, Any]]:
     """Make the plan's streets and paths, clipped to a window somewhat larger than the site."""
     out = []
     for feature in lines:
@@ -29,14 +30,14 @@ def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> l
         if made is None:
             continue
         if below_ground(feature.tags):
-            summary.add("ways in tunnels or below ground left out")
+            summary["ways in tunnels or below ground left out"] += 1
             continue
         if BRIDGE in feature.tags:
             # No parking on bridges.
             made = {k: v for k, v in made.items() if k != "parking"} | {"bridge": int(feature.tags[BRIDGE])}
         for line in clipped(feature.shape, window):
             out.append({**made, "line": line})
-            summary.add("streets" if made["kind"] != "path" else "paths")
+            summary["streets" if made["kind"] != "path" else "paths"] += 1
     return out
 
 
@@ -111,7 +112,7 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 
 
 def areas(
-    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: MapSummary
+    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
@@ -147,7 +148,7 @@ def _ground(tags: Tags) -> tuple[str, str] | None:
 
 
 def _areas(
-    shape: BaseGeometry, summary: MapSummary, material: str, grows: str = "", parking: bool = False, name: str = ""
+    shape: BaseGeometry, summary: Counter[str], material: str, grows: str = "", parking: bool = False, name: str = ""
 ) -> list[dict[str, Any]]:
     optional = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
     plans = (plan for plan in plans_of(shape, 0.1, summary) if plan.area >= _LEAST_AREA_M2)

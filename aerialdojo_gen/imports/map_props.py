@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,6 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_tags import TABLES, Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -23,7 +23,7 @@ _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 
 def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
-           built: BaseGeometry, summary: MapSummary) -> list[dict[str, Any]]:  # fmt: skip
+           built: BaseGeometry, summary: Counter[str]) -> list[dict[str, Any]]:  # fmt: skip
     """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas.
 
     What lies in a building is no street furniture, and is counted as left out; what is drawn within its wall's
@@ -36,7 +36,7 @@ def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[F
             continue
         at = _move_before_wall(feature.shape, built)
         if at is None:
-            summary.add("things inside buildings left out")
+            summary["things inside buildings left out"] += 1
             continue
         out.append(_thing(category, at, feature.tags))
     for feature in lines:
@@ -52,7 +52,7 @@ def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[F
         at = feature.shape.representative_point()
         if category and category != "urban_tree" and site.contains(at) and not built.contains(at):
             out.append(_thing(category, at, feature.tags))
-    summary.add("things of the map", len(out))
+    summary["things of the map"] += len(out)
     return out
 
 
