@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
-from aerialdojo_gen.imports.naming import words_in
+from aerialdojo_gen.imports.naming import word_list, words_in
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -21,12 +21,6 @@ Floats = NDArray[np.float64]
 
 # Category by which a naming table marks a sky dome.
 SKY = "sky"
-_SKY_WORDS = frozenset({"sky", "skybox", "skydome", "skysphere", "hdri", "panorama", "backdrop", "horizon", "env"})
-# Ambiguous words: the shape has to decide.
-_SKY_PERHAPS = frozenset({"dome", "hemisphere", "background", "environment", "backside", "bg"})
-_GROUND_WORDS = frozenset(
-    {"terrain", "ground", "landscape", "relief", "dem", "dtm", "topography", "heightfield", "heightmap", "earth"}
-)
 # Minimum ratio of a dome's size to its content: if named a sky, and if unnamed.
 _WIDER_CALLED, _WIDER = 1.05, 1.5
 _LARGE_M = 100.0
@@ -46,8 +40,8 @@ def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[in
         rest = [j for j in range(len(bodies)) if j != k and j not in found]
         if not rest:
             break
-        words = [word for word in words_in(bodies[k].name) if word not in _SKY_PERHAPS]
-        sky = table_names[k] == SKY or (not table_names[k] and bool(_SKY_WORDS & set(words)))
+        words = [word for word in words_in(bodies[k].name) if word not in word_list("sky_perhaps")]
+        sky = table_names[k] == SKY or (not table_names[k] and bool(word_list("sky") & set(words)))
         if (table_names[k] or words) and not sky:
             break
         inner_low, inner_high = low[rest].min(axis=0), high[rest].max(axis=0)
@@ -97,7 +91,7 @@ def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
         if instance.surface != "sheet":
             return instance.surface
         wide = bool((np.ptp(instance.bounds, axis=0)[:2] >= 0.2 * extent).all())
-        named = wide and bool(_GROUND_WORDS & set(words_in(source_names.get(instance.node, ""))))
+        named = wide and bool(word_list("ground") & set(words_in(source_names.get(instance.node, ""))))
         return "ground" if instance.node in nodes or named else "sheet"
 
     return replace(scene, instances=tuple(replace(i, surface=surface(i)) for i in scene.instances))
