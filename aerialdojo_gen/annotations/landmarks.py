@@ -45,8 +45,9 @@ def choose_landmarks(
     else:
         rest = [i for i in inside if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
         if len(chosen) + len(rest) < n and at_most:
-            # Mapped towns often have no landmark of the catalogue: use the tallest buildings.
-            large = [i for i in _prominent(inside) if _is_large(i)][: 8 * n]
+            # Mapped towns often have no landmark of the catalogue: use the tallest buildings, that is what is large
+            # itself, not only high up on a roof.
+            large = [i for i in _prominent(inside) if np.ptp(i.bounds, axis=0).min() >= _LARGE_M][: 8 * n]
             own = {i.node: names.of(i) for i in large if i not in (*chosen, *rest) and names.of(i)}
             rest += [i for i in large if i.node in own]
     while len(chosen) < n and rest:
@@ -90,11 +91,6 @@ def _prominent(instances: Sequence[Instance]) -> list[Instance]:
     """Those of some instances that are things, highest first, those without a name last."""
     things = [i for i in instances if i.category not in NON_OBJECTS]
     return sorted(things, key=lambda i: (i.category == UNKNOWN, -float(i.bounds[1, 2]), i.node))
-
-
-def _is_large(instance: Instance) -> bool:
-    """Whether an instance itself is large, not only high up on a roof."""
-    return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
 
 
 class _UniqueNames:

@@ -96,10 +96,11 @@ class Matcher:
 
     def faults(self, i: int, text: str) -> list[str]:
         """What a text says of an instance that is false, in words."""
-        node, matched = self._instances[i].node, self.read(text, i)
+        node, matched, places = self._instances[i].node, self.read(text, i), self._claims.places
         wrong = [f"it is called {matched.called!r}, and the mesh says {self._name(i)!r}"] if matched.called else []
         return wrong + [
-            f"{words!r} is not so of {node}{self._why(claim, i)}"
+            f"{words!r} is not so of {node}"
+            + (f": {places.fault(i, claim.key)}" if claim.kind == "place" and places is not None else "")
             for claim, words in matched.claims.items()
             if not self._claims.holds(claim, i)
         ]
@@ -107,10 +108,6 @@ class Matcher:
     def true_claims(self, i: int, text: str) -> list[Claim]:
         """The claims of a text that hold of its instance."""
         return [claim for claim in self.read(text, i).claims if self._claims.holds(claim, i)]
-
-    def _why(self, claim: Claim, i: int) -> str:
-        places = self._claims.places
-        return f": {places.fault(i, claim.key)}" if claim.kind == "place" and places is not None else ""
 
     def _name(self, i: int) -> str:
         category = self._instances[i].category

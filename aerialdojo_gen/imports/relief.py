@@ -68,12 +68,6 @@ def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float
     return max(native_m, least, _FINEST_M * 2)
 
 
-def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]:
-    """Round an extent down to whole cells, metres."""
-    x, y = (max(int(s / cell_m + 1e-6), 1) * cell_m for s in size)
-    return round(x, 6), round(y, 6)
-
-
 @dataclass(frozen=True, eq=False)
 class HeightTable:
     """Heights about the origin, on a square grid."""
@@ -158,18 +152,24 @@ def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[ReliefPlan, list[str]
             f"--size 400 400 crops to its centre, --bbox to a part; {describe_coverage(dem)}"
         )
     cell = round(choose_cell(size, options.cell_m, native_cell_m(dem, frame)), 4)
-    size = whole_cells(size, cell)
+    # Whole cells.
+    width, depth = (round(max(int(s / cell + 1e-6), 1) * cell, 6) for s in size)
+    size = width, depth
     table = HeightTable.of(grid(dem, size, cell, frame, middle), cell)
     top = float(table.rows_m.max())
     marks = {"water_m": options.water_m, "snow_from_m": options.snow_m, "sand_to_m": options.sand_m}
     surfaces = {key: round(value - table.datum_m, 2) for key, value in marks.items() if value is not None}
     water = surfaces.pop("water_m", None)
     surfaces["rock_slope"] = _ROCK_SLOPE
+    if frame is None:
+        origin = {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3)}
+    else:
+        origin = {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
     plan = {
         "plan": 1, "seed": options.seed, "size_m": list(size),
         "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if options.ceiling_m is None else options.ceiling_m,
         **({"attribution": options.attribution} if options.attribution else {}),
-        "origin": _origin(frame, middle, table.datum_m),
+        "origin": origin | {"z_m": table.datum_m},
         "ground": {"material": "meadow:#7a9148", "steps": [{"make": "surveyed_heights"}]},
         "site": [
             {"make": "surveyed_surfaces", **surfaces},
@@ -206,12 +206,6 @@ def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[f
     if dem.geographic:
         return LocalFrame(*middle), (0.0, 0.0), size or size_m(dem.extent)
     return None, middle, size or (east - west, north - south)
-
-
-def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float) -> dict[str, float]:
-    if frame is None:
-        return {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3), "z_m": datum}
-    return {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7), "z_m": datum}
 
 
 def ground_sampler(dem: Dem, cell_m: float | None = None) -> Callable[[LocalFrame, tuple[float, float]], HeightTable]:

@@ -57,8 +57,8 @@ class LocationPhrases:
         nodes = [index_of[mention.node] for mention in claim.things]
         text = self._words(level if level in relation_phrases() else "relation", key, i, nodes, rng)
         pronoun = self._words("pronoun", key, i, nodes, rng)
-        if len(things) == 1 and things[0].startswith("the ") and _is_plural(claim.things[0].noun):
-            pronoun = _of_many(pronoun)
+        if len(things) == 1 and things[0].startswith("the ") and " of " not in (noun := claim.things[0].noun):
+            pronoun = _of_many(pronoun) if group_of(noun) else pronoun
         return Location(
             index, claim.kind, claim.key, text.format(*things, d=direction), thing=" and ".join(things),
             pronoun=pronoun.format(d=direction), turned=self._words("turned", key, i, nodes, rng),
@@ -90,10 +90,6 @@ class LocationPhrases:
             return phrase.the
         alike = instances[k].category == instances[i].category
         return f"another {phrase.bare}" if alike and not said else phrase.a
-
-
-def _is_plural(noun: str) -> bool:
-    return bool(group_of(noun)) and " of " not in noun
 
 
 def _of_many(pronoun: str) -> str:

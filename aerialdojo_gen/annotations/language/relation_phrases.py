@@ -32,24 +32,16 @@ class RelationPhrase:
         return all(_HOLDS[name](claims, i, j, value) for name, value in self.conditions.items())
 
 
-def _between(value: float, ends: list[float]) -> bool:
-    return ends[0] <= value <= ends[1]
-
-
-def _is_kind(claims: SceneClaims, j: int, kinds: list[str]) -> bool:
-    return claims.vocabulary.kinds.get(claims.scene.instances[j].category, STRUCTURE) in kinds
-
-
 def _size(claims: SceneClaims, j: int) -> Any:
     return np.ptp(claims.geometry.boxes[j], axis=0)
 
 
 _HOLDS: Mapping[str, Callable[[SceneClaims, int, int, Any], bool]] = {
-    "gap_m": lambda c, i, j, ends: _between(c.geometry.gap_m(i, j), ends),
+    "gap_m": lambda c, i, j, ends: bool(ends[0] <= c.geometry.gap_m(i, j) <= ends[1]),
     "tall_m": lambda c, _, j, least: bool(_size(c, j)[2] >= least),
     "long_m": lambda c, _, j, least: bool(_size(c, j)[:2].max() >= least),
     "level": lambda c, i, j, _: bool(abs(c.geometry.boxes[i, 0, 2] - c.geometry.boxes[j, 0, 2]) <= _LEVEL_M),
-    "kinds": lambda c, _, j, kinds: _is_kind(c, j, kinds),
+    "kinds": lambda c, _, j, kinds: c.vocabulary.kinds.get(c.scene.instances[j].category, STRUCTURE) in kinds,
     "like": lambda c, _, j, like: any(fnmatchcase(c.scene.instances[j].category, one) for one in like.split("|")),
     "smaller": lambda c, i, j, _: bool((_size(c, i) <= _size(c, j)).all()),
 }
