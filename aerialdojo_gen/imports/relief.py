@@ -1,22 +1,26 @@
-"""Convert a height model to the plan of a scene."""
+"""Convert a height model to the plan of a scene: its ground, and what grows and lies on it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
+from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.imports.relief_props import place_things
+from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
 from aerialdojo_gen.scenes.height_table import heights_text
+from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
@@ -102,6 +106,56 @@ class PlacePlan:
     heights: HeightTable | None = None
 
 
+_COUNTRY = TABLES["country"]
+_CAMP = _COUNTRY["camp"].split()
+
+
+def _grow_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float | None) -> None:
+    """Grow and strew what such ground has; `surfaces` are the arguments of the plan's surfaces."""
+    site = placer.site
+    areas = surface_areas(site, **surfaces, water_to_m=water_z_m)
+    bare = shapely.union_all([areas[key] for key in ("sand", "snow", "rock", "wet")])
+    free = {
+        "grass": site.extent.difference(bare), "rock": areas["rock"].difference(areas["wet"]),
+        "sand": areas["sand"].difference(areas["wet"]),
+    }  # fmt: skip
+    placer.begin("Landmarks, and a resting place on level grass")
+    _landmarks(placer, water_z_m)
+    for k, (x, y) in enumerate(_level_places(placer, free["grass"])):
+        placer.place(_CAMP[k % len(_CAMP)], Pose(x, y, 37.0 * k))
+    placer.begin("Trees, bushes and stones")
+    for category, spacing, most, kind in _COUNTRY["growth"]:
+        area = free[kind].intersection(site.extent.buffer(-1.5))
+        for x, y, yaw in poisson_disc(area, spacing, site.rng_for("grow", category, kind), limit=most):
+            placer.place(category, Pose(x, y, yaw), drawn=True)
+
+
+def _landmarks(placer: Placer, water_z_m: float | None) -> None:
+    site = placer.site
+    corners = site.terrain.corners()
+    spots = corners[shapely.contains_xy(site.extent.buffer(-8.0), corners[:, 0], corners[:, 1])]
+    for k, category in enumerate(_COUNTRY["landmarks"].split()):
+        dry = spots if water_z_m is None else spots[spots[:, 2] > water_z_m + 1.0]
+        if not len(dry):
+            return
+        x, y, _ = dry[int(np.argmax(dry[:, 2]))]
+        placer.place(category, Pose(float(x), float(y), 90.0 * k), settle_m=1.0, drawn=True)
+        # The next one stands far from it.
+        spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.head.size_m)]
+
+
+def _level_places(placer: Placer, grass: BaseGeometry) -> list[tuple[float, float]]:
+    site, ground = placer.site, placer.site.terrain
+    inner = grass.intersection(site.extent.buffer(-4.0)).buffer(-1.0)
+    spots = poisson_disc(inner, 14.0, site.rng_for("level"), limit=120)
+
+    def tilt(pose: tuple[float, float, float]) -> float:
+        x, y, _ = pose
+        return float(abs(ground.z(x + 1, y) - ground.z(x - 1, y)) + abs(ground.z(x, y + 1) - ground.z(x, y - 1)))
+
+    return [(x, y) for x, y, _ in sorted(spots, key=tilt)[: 2 * len(_CAMP)]]
+
+
 @dataclass(frozen=True)
 class ReliefPlan:
     """The plan of a relief, but what is placed on the ground that it builds."""
@@ -115,7 +169,7 @@ class ReliefPlan:
         """Place things on the site that the plan has built."""
         placer = Placer(site, _SETTLE_M)
         if not self.bare:
-            place_things(placer, self.surfaces, self.water_z_m)
+            _grow_things(placer, self.surfaces, self.water_z_m)
         return placer
 
 
