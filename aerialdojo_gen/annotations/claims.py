@@ -174,7 +174,9 @@ class SceneClaims:
         return [Claim("place", place)] if place and bound else []
 
     def _relations(self, i: int) -> list[Claim]:
-        things = [j for j in self.geometry.neighbours(i, _REACH_M) if self._may_mention(i, j)]
+        sizes = (self.geometry.boxes[:, 1] - self.geometry.boxes[:, 0]).max(axis=1)
+        close = self.geometry.neighbours(i, _REACH_M)
+        things = [j for j in close if self.vocabulary.words[j].reference and sizes[j] >= _MIN_SIZE_M]
         weights = {j: self._weight(i, j) for j in things}
         things.sort(key=lambda j: (-weights[j], j))
         found: list[tuple[float, Claim]] = []
@@ -218,10 +220,6 @@ class SceneClaims:
             offset = g.centres[i] - g.centres[j]
             if g.side(i, j, direction, _TIGHT) and lies_towards(offset, direction, 22.5 - BORDER_DEG):
                 yield f"{direction} of", 1.0
-
-    def _may_mention(self, i: int, j: int) -> bool:
-        size = self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]
-        return j != i and self.vocabulary.words[j].reference and float(size.max()) >= _MIN_SIZE_M
 
     def _weight(self, i: int, j: int) -> float:
         noun, size = self._nouns[j], float((self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]).max())

@@ -151,15 +151,10 @@ def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
     for patterns in (table.get(category, {}), table):
         found = patterns.get(f"{key}={value}") or patterns.get(f"{key}=*")
         if found:
-            forms = {"{a}": _with_article(value), "{up}": value.upper(), "{}": value}
-            return tuple(_filled(pattern, forms) for pattern in ([found] if isinstance(found, str) else found))
+            patterns = [found] if isinstance(found, str) else found
+            filled = (one.replace("{a}", _with_article(value)).replace("{up}", value.upper()) for one in patterns)
+            return tuple(one.replace("{}", value) for one in filled)
     return (_phrase_by_rule(key, value),)
-
-
-def _filled(pattern: str, forms: dict[str, str]) -> str:
-    for slot, form in forms.items():
-        pattern = pattern.replace(slot, form)
-    return pattern
 
 
 def _phrase_by_rule(key: str, value: str) -> str:

@@ -69,7 +69,8 @@ class MaterialBuilder:
         )  # fmt: skip
 
     def _build_parts(self, body: RawNode, rows: NDArray[np.bool_], material: Material) -> list[tuple[Material, Part]]:
-        material = replace(material, name=_material_name(material))
+        sides, light = ", both sides" if material.double_sided else "", ", unlit" if material.unlit else ""
+        material = replace(material, name=material.name.split(",")[0] + sides + light)
         material = self.materials.get(material.name, material)
         corners = None
         if material.texture is not None and body.corners is not None:
@@ -156,11 +157,6 @@ def _split(
     carried = corners.reshape(len(flat), -1) + np.float32(0.0)  # no negative zero
     first, index, _ = unique_rows(flat, *carried.T)
     return vertices[used[flat[first]]], index.reshape(-1, 3).astype(np.int32), carried[first]
-
-
-def _material_name(material: Material) -> str:
-    base = material.name.split(",")[0]
-    return base + (", both sides" if material.double_sided else "") + (", unlit" if material.unlit else "")
 
 
 def is_photographic(nodes: Sequence[RawNode]) -> bool:

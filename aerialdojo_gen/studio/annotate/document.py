@@ -159,6 +159,11 @@ def difference(before: Annotations, after: Annotations) -> list[Edit]:
     return edits
 
 
+def called(kind: str, entry: Entry) -> str:
+    """Name an entry for people."""
+    return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
+
+
 def describe(edits: Sequence[Edit]) -> str:
     """Say in a few words what edits do, for people."""
     if not edits:
@@ -167,7 +172,7 @@ def describe(edits: Sequence[Edit]) -> str:
     for edit in edits[:3]:
         entry = edit.after or edit.before
         assert entry is not None
-        thing = f"{edit.kind[:-1]} {edit.id}" + (f" ({entry.name})" if entry.name else "")
+        thing = called(edit.kind, entry)
         if edit.before is None:
             words.append(f"added {thing}")
         elif edit.after is None:
