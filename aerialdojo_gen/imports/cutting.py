@@ -144,8 +144,8 @@ def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal
         np.stack([border[:k, 0], c[:k, 1], c[:k, 2]], 1), np.stack([border[:k, 0], c[:k, 2], border[:k, 1]], 1),
         np.stack([c[k:, 0], border[k:, 0], border[k:, 1]], 1),
     ])  # fmt: skip
-    pieces_made = Pieces(made[..., :3], np.concatenate([source[:k], source[:k], source[k:]]), made[..., 3:])
-    kept = _concatenate([keep, pieces_made])
+    clipped = Pieces(made[..., :3], np.concatenate([source[:k], source[:k], source[k:]]), made[..., 3:])
+    kept = _concatenate([keep, clipped])
     kept = _select(kept, np.argsort(kept.source, kind="stable"))
     return _concatenate([kept, *_caps(border[..., :3], source, body, closed, normal, offset)])
 
