@@ -125,8 +125,8 @@ def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
         locked = len(head) >= 8 and struct.unpack_from("<H", head, 6)[0] & _ENCRYPTED
         how = "unpack it with its password" if locked else "unpack it"
         return f"is {'an encrypted' if locked else 'a'} ZIP archive: {how}, and give the mesh in it"
-    for begin, message in tomli.loads(Path(__file__).with_name("file_types.toml").read_text("utf-8")).items():
-        if head.startswith(begin.encode("latin-1")):
+    for start, message in tomli.loads(Path(__file__).with_name("file_types.toml").read_text("utf-8")).items():
+        if head.startswith(start.encode("latin-1")):
             return message
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text.lower().startswith(_PAGES):
