@@ -9,30 +9,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from aerialdojo_gen.annotations.words import LISTS, TABLES
 from aerialdojo_gen.scenes.colours import colour_name, shown_colours
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance, Material
 
 # Colour words and the results of `colour_name` that each may stand for.
-SHADES: Mapping[str, frozenset[str]] = {
-    word: frozenset(names.split())
-    for word, names in {
-        "red": "red brown pink orange", "maroon": "red brown purple", "russet": "red brown orange",
-        "reddish": "red brown pink orange", "terracotta": "red orange brown beige", "rusty": "red orange brown",
-        "pink": "pink red purple beige", "purple": "purple pink blue", "violet": "purple pink blue",
-        "lilac": "purple pink blue", "blue": "blue turquoise purple", "navy": "blue black",
-        "teal": "turquoise green blue", "turquoise": "turquoise green blue", "green": "green turquoise yellow",
-        "olive": "green yellow brown", "yellow": "yellow orange beige brown", "ochre": "yellow orange brown beige",
-        "amber": "yellow orange brown", "orange": "orange red yellow brown", "gold": "yellow orange brown beige",
-        "golden": "yellow orange brown beige", "bronze": "brown orange yellow green grey",
-        "copper": "brown orange green red turquoise",
-        "brown": "brown orange beige red", "tan": "brown beige orange yellow",
-        "beige": "beige white orange yellow brown grey",
-        "sand": "beige yellow orange brown", "cream": "beige white yellow grey", "white": "white beige grey",
-        "silver": "grey white", "grey": "grey white black", "gray": "grey white black", "black": "black grey",
-    }.items()
-}  # fmt: skip
-DEGREES = frozenset({"dark", "light", "pale", "bright", "weathered", "faded", "bluish", "yellowish"})
+SHADES: Mapping[str, frozenset[str]] = {word: frozenset(names.split()) for word, names in TABLES["shades"].items()}
 # Minimum share of the surface: for a colour named alone, and for one of several or of a part.
 _ALONE, _AMONG = 0.1, 0.03
 
@@ -94,7 +77,7 @@ def unsupported_colours(text: str, instance: Instance, materials: Mapping[str, M
     """List the colours of a text that the instance's surface does not have."""
     words = colour_words(text)
     shares = colour_shares(instance, materials)
-    alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in DEGREES] == words[:1]
+    alone = [word for word in re.findall(r"[a-z]+", text.lower()) if word not in LISTS["degrees"]] == words[:1]
     least = _ALONE if alone else _AMONG
     return [word for word in words if sum(shares.get(name, 0.0) for name in SHADES[word]) < least]
 

@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,9 @@ from aerialdojo_gen.annotations.appearance import SHADES, unsupported_colours
 from aerialdojo_gen.annotations.bearings import BORDER_DEG, Bearing, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.format import Landmark
 from aerialdojo_gen.annotations.places import Places, places_of
-from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
+from aerialdojo_gen.annotations.relations import AGAINST_M, AT_M, DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
+from aerialdojo_gen.annotations.words import TABLES
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.scenes.model import Instance
@@ -29,12 +30,7 @@ from aerialdojo_gen.scenes.model import Instance
 KINDS = ("colour", "size", "attribute", "part", "place", "relation", "direction")
 # Attributes that are no adjectives: claims of a kind of their own, or words of the noun.
 _NO_VALUES = frozenset({"colour", "size", "place", "called", "group"})
-# Words for one colour: a thing that has one of them may be said to have another.
-_ONE_COLOUR = (
-    {"grey", "gray", "silver"}, {"beige", "cream", "sand", "tan"}, {"teal", "turquoise"},
-    {"gold", "golden", "yellow"}, {"maroon", "red"}, {"violet", "purple", "lilac"},
-    {"russet", "rusty", "reddish", "brown"}, {"navy", "blue"},
-)  # fmt: skip
+_ONE_COLOUR = [frozenset(words.split()) for words in TABLES["one_colour"].values()]
 _SPELT = {"wooden": "wood", "gray": "grey", "golden": "gold"}
 # Stricter than the check, so that claims stay true after small changes of the scene.
 _TIGHT = 0.9
@@ -178,7 +174,9 @@ class SceneClaims:
         return [Claim("place", place)] if place and bound else []
 
     def _relations(self, i: int) -> list[Claim]:
-        things = [j for j in self.geometry.neighbours(i, _REACH_M) if self._may_mention(i, j)]
+        sizes = (self.geometry.boxes[:, 1] - self.geometry.boxes[:, 0]).max(axis=1)
+        close = self.geometry.neighbours(i, _REACH_M)
+        things = [j for j in close if self.vocabulary.words[j].reference and sizes[j] >= _MIN_SIZE_M]
         weights = {j: self._weight(i, j) for j in things}
         things.sort(key=lambda j: (-weights[j], j))
         found: list[tuple[float, Claim]] = []
@@ -222,10 +220,6 @@ class SceneClaims:
             offset = g.centres[i] - g.centres[j]
             if g.side(i, j, direction, _TIGHT) and lies_towards(offset, direction, 22.5 - BORDER_DEG):
                 yield f"{direction} of", 1.0
-
-    def _may_mention(self, i: int, j: int) -> bool:
-        size = self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]
-        return j != i and self.vocabulary.words[j].reference and float(size.max()) >= _MIN_SIZE_M
 
     def _weight(self, i: int, j: int) -> float:
         noun, size = self._nouns[j], float((self.geometry.boxes[j, 1] - self.geometry.boxes[j, 0]).max())
@@ -373,7 +367,8 @@ def _is_shade(own: str, said: str) -> bool:
 
 _Test = Callable[[SceneGeometry, int, int, float], bool]
 _RELATIONS: Mapping[str, _Test] = {
-    "beside": SceneGeometry.beside, "against": SceneGeometry.against, "at": SceneGeometry.at,
+    "beside": SceneGeometry.beside, "against": partial(SceneGeometry.near, most_m=AGAINST_M),
+    "at": partial(SceneGeometry.near, most_m=AT_M),
     "near": SceneGeometry.near, "front": SceneGeometry.front, "behind": SceneGeometry.behind, "on": SceneGeometry.on,
     "under": SceneGeometry.under, "above": SceneGeometry.above,
 }  # fmt: skip

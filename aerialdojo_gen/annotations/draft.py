@@ -90,7 +90,7 @@ class AnnotationDrafter:
         taken: list[int] = []
         everywhere = self._queues()
         core, rest = _parted(everywhere, self._in_core)
-        elevated, low = _parted(core, self._is_elevated)
+        elevated, low = _parted(core, lambda i: float(self._scene.instances[i].bounds[0, 2]) >= _ELEVATED_M)
         in_core = n if self._options.core_radius_m is None else round(n * self._options.core_share)
         phases: tuple[tuple[dict[str, list[int]], int], ...] = (
             (core, in_core),
@@ -104,7 +104,7 @@ class AnnotationDrafter:
                 before = len(taken)
                 # Categories that the core lacks come first.
                 for category, queue in sorted(queues.items(), key=lambda item: self._count(item[0], taken) > 0):
-                    open_slot = len(taken) < upto and not self._is_full(category, taken)
+                    open_slot = len(taken) < upto and self._count(category, taken) < self._limit(category)
                     if open_slot and self._take_next(queue, taken):
                         on_chosen()
                 if len(taken) == before:
@@ -126,9 +126,6 @@ class AnnotationDrafter:
         vegetation = self._kinds.get(category) == "vegetation"
         return self._options.max_vegetation if vegetation else self._options.max_per_category or MAX_PER_CATEGORY
 
-    def _is_full(self, category: str, taken: list[int]) -> bool:
-        return self._count(category, taken) >= self._limit(category)
-
     def _queues(self) -> dict[str, list[int]]:
         """Candidates by category; categories in a random but fixed order."""
         queues: dict[str, list[int]] = {}
@@ -140,9 +137,6 @@ class AnnotationDrafter:
         middle = self._scene.instances[i].centroid
         inside = np.all(middle >= self._scene.bounds[0]) and np.all(middle <= self._scene.bounds[1])
         return bool(inside) and self._claims.bearings[i] is not None
-
-    def _is_elevated(self, i: int) -> bool:
-        return float(self._scene.instances[i].bounds[0, 2]) >= _ELEVATED_M
 
     def _in_core(self, i: int) -> bool:
         if self._options.core_radius_m is None:

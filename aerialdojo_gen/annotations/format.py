@@ -22,18 +22,20 @@ _Id = Annotated[StrictInt, Field(ge=0, le=2**31 - 1)]
 _Finite = Annotated[StrictFloat, Field(allow_inf_nan=False)]
 
 
-class _Entry(BaseModel):
+class Strict(BaseModel):
+    """Values that do not change, under no keys but these."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Anchor(_Entry):
+class Anchor(Strict):
     """A viewpoint that a person chose for an object."""
 
     position_m: tuple[_Finite, _Finite, _Finite]  # Position of the body's centre, metres, world frame
     yaw_deg: _Finite  # Degrees, counter-clockwise from +x
 
 
-class Landmark(_Entry):
+class Landmark(Strict):
     """A landmark: an id, a name that is unique in the scene, and a node of the scene's mesh."""
 
     id: _Id
@@ -41,7 +43,7 @@ class Landmark(_Entry):
     node: StrictStr
 
 
-class Object(_Entry):
+class Object(Strict):
     """A target object."""
 
     id: _Id  # Unique in the scene
@@ -77,7 +79,7 @@ class Source:
         return Annotations(self.scene, tuple(self.landmarks.values()), tuple(self.objects.values()))
 
 
-_E = TypeVar("_E", bound=_Entry)
+_E = TypeVar("_E", bound=Strict)
 
 
 def parse_annotations(text: str) -> Source:

@@ -1,4 +1,4 @@
-"""A scene's ground: how far instances stand from a material of it, and which parts lie below it or below water."""
+"""A scene's ground: its triangles, and which parts of things lie below it or below water."""
 
 from __future__ import annotations
 
@@ -9,38 +9,15 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
 
 GROUND = ("ground", "terrain", "river")
-_RISE_M = 3.0
 # A body that stands on the ground touches it.
 _TOUCH_M = 0.01
 _MAX_HIDDEN = 0.5
-
-
-class GroundMaterials:
-    """The surfaces of a scene's ground."""
-
-    def __init__(self, geometry: SceneGeometry) -> None:
-        self._geometry = geometry
-        self._trees: dict[str, tuple[shapely.STRtree, np.ndarray]] = {}
-
-    def within(self, i: int, pattern: str, most_m: float) -> bool:
-        """Whether ground of a material is within `most_m` metres of an instance's outline."""
-        tree, heights = self._tree(pattern)
-        hits = tree.query(self._geometry.outline(i), predicate="dwithin", distance=most_m)
-        low = float(self._geometry.boxes[i, 0, 2])
-        return bool((np.abs(heights[hits] - low) <= _RISE_M).any())
-
-    def _tree(self, pattern: str) -> tuple[shapely.STRtree, np.ndarray]:
-        if pattern not in self._trees:
-            tree, corners = _ground_triangles(self._geometry.scene, pattern)
-            self._trees[pattern] = tree, corners[:, :, 2].mean(axis=1)
-        return self._trees[pattern]
 
 
 class Surface:
@@ -52,7 +29,7 @@ class Surface:
 
     @cached_property
     def _triangles(self) -> tuple[shapely.STRtree, Floats]:
-        return _ground_triangles(self._scene, "*")
+        return ground_triangles(self._scene, "*")
 
     def hidden(self, instance: Instance, faces: NDArray[np.int64]) -> float:
         """Share, 0 to 1, of the area of `faces` (indices into the instance's faces) that lies below the surface."""
@@ -81,7 +58,7 @@ class Surface:
         return all(self.hidden(instance, faces) <= _MAX_HIDDEN for faces in pieces)
 
 
-def _ground_triangles(scene: Scene, pattern: str) -> tuple[shapely.STRtree, Floats]:
+def ground_triangles(scene: Scene, pattern: str) -> tuple[shapely.STRtree, Floats]:
     """Ground triangles of materials that match, from above as a tree, and their corners, (n, 3, 3)."""
     found = [
         part.vertices[part.faces]

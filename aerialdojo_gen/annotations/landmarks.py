@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,27 +28,27 @@ def choose_landmarks(
         raise AnnotationError(f"{scene.name}: no node {missing[0]!r} to make a landmark of")
     chosen = [scene[node] for node in dict.fromkeys(requested)][:n]
     own: dict[str, str] = {}
-    nouns = {i.node: noun for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)}
+    names = _UniqueNames(vocabulary)
+    inside = [i for i in scene.instances if reaches_into(scene, i)]
     if scene.imported:
-        names = _UniqueNames(vocabulary)
         nameless = [i.node for i in chosen if not names.of(i)]
         if nameless:
             raise AnnotationError(
                 f"{scene.name}: the landmark {nameless[0]!r} is indistinguishable from others of its "
                 "category: choose another node"
             )
-        prominent = [i for i in _prominent(vocabulary) if i not in chosen]
+        prominent = [i for i in _prominent(inside) if i not in chosen]
         rest = [i for i in prominent[: 8 * n] if names.of(i)]
         if len(chosen) + len(rest) < n:
             # Few names: the extreme one in each direction has a unique name, however low it is.
             rest = [i for i in prominent if names.of(i)][:n]
     else:
-        rest = [i for i in _inside(scene) if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
+        rest = [i for i in inside if vocabulary.kinds.get(i.category) == "landmark" and i not in chosen]
         if len(chosen) + len(rest) < n and at_most:
-            # Mapped towns often have no landmark of the catalogue: use the tallest buildings.
-            named = _UniqueNames(vocabulary)
-            large = [i for i in _prominent(vocabulary) if _is_large(i)][: 8 * n]
-            own = {i.node: named.of(i) for i in large if i not in (*chosen, *rest) and named.of(i)}
+            # Mapped towns often have no landmark of the catalogue: use the tallest buildings, that is what is large
+            # itself, not only high up on a roof.
+            large = [i for i in _prominent(inside) if np.ptp(i.bounds, axis=0).min() >= _LARGE_M][: 8 * n]
+            own = {i.node: names.of(i) for i in large if i not in (*chosen, *rest) and names.of(i)}
             rest += [i for i in large if i.node in own]
     while len(chosen) < n and rest:
         best = max(rest, key=lambda i: (spread_m(i, chosen), float(i.bounds[1, 2])))
@@ -56,12 +56,16 @@ def choose_landmarks(
         rest.remove(best)
         if at_most and not scene.imported:
             # A landmark's name must be unique: keep only one of identical statues.
-            rest = [i for i in rest if nouns[i.node].short != nouns[best.node].short]
+            rest = [i for i in rest if names.nouns[i.node].short != names.nouns[best.node].short]
     if len(chosen) < n and not (at_most and chosen):
         raise AnnotationError(
             f"{scene.name}: {n} landmark{'s' if n > 1 else ''} requested, the scene has {len(chosen)}"
         )
-    landmark_names = [names.of(i) for i in chosen] if scene.imported else _catalogue_names(vocabulary, chosen, own)
+    plain = [names.nouns[i.node].name for i in chosen]
+    landmark_names = [
+        names.of(i) if scene.imported else own.get(i.node) or (names.nouns[i.node].short if plain.count(p) > 1 else p)
+        for i, p in zip(chosen, plain, strict=True)
+    ]
     if len(set(landmark_names)) < len(landmark_names):
         raise AnnotationError(f"{scene.name}: landmarks share a name: {', '.join(sorted(landmark_names))}")
     return tuple(
@@ -83,48 +87,31 @@ def reaches_into(scene: Scene, instance: Instance) -> bool:
     return x0 <= x <= x1 and y0 <= y <= y1 and bottom <= z1 and top >= z0
 
 
-def _inside(scene: Scene) -> list[Instance]:
-    return [i for i in scene.instances if reaches_into(scene, i)]
-
-
-def _prominent(vocabulary: Vocabulary) -> list[Instance]:
-    """The things of an imported mesh, highest first, those without a name last."""
-    things = [i for i in _inside(vocabulary.scene) if i.category not in NON_OBJECTS]
+def _prominent(instances: Sequence[Instance]) -> list[Instance]:
+    """Those of some instances that are things, highest first, those without a name last."""
+    things = [i for i in instances if i.category not in NON_OBJECTS]
     return sorted(things, key=lambda i: (i.category == UNKNOWN, -float(i.bounds[1, 2]), i.node))
-
-
-def _is_large(instance: Instance) -> bool:
-    """Whether an instance itself is large, not only high up on a roof."""
-    return float(np.ptp(instance.bounds, axis=0).min()) >= _LARGE_M
-
-
-def _catalogue_names(vocabulary: Vocabulary, chosen: Sequence[Instance], own: Mapping[str, str]) -> list[str]:
-    """Name landmarks as the catalogue does, or by `own` where it has no name."""
-    noun = {i.node: noun for i, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True)}
-    plain = [noun[i.node].name for i in chosen]
-    return [own.get(i.node) or (noun[i.node].short if plain.count(p) > 1 else p)
-            for i, p in zip(chosen, plain, strict=True)]  # fmt: skip
 
 
 class _UniqueNames:
     """Unique names for the things of an imported mesh."""
 
     def __init__(self, vocabulary: Vocabulary) -> None:
-        self._nouns = dict(zip((i.node for i in vocabulary.scene.instances), vocabulary.nouns, strict=True))
+        self.nouns = dict(zip((i.node for i in vocabulary.scene.instances), vocabulary.nouns, strict=True))
         self._alike: dict[str, list[Instance]] = {}
         for instance, noun in zip(vocabulary.scene.instances, vocabulary.nouns, strict=True):
             self._alike.setdefault(noun.name, []).append(instance)
 
     def of(self, instance: Instance) -> str:
         """Return a unique name; empty if there is none."""
-        noun = self._nouns[instance.node]
+        noun = self.nouns[instance.node]
         others = [other for other in self._alike[noun.name] if other is not instance]
         # An office building is also a building.
         kinds = (name for name in self._alike if name.endswith(f" {noun.name}"))
         others += [other for name in kinds for other in self._alike[name]]
         if not others:
             return noun.name
-        if not any(set(noun.adjectives) <= set(self._nouns[other.node].adjectives) for other in others):
+        if not any(set(noun.adjectives) <= set(self.nouns[other.node].adjectives) for other in others):
             return noun.short
         rises = [float(np.ptp(other.bounds[:, 2])) for other in others]
         if float(np.ptp(instance.bounds[:, 2])) > _TALLER * max(rises):

@@ -12,9 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
-from aerialdojo_gen.annotations.appearance import DEGREES, SHADES
+from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.claims import Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.phrases import phrases_of_value, plural, spoken
+from aerialdojo_gen.annotations.words import LISTS, TABLES
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.scenes.model import Instance
 
@@ -23,35 +24,10 @@ _TOKEN = re.compile(r"[a-z0-9']+|[,.;:!?()]")
 _CORNER = re.compile(r"\b(north|south)[- ](east|west)")
 _MARK = "look'"
 _STOPS = frozenset(".;:!?")
-_VERBS = frozenset(re.findall(
-    r"\w+",
-    "is are stands grows lies sits hangs rises leans floats flies waits has have which that it its you",
-))  # fmt: skip
-# Words that say nothing by themselves.
-_EMPTY = frozenset(re.findall(
-    r"\w+",
-    "a an the and or of to with there here where this these one another other who find look for search go see will "
-    "target be can tell know notice reading stand standing parked lying growing hanging sitting in on at by from "
-    "also as your",
-))  # fmt: skip
 
 
 def _relations() -> dict[tuple[str, ...], str]:
-    phrases = {
-        "beside": "beside, right beside, next to, right next to, alongside, by, right by, adjacent to, flanked by, "
-        "close beside, at the foot of",
-        "against": "leaning against, right against, up against",
-        "near": "near, nearby, close to, not far from, a few steps from, a short way from, a short walk from, "
-        "surrounded by, facing, around",
-        "at": "at",
-        "front": "in front of, before",
-        "behind": "behind, at the back of",
-        "on": "on, on top of, atop, upon, on the top of",
-        "under": "under, beneath, underneath, below, sheltered by, in the shade of, under the cover of",
-        "above": "above, over, high above",
-        "between": "between, in between",
-    }
-    table = {phrase: key for key, many in phrases.items() for phrase in many.split(", ")}
+    table = {phrase: key for key, many in TABLES["relations"].items() for phrase in many.split(", ")}
     forms = ("{} of", "to the {} of", "just {} of", "on the {} side of", "at the {} side of", "on the {}ern side of")
     table |= {form.format(d): f"{d} of" for d in DIRECTIONS for form in forms}
     return {_tokens(phrase): key for phrase, key in table.items()}
@@ -120,10 +96,11 @@ class Matcher:
 
     def faults(self, i: int, text: str) -> list[str]:
         """What a text says of an instance that is false, in words."""
-        node, matched = self._instances[i].node, self.read(text, i)
+        node, matched, places = self._instances[i].node, self.read(text, i), self._claims.places
         wrong = [f"it is called {matched.called!r}, and the mesh says {self._name(i)!r}"] if matched.called else []
         return wrong + [
-            f"{words!r} is not so of {node}{self._why(claim, i)}"
+            f"{words!r} is not so of {node}"
+            + (f": {places.fault(i, claim.key)}" if claim.kind == "place" and places is not None else "")
             for claim, words in matched.claims.items()
             if not self._claims.holds(claim, i)
         ]
@@ -131,10 +108,6 @@ class Matcher:
     def true_claims(self, i: int, text: str) -> list[Claim]:
         """The claims of a text that hold of its instance."""
         return [claim for claim in self.read(text, i).claims if self._claims.holds(claim, i)]
-
-    def _why(self, claim: Claim, i: int) -> str:
-        places = self._claims.places
-        return f": {places.fault(i, claim.key)}" if claim.kind == "place" and places is not None else ""
 
     def _name(self, i: int) -> str:
         category = self._instances[i].category
@@ -219,7 +192,7 @@ class _Reading:
     def take(self, words: tuple[str, ...], kind: str, meaning: str) -> None:
         """Take one phrase: its words, its kind and its meaning."""
         first = words[0]
-        if first in _STOPS or (first in ",()" and not self._things) or (not kind and first in _VERBS):
+        if first in _STOPS or (first in ",()" and not self._things) or (not kind and first in LISTS["verbs"]):
             self.end_clause()
         elif kind == "relation":
             self.end_clause()
@@ -231,7 +204,7 @@ class _Reading:
             self._values.append(meaning)
         elif kind == "thing":
             self._thing(meaning, [*words])
-        elif not kind and first.isalpha() and first not in _EMPTY | DEGREES:
+        elif not kind and first.isalpha() and first not in LISTS["empty"] | LISTS["degrees"]:
             self.matched.unchecked.append(first)
         if self._relation:
             self._words += words

@@ -8,22 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.annotations.words import LISTS, TABLES
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.model import Instance
 
-# Singular words that end like plurals.
-_SINGULAR = frozenset({"lens", "series", "species", "chaos", "cosmos", "news", "premises", "headquarters", "gallows"})
 _SINGULAR_ENDS = ("ss", "us", "is", "as")
-_PLURAL = frozenset({"people", "men", "women", "children", "cattle", "geese", "oxen", "sheep"})
-_STUFF = {
-    "a patch of": ("grass", "vegetation", "foliage", "ivy", "moss", "gravel", "sand", "snow", "soil", "mud"),
-    "a heap of": ("debris", "rubble", "trash", "garbage", "rubbish", "junk", "firewood", "lumber", "scrap"),
-    "a stretch of": ("water", "asphalt", "pavement", "paving", "terrain", "ground", "land", "ice"),
-    "a set of": ("furniture", "equipment", "machinery", "scaffolding", "stairs", "steps"),
-}  # fmt: skip
-_GROUPS = {word: group for group, words in _STUFF.items() for word in words}
+_GROUPS = {word: group for group, words in TABLES["groups"].items() for word in words.split()}
 
 
 def group_of(name: str) -> str:
@@ -31,8 +23,10 @@ def group_of(name: str) -> str:
     word = name.lower().split()[-1] if name.split() else ""
     if word in _GROUPS:
         return _GROUPS[word]
-    many = word.endswith("s") and len(word) > 3 and not word.endswith(_SINGULAR_ENDS) and word not in _SINGULAR
-    return "a group of" if many or word in _PLURAL else ""
+    many = (
+        word.endswith("s") and len(word) > 3 and not word.endswith(_SINGULAR_ENDS) and word not in LISTS["singular"]
+    )
+    return "a group of" if many or word in LISTS["plural"] else ""
 
 
 # Attributes before the noun, in English order: a small rotten brown wooden bench.
@@ -40,10 +34,6 @@ _ADJECTIVES = ("size", "state", "pattern", "shape", "colour", "material")
 _PLACE = "place"
 # Naming attributes of imported nodes (see `aerialdojo_gen.imports.naming`), not adjectives.
 _NAMING = frozenset({"called", "group"})
-_AFTER_NOUN = frozenset({"down", "up", "open", "closed", "raised", "lowered", "covered", "folded", "lit", "shut"})
-_OPENERS = frozenset({"showing", "carrying", "leaning", "facing", "selling", "holding", "wearing", "half-buried"})
-_MASS = frozenset(["lichen", "moss", "snow", "ivy", "graffiti", "water", "fruit", "rust", "foliage"])
-_PREPOSITIONS = frozenset(["in", "on", "of", "around", "over", "under", "along", "at", "near"])
 _VERBS = {"vehicle": ("is parked", "parked"), "vegetation": ("grows", "growing")}
 
 
@@ -161,15 +151,10 @@ def phrases_of_value(key: str, value: str, category: str) -> tuple[str, ...]:
     for patterns in (table.get(category, {}), table):
         found = patterns.get(f"{key}={value}") or patterns.get(f"{key}=*")
         if found:
-            forms = {"{a}": _with_article(value), "{up}": value.upper(), "{}": value}
-            return tuple(_filled(pattern, forms) for pattern in ([found] if isinstance(found, str) else found))
+            patterns = [found] if isinstance(found, str) else found
+            filled = (one.replace("{a}", _with_article(value)).replace("{up}", value.upper()) for one in patterns)
+            return tuple(one.replace("{}", value) for one in filled)
     return (_phrase_by_rule(key, value),)
-
-
-def _filled(pattern: str, forms: dict[str, str]) -> str:
-    for slot, form in forms.items():
-        pattern = pattern.replace(slot, form)
-    return pattern
 
 
 def _phrase_by_rule(key: str, value: str) -> str:
@@ -177,9 +162,9 @@ def _phrase_by_rule(key: str, value: str) -> str:
     words = value.split()
     if key in ("size", "material", "shape") or (key == "colour" and words[-1] in colours):
         return "+" + value
-    if words[0] in _OPENERS or words[0] in ("in", "on", "under", "without", "with", "of", "full"):
+    if words[0] in LISTS["openers"] or words[0] in ("in", "on", "under", "without", "with", "of", "full"):
         return value
-    if key == "state" and len(words) > 1 and words[-1] in _AFTER_NOUN:
+    if key == "state" and len(words) > 1 and words[-1] in LISTS["after_noun"]:
         return f"with its {value}"
     if key in ("state", "pattern") and (len(words) == 1 or words[0].endswith("ly")) and not _noun(words[-1]):
         return "+" + value
@@ -187,11 +172,11 @@ def _phrase_by_rule(key: str, value: str) -> str:
 
 
 def _noun(word: str) -> bool:
-    return (word.endswith("s") and not word.endswith("ss")) or word in _MASS
+    return (word.endswith("s") and not word.endswith("ss")) or word in LISTS["mass"]
 
 
 def _plural(words: list[str]) -> bool:
-    head = next((before for before, word in pairwise(words) if word in _PREPOSITIONS), words[-1])
+    head = next((before for before, word in pairwise(words) if word in LISTS["prepositions"]), words[-1])
     return _noun(head) or words[0] in ("a", "an", "the", "its", "one", "two", "three", "four")
 
 

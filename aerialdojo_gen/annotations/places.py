@@ -23,7 +23,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from aerialdojo_gen.annotations.ground import GROUND, GroundMaterials
+from aerialdojo_gen.annotations.ground import GROUND, ground_triangles
 from aerialdojo_gen.annotations.relations import AT_M, BESIDE_M, NEAR_M, TOUCHING_M, SceneGeometry
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
@@ -112,7 +112,7 @@ _FORMS: Mapping[str, Callable[[Any], bool]] = {
 
 
 _REACH_M: Mapping[str, float] = {"touching": TOUCHING_M, "beside": BESIDE_M, "at": AT_M, "near": NEAR_M}
-_STEP_M = 0.4
+_STEP_M, _RISE_M = 0.4, 3.0
 _SLAB_SHARE = 0.06  # of the outline: smaller level surfaces are sills or stairs
 _STOREY_M = 1.6
 _CORNERS: Mapping[str, tuple[int, int]] = {
@@ -128,7 +128,7 @@ class Places:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
         self._said = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in phrases.items()}
-        self._ground_materials = GroundMaterials(geometry)
+        self._ground: dict[str, tuple[shapely.STRtree, NDArray[np.float64]]] = {}
         self._sets: dict[str, frozenset[int]] = {}
         self._slabs: dict[int, NDArray[np.float64]] = {}
         self._found: dict[tuple[int, str, float], str] = {}
@@ -280,7 +280,12 @@ class Places:
 
     def _by(self, i: int, pattern: str, slack: float) -> bool:
         """Ground of the material is within `BESIDE_M`."""
-        return self._ground_materials.within(i, pattern, BESIDE_M * slack)
+        if pattern not in self._ground:
+            self._ground[pattern] = ground_triangles(self._geometry.scene, pattern)
+        tree, corners = self._ground[pattern]
+        hits = tree.query(self._geometry.outline(i), predicate="dwithin", distance=BESIDE_M * slack)
+        low = float(self._geometry.boxes[i, 0, 2])
+        return bool((np.abs(corners[hits, :, 2].mean(axis=1) - low) <= _RISE_M).any())
 
     @staticmethod
     def _named(material: str, pattern: str) -> bool:

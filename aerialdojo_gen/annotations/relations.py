@@ -57,9 +57,8 @@ class SceneGeometry:
         self._close: dict[tuple[int, float], list[int]] = {}
         self._columns: dict[tuple[float, float], list[tuple[int, Floats]]] = {}
         self._supports: dict[int, int | None] = {}
-        self._corners: dict[int, Floats] = {}
+        self._solid: dict[int, tuple[Floats, NDArray[np.intp]]] = {}
         self._covers: dict[int, frozenset[int]] = {}
-        self._level_faces: dict[int, NDArray[np.intp]] = {}
 
     @classmethod
     def of(cls, scene: Scene) -> SceneGeometry:
@@ -187,20 +186,16 @@ class SceneGeometry:
 
     def _crossed(self, j: int, x: float, y: float) -> tuple[Floats, NDArray[np.intp]]:
         """Heights of an instance's triangles at a point, and their face indices."""
-        triangles = self._triangles(j)
-        z, which = _heights_at(triangles, x, y)
-        return z, self._level_faces[j][which]
-
-    def _triangles(self, j: int) -> Floats:
-        """Corners of the non-vertical triangles and twice their signed areas from above, (n, 10)."""
-        if j not in self._corners:
+        if j not in self._solid:
             instance = self.scene.instances[j]
             a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
             det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
             flat = np.abs(det) > 1e-12
-            self._corners[j] = np.column_stack([a[flat], b[flat], c[flat], det[flat]])
-            self._level_faces[j] = np.flatnonzero(flat)
-        return self._corners[j]
+            # Corners of the triangles that are not vertical, and twice their signed areas from above, (n, 10).
+            self._solid[j] = np.column_stack([a[flat], b[flat], c[flat], det[flat]]), np.flatnonzero(flat)
+        triangles, faces = self._solid[j]
+        z, which = _heights_at(triangles, x, y)
+        return z, faces[which]
 
     def bearing_rad(self, i: int, j: int) -> float | None:
         """Direction from the nearest point of `j`'s outline to the centre of `i`; None inside the outline."""
@@ -224,17 +219,9 @@ class SceneGeometry:
         within = self.level_gap_m(i, j) == 0.0 and float(np.ptp(self.boxes[j, :, :2], axis=0).max()) > _LARGE_M
         return not stacked and not within
 
-    def near(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` is a few steps from `j`, at about the same level."""
-        return self._level(i, j, slack) and self._within(i, j, NEAR_M * slack)
-
-    def against(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` touches `j`, or nearly."""
-        return self._level(i, j, slack) and self._within(i, j, AGAINST_M * slack)
-
-    def at(self, i: int, j: int, slack: float = 1.0) -> bool:
-        """`i` belongs to where `j` stands."""
-        return self._level(i, j, slack) and self._within(i, j, AT_M * slack)
+    def near(self, i: int, j: int, slack: float = 1.0, most_m: float = NEAR_M) -> bool:
+        """`i` is a few steps from `j`, or at most that far, at about the same level."""
+        return self._level(i, j, slack) and self._within(i, j, most_m * slack)
 
     def front(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` is in front of `j`; for things without a front, close to it."""
@@ -245,7 +232,7 @@ class SceneGeometry:
         return self._before(i, j, slack, math.pi)
 
     def _before(self, i: int, j: int, slack: float, turn_rad: float) -> bool:
-        if not self.at(i, j, slack):
+        if not self.near(i, j, slack, AT_M):
             return False
         anatomy = self.scene.instances[j].anatomy
         fronts = anatomy.fronts_rad if anatomy is not None else ()

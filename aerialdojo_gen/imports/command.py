@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from aerialdojo_gen.annotations.format import parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, AssetError, UsageError, brief, check_regular
+from aerialdojo_gen.imports.cutting import Region
 from aerialdojo_gen.imports.files import read_mesh
-from aerialdojo_gen.imports.import_mesh import MeshOptions, Repairs, SourceMesh, check_axes, import_mesh
+from aerialdojo_gen.imports.import_mesh import (
+    LARGEST_M,
+    SMALLEST_M,
+    MeshOptions,
+    Repairs,
+    SourceMesh,
+    check_axes,
+    import_mesh,
+    make_scene,
+)
 from aerialdojo_gen.imports.listing import describe_mesh
 from aerialdojo_gen.imports.naming import Naming
-from aerialdojo_gen.imports.tiles import make_tiles, tile_name
 from aerialdojo_gen.pipeline.registry import STAGES
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -58,23 +70,72 @@ def add_tiles(
     on_added: Callable[[AddedScene], None] = lambda added: None,
 ) -> list[AddedScene]:  # fmt: skip
     """Make scenes of a large mesh, one per square of `edge_m` metres, in one frame; all or none are written."""
-    check_scene_name(tile_name(name, 99, 99))
+    check_scene_name(_tile_name(name, 99, 99))
     with _prefix_errors(mesh):
         source = SourceMesh.of(read_mesh(mesh, texture_px=options.texture_px), options)
         if options.region is not None:
             source = source.within(options.region)
         # Build all tiles before writing any, so that a failure leaves nothing behind.
-        tiles = list(make_tiles(name, source, edge_m, options))
+        tiles = list(_make_tiles(name, source, edge_m, options))
         if not tiles:
             raise AssetError(f"--tiles {edge_m:g}: every tile of the mesh is nearly empty")
-    check_free([tile.name for tile in tiles], project, force)
+    check_free([scene.name for _, scene, _ in tiles], project, force)
     source_digest, out = _file_digest(mesh), []
-    for tile in tiles:
-        (x0, y0), (x1, y1) = tile.region.low.tolist(), tile.region.high.tolist()
-        recipe = _recipe(source_digest, tile.scene, tile.repairs, options, (x0, y0, x1, y1))
-        out.append(_write_scene(tile.scene, tile.repairs, project, recipe, None))
+    for region, scene, repairs in tiles:
+        recipe = _recipe(source_digest, scene, repairs, options, (*region.low.tolist(), *region.high.tolist()))
+        out.append(_write_scene(scene, repairs, project, recipe, None))
         on_added(out[-1])
     return out
+
+
+_MAX_TILES = 400
+# Tiles at the edge with less than this share of their plan are skipped.
+_MIN_SHARE = 0.02
+
+
+def _make_tiles(
+    name: str, source: SourceMesh, edge_m: float, options: MeshOptions
+) -> Iterator[tuple[Region, Scene, Repairs]]:
+    """Cut a mesh into squares of `edge_m` metres, in one frame; yields those with content, from south-west on."""
+    if not (math.isfinite(edge_m) and SMALLEST_M <= edge_m <= LARGEST_M):
+        raise UsageError(f"--tiles {edge_m:g}: the edge of a tile is {SMALLEST_M:g} to {LARGEST_M:g} m")
+    low, high = source.low, source.high
+    columns, rows = (max(1, math.ceil(v / edge_m - 1e-9)) for v in (high - low)[:2])
+    if columns * rows > _MAX_TILES:
+        raise AssetError(
+            f"--tiles {edge_m:g}: {columns * rows:,} tiles, the maximum is {_MAX_TILES}: use larger tiles"
+        )
+    origin = np.array([*(low[:2] + high[:2]) / 2, low[2]])
+    boxes = np.array([[b.vertices[:, :2].min(axis=0), b.vertices[:, :2].max(axis=0)] for b in source.bodies])
+    for row in range(rows):
+        for column in range(columns):
+            corner = low[:2] + edge_m * np.array([column, row])
+            region = Region.box(*corner, *(corner + edge_m))
+            near = np.asarray((boxes[:, 0] < region.high).all(axis=1) & (boxes[:, 1] > region.low).all(axis=1))
+            part = SourceMesh(
+                [b for b, n in zip(source.bodies, near, strict=True) if n], source.domes, source.repairs
+            )
+            if not near.any() or not _has_content(part, region, edge_m):
+                continue
+            yield region, *make_scene(_tile_name(name, column, row), part, options, region, origin)
+
+
+def _tile_name(name: str, column: int, row: int) -> str:
+    """Name a tile by its column from the west and its row from the south; a partition suffix stays last."""
+    for suffix in ("_0", "_1"):
+        if name.endswith(suffix):
+            return f"{name[: -len(suffix)]}-x{column}y{row}{suffix}"
+    return f"{name}-x{column}y{row}"
+
+
+def _has_content(source: SourceMesh, region: Region, edge_m: float) -> bool:
+    """Whether the content of a square is wide enough to fly in."""
+    try:
+        part = source.within(region)
+    except AssetError:
+        return False
+    size = (part.high - part.low)[:2]
+    return bool(size.max() >= SMALLEST_M and np.prod(size) >= _MIN_SHARE * edge_m**2)
 
 
 def list_mesh(

@@ -129,29 +129,25 @@ def _clip_by_plane(pieces: Pieces, body: Ints, closed: NDArray[np.bool_], normal
     turn = (first[:, None] + np.arange(3)) % 3
     at = np.arange(len(rows))[:, None]
     split = _select(pieces, rows)
-    c, w, d = split.corners[at, turn], split.weights[at, turn], away[rows][at, turn]
-    k = len(one)
-    at_border, weights = np.empty((len(rows), 2, 3)), np.empty((len(rows), 2, 3))
+    # Corners and their weights are interpolated alike.
+    c = np.concatenate([split.corners, split.weights], axis=2)[at, turn]
+    d, i, k = away[rows][at, turn], np.arange(len(rows)), len(one)
+    border = np.empty((len(rows), 2, 6))
     for j in (0, 1):
         # Interpolate from the inner corner outwards, so that both triangles of an edge give identical points.
         ends = np.concatenate([np.full(k, j + 1), np.zeros(len(two), np.int64)])
         beyond = np.concatenate([np.zeros(k, np.int64), np.full(len(two), j + 1)])
-        i = np.arange(len(rows))
         share = (d[i, ends] / (d[i, ends] - d[i, beyond]))[:, None]
-        at_border[:, j] = c[i, ends] + share * (c[i, beyond] - c[i, ends])
-        weights[:, j] = w[i, ends] + share * (w[i, beyond] - w[i, ends])
+        border[:, j] = c[i, ends] + share * (c[i, beyond] - c[i, ends])
     source = split.source
-    quads = [
-        Pieces(np.stack([at_border[:k, 0], c[:k, 1], c[:k, 2]], 1), source[:k],
-               np.stack([weights[:k, 0], w[:k, 1], w[:k, 2]], 1)),
-        Pieces(np.stack([at_border[:k, 0], c[:k, 2], at_border[:k, 1]], 1), source[:k],
-               np.stack([weights[:k, 0], w[:k, 2], weights[:k, 1]], 1)),
-        Pieces(np.stack([c[k:, 0], at_border[k:, 0], at_border[k:, 1]], 1), source[k:],
-               np.stack([w[k:, 0], weights[k:, 0], weights[k:, 1]], 1)),
-    ]  # fmt: skip
-    kept = _concatenate([keep, *quads])
+    made = np.concatenate([
+        np.stack([border[:k, 0], c[:k, 1], c[:k, 2]], 1), np.stack([border[:k, 0], c[:k, 2], border[:k, 1]], 1),
+        np.stack([c[k:, 0], border[k:, 0], border[k:, 1]], 1),
+    ])  # fmt: skip
+    clipped = Pieces(made[..., :3], np.concatenate([source[:k], source[:k], source[k:]]), made[..., 3:])
+    kept = _concatenate([keep, clipped])
     kept = _select(kept, np.argsort(kept.source, kind="stable"))
-    return _concatenate([kept, *_caps(at_border, source, body, closed, normal, offset)])
+    return _concatenate([kept, *_caps(border[..., :3], source, body, closed, normal, offset)])
 
 
 def _caps(

@@ -10,7 +10,9 @@ import json
 import re
 import struct
 import warnings
+from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -92,7 +94,7 @@ def _read(path: Path, texture_px: int) -> list[RawNode]:
     import trimesh
 
     # References are resolved within the mesh's folder only.
-    siblings = _resolver(path)
+    siblings: Any = SiblingFiles(path)
     scene = trimesh.load_scene(
         path, file_type=suffix[1:], resolver=siblings, process=False, split_objects=True, group_material=True,
         maintain_order=False,
@@ -134,15 +136,6 @@ def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
     # ones by the file's path.
     other = stem if name not in objects and stem in objects else "" if path.name in name else name
     return named.get(name, other)
-
-
-def _resolver(path: Path) -> Any:
-    import trimesh
-
-    class Resolver(SiblingFiles, trimesh.resolvers.Resolver):
-        """Resolver for trimesh."""
-
-    return Resolver(path)
 
 
 def check_glb(path: Path) -> None:
@@ -189,53 +182,44 @@ def _glb_json(file: BinaryIO) -> bytes:
 
 
 def _pack(nodes: list[RawNode], out: Path) -> None:
-    arrays: dict[str, Any] = {"names": np.array([n.name for n in nodes], dtype=np.str_)}
-    surface_sets = {n.surfaces: None for n in nodes}
-    place = {surface_set: k for k, surface_set in enumerate(surface_sets)}
-    arrays["surface_sets"] = np.array([place[n.surfaces] for n in nodes])
-    descriptions = []
-    for surface_set in surface_sets:
-        descriptions.append([{"name": s.name, "colour": s.colour, "double_sided": s.double_sided, "unlit": s.unlit,
-                      "notes": s.notes} for s in surface_set])  # fmt: skip
-        for k, s in enumerate(surface_set):
-            key = f"{place[surface_set]}-{k}"
-            arrays |= {f"t{key}": s.texture} if s.texture is not None else {}
-            arrays |= {f"m{key}": s.mask} if s.mask is not None else {}
-            arrays |= {f"j{key}": np.frombuffer(s.jpeg, dtype=np.uint8)} if s.jpeg else {}
-    arrays["surfaces"] = np.frombuffer(json.dumps(descriptions).encode(), dtype=np.uint8)
-    for k, node in enumerate(nodes):
-        arrays |= {f"v{k}": node.vertices, f"f{k}": node.faces, f"c{k}": node.colours}
-        arrays |= {f"s{k}": node.surface} if node.surface is not None else {}
-        arrays |= {f"u{k}": node.corners} if node.corners is not None else {}
-    np.savez(out, **arrays)
+    arrays: dict[str, Any] = {}
+
+    def packed(key: str, one: RawNode | RawSurface) -> dict[str, Any]:
+        """Keep the arrays of a node or a surface, and return its other values."""
+        values = {field.name: getattr(one, field.name) for field in fields(one) if field.name != "surfaces"}
+        for name, value in list(values.items()):
+            if isinstance(value, np.ndarray | bytes):
+                arrays[f"{key}.{name}"] = (
+                    np.frombuffer(values.pop(name), np.uint8) if name == "jpeg" else values.pop(name)
+                )
+        return values
+
+    place = {surfaces: n for n, surfaces in enumerate(dict.fromkeys(node.surfaces for node in nodes))}
+    head = {
+        "surfaces": [[packed(f"{n}-{k}", s) for k, s in enumerate(surfaces)] for surfaces, n in place.items()],
+        "nodes": [(place[node.surfaces], packed(str(k), node)) for k, node in enumerate(nodes)],
+    }
+    np.savez(out, head=np.frombuffer(json.dumps(head).encode(), np.uint8), **arrays)
 
 
 def unpack_nodes(path: Path) -> list[RawNode]:
     """Load the nodes that `read_into` wrote."""
+    arrays: defaultdict[str, dict[str, Any]] = defaultdict(dict)
     with np.load(path, allow_pickle=False) as file:
+        for name in file.files:
+            key, _, field = name.partition(".")
+            arrays[key][field] = file[name]
+    head = json.loads(arrays["head"][""].tobytes())
 
-        def optional(key: str) -> Any:
-            return file[key] if key in file.files else None
+    def surface(key: str, told: dict[str, Any]) -> RawSurface:
+        more = {"colour": tuple(told["colour"]), "notes": tuple(told["notes"]), "jpeg": arrays[key]["jpeg"].tobytes()}
+        return RawSurface(**told | arrays[key] | more)
 
-        surface_sets = []
-        for n, surface_set in enumerate(json.loads(file["surfaces"].tobytes())):
-            surfaces = []
-            for k, item in enumerate(surface_set):
-                red, green, blue = item["colour"]
-                jpeg = optional(f"j{n}-{k}")
-                surfaces.append(RawSurface(
-                    item["name"], (red, green, blue), optional(f"t{n}-{k}"), optional(f"m{n}-{k}"),
-                    item["double_sided"], item["unlit"], b"" if jpeg is None else jpeg.tobytes(),
-                    tuple(item["notes"]),
-                ))  # fmt: skip
-            surface_sets.append(tuple(surfaces))
-        return [
-            RawNode(
-                str(name), file[f"v{k}"], file[f"f{k}"], file[f"c{k}"], optional(f"s{k}"), optional(f"u{k}"),
-                surface_sets[int(file["surface_sets"][k])],
-            )
-            for k, name in enumerate(file["names"])
-        ]  # fmt: skip
+    surfaces = [
+        tuple(surface(f"{n}-{k}", told) for k, told in enumerate(several))
+        for n, several in enumerate(head["surfaces"])
+    ]
+    return [RawNode(**told, **arrays[str(k)], surfaces=surfaces[n]) for k, (n, told) in enumerate(head["nodes"])]
 
 
 if __name__ == "__main__":

@@ -13,40 +13,22 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.vocabulary import UNKNOWN
+from aerialdojo_gen.imports.naming import word_list
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.colours import colour_words, shown_colours
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Material, Part
 
-# Categories of things without a name; a person has to say what they are.
-FORMS = frozenset(
-    {
-        UNKNOWN,
-        "ball",
-        "block",
-        "box",
-        "building",
-        "cylinder",
-        "drum",
-        "mound",
-        "pillar",
-        "pole",
-        "post",
-        "tower",
-        "wall",
-    }
-    | {"bush", "hedge", "tree"}
-)
 _NOTABLY, _LARGER = 1.4, 1.5
 
 
 def is_unnamed(node: str, category: str) -> bool:
     """Whether nothing but the form of a thing is known."""
-    return category in FORMS and node.startswith(f"{UNKNOWN}_")
+    return category in word_list("forms") and node.startswith(f"{UNKNOWN}_")
 
 
 def form_of(vertices: NDArray[np.float64]) -> str:
-    """Name the form of a thing: one of `FORMS`."""
+    """Name the form of a thing: one of the list `forms`."""
     low, height = float(vertices[:, 2].min()), float(np.ptp(vertices[:, 2]))
     outline = _outline(vertices)
     try:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.annotations.vocabulary import NON_OBJECTS, UNKNOWN
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.imports.cutting import Region, clip_node, connected_bodies, unique_rows
-from aerialdojo_gen.imports.forms import FORMS, colour_of, form_of, grown, is_unnamed, material_shares, size_words
+from aerialdojo_gen.imports.forms import colour_of, form_of, grown, is_unnamed, material_shares, size_words
 from aerialdojo_gen.imports.material_builder import LIGHTS, MaterialBuilder, is_photographic
-from aerialdojo_gen.imports.naming import Naming
+from aerialdojo_gen.imports.naming import Naming, word_list
 from aerialdojo_gen.imports.pictures import TEXTURE_PX
 from aerialdojo_gen.imports.raw import RawNode, merge_nodes, sort_by_position
 from aerialdojo_gen.imports.split_components import split_components
@@ -351,7 +351,7 @@ def _make_instances(
     out = []
     for (_, parts), name, category, colour, word in zip(bodies, names, categories, colours, words, strict=True):
         # A thing without a name has its form for a category, and no number of its own.
-        stem = category if name.category or category not in FORMS else UNKNOWN
+        stem = category if name.category or category not in word_list("forms") else UNKNOWN
         k = counts[stem] = counts.get(stem, -1) + 1
         attributes = {"size": word, **name.attributes, "colour": colour}
         attributes = {key: value for key, value in attributes.items() if value}

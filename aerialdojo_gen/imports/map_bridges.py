@@ -18,7 +18,6 @@ from scipy.sparse.csgraph import connected_components
 from shapely.geometry import LineString, Point, Polygon
 from shapely.ops import linemerge, substring
 
-from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_tags import Tags, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -73,7 +72,7 @@ class Bridge:
 
 
 def bridges(
-    lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, summary: MapSummary
+    lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon, ground: Ground, summary: Counter[str]
 ) -> tuple[list[Bridge], list[Feature]]:
     """Find the bridges that touch the site, lowest first, and split the lines on them."""
     ways = [f for f in lines if _kind(f.tags) and isinstance(f.shape, LineString) and not below_ground(f.tags)]
@@ -94,9 +93,9 @@ def bridges(
             on[id(way)] = [replace(way, shape=shape, tags={**way.tags, **(number if up else {})})
                            for shape, up in pieces]  # fmt: skip
         out.append(bridge)
-        summary.add("bridges")
+        summary["bridges"] += 1
         if not enough:
-            summary.add("bridges lower than the required clearance: no room for ramps")
+            summary["bridges lower than the required clearance: no room for ramps"] += 1
     return out, [one for f in lines for one in on.get(id(f), [f])]
 
 
@@ -287,14 +286,10 @@ def _axis(core: LineString, runs: Sequence[Sequence[Any]], ramp: Sequence[float]
         run = next((r for r in runs[side] if r and r[0][1][0] == end), None)
         if run is None:
             continue
-        whole = LineString(_join_points(run))
+        whole = LineString([run[0][1][0], *(p for _, way in run for p in way[1:])])
         more = [tuple(p) for p in substring(whole, 0.0, ramp[side]).coords][1:]
         points = points + more if side else more[::-1] + points
     return LineString(points)
-
-
-def _join_points(run: Sequence[tuple[Feature, list[At]]]) -> list[At]:
-    return [run[0][1][0], *(p for _, points in run for p in points[1:])]
 
 
 def _split_ways(run: Sequence[tuple[Feature, list[At]]], ramp_m: float) -> list[Cut]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from statistics import median_low
 from typing import Any
 
@@ -15,7 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.rng import rank
-from aerialdojo_gen.imports.map_tags import Tags, below_ground, colour, count, metres
+from aerialdojo_gen.imports.map_tags import TABLES, Tags, below_ground, by_word, colour, count, metres
 from aerialdojo_gen.imports.osm import Feature
 from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.ground import polygons_of
@@ -34,54 +33,11 @@ _MAX_RISE_M = 5.0
 _PARTED = 0.85
 _SHOP_NEAR_M = 2.5
 
-_CATEGORY = {
-    **dict.fromkeys(("apartments", "residential", "dormitory", "terrace"), "apartment_building"),
-    **dict.fromkeys(("house", "detached", "semidetached_house", "bungalow", "villa", "cabin", "farm"), "house"),
-    **dict.fromkeys(("office", "commercial", "bank"), "office_building"),
-    **dict.fromkeys(("retail", "supermarket", "shop", "mall", "kiosk"), "shop_building"),
-    **dict.fromkeys(("industrial", "warehouse", "factory", "hangar"), "factory_building"),
-    **dict.fromkeys(("church", "cathedral", "chapel"), "church"),
-    **dict.fromkeys(("school", "university", "college", "kindergarten"), "school"),
-    **dict.fromkeys(("public", "civic", "government", "townhall", "courthouse", "library"), "public_building"),
-    **dict.fromkeys(("garage", "garages", "carport"), "garage_building"),
-    **dict.fromkeys(("shed", "hut", "greenhouse", "service", "toilets", "transformer_tower"), "outbuilding"),
-    "hotel": "hotel", "hospital": "hospital", "train_station": "station_building", "museum": "museum",
-    "theatre": "theatre", "mosque": "mosque", "synagogue": "synagogue", "temple": "temple", "roof": "canopy",
-}  # fmt: skip
-_LEVELS = {
-    "apartment_building": 5, "house": 2, "office_building": 5, "shop_building": 2, "factory_building": 2, "church": 4,
-    "school": 3, "public_building": 4, "garage_building": 1, "outbuilding": 1, "hotel": 6, "hospital": 5,
-    "station_building": 3, "canopy": 1,
-}  # fmt: skip
-_PLASTER = (
-    "#d9bd74", "#e3d6b0", "#c98f6a", "#d8c7b4", "#b9c2b0", "#cfa79c", "#c4b49a", "#e6e0d2",
-    "#b08a6a", "#a9b4bb",
-)  # fmt: skip
-_BRICK = ("#8f4a3c", "#a4614a", "#7d5546")
-_OFFICE = ("facade_office:#b8b4ac", "facade_office:#97a1a8", "facade_office:#c9bfae", "curtain_wall:#6f95ad",
-           "curtain_wall:#7f958c", "facade_office:#a08c78")  # fmt: skip
-_METAL = ("sheet_metal:#4f5a55", "sheet_metal:#5f4a44", "sheet_metal:#464b50", "sheet_metal:#6f7d74")
-_TILES = ("roof_tiles:#8a4a38", "roof_tiles:#a05a40", "shingles:#55504c")
-_FLAT = ("concrete:#77787a", "gravel:#8b877f", "concrete:#63656a")
-_ROOFS = {
-    **dict.fromkeys(("gabled", "gambrel", "saltbox", "half-hipped"), "gabled"),
-    **dict.fromkeys(("hipped", "pyramidal", "mansard", "cone", "side_hipped"), "hipped"),
-    **dict.fromkeys(("dome", "onion", "round"), "dome"), "flat": "flat", "skillion": "flat",
-}  # fmt: skip
+_CATEGORY, _ROOFS = by_word(TABLES["buildings"]), by_word(TABLES["roofs"])
+_MATERIALS = {kind: specs.split() for kind, specs in TABLES["materials"].items()}
 
 
-@dataclass
-class MapSummary:
-    """Counts of what was made of the map, for the user."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-
-    def add(self, what: str, n: int = 1) -> None:
-        """Count an item."""
-        self.counts[what] += n
-
-
-def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> list[Polygon]:
+def plans_of(shape: BaseGeometry, tolerance_m: float, summary: Counter[str]) -> list[Polygon]:
     """Simplify an area and round it to centimetres; count what becomes invalid."""
     out = []
     for piece in polygons_of(shape):
@@ -92,7 +48,7 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: MapSummary) -> li
             rounded = [_to_centimetres(p) for p in polygons_of(shapely.set_precision(plan, 0.01))]
         valid = [p for p in rounded if p.is_valid and len(p.exterior.coords) <= _MAX_POINTS]
         if len(valid) < len(rounded):
-            summary.add(_LEFT_OUT, len(rounded) - len(valid))
+            summary[_LEFT_OUT] += len(rounded) - len(valid)
         out += valid
     return out
 
@@ -111,7 +67,7 @@ def _to_centimetres(plan: Polygon) -> Polygon:
 
 
 def buildings(
-    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: MapSummary
+    areas: Sequence[Feature], shops: Sequence[BaseGeometry], site: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's buildings from map areas in metres."""
     outlines = [a for a in areas if a.tags.get("building", "no") != "no" and not below_ground(a.tags)]
@@ -140,7 +96,7 @@ def buildings(
         if not bodies:
             continue
         out.append((area.key, _building(area, bodies, shop_points)))
-    summary.add("buildings", len(out))
+    summary["buildings"] += len(out)
     return [made for _, made in sorted(out, key=lambda item: item[0])]
 
 
@@ -184,7 +140,7 @@ def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry |
 
 
 def _bodies(
-    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, summary: MapSummary, *, part: bool = False
+    shape: BaseGeometry, area: Feature, usual: int, site: Polygon, summary: Counter[str], *, part: bool = False
 ) -> list[dict[str, Any]]:
     out = []
     for plan in plans_of(shape.intersection(site), 0.12, summary):
@@ -198,17 +154,19 @@ def _bodies(
     return out
 
 
-def _heights(area: Feature, plan: Polygon, usual: int, summary: MapSummary | None) -> tuple[float, float, str, float]:
+def _heights(
+    area: Feature, plan: Polygon, usual: int, summary: Counter[str] | None
+) -> tuple[float, float, str, float]:
     """Base, top, roof shape and roof rise, metres above ground."""
     tags, kind = area.tags, category(area.tags)
     height, levels = metres(tags, "height", "building:height"), count(tags, "building:levels")
     if levels is None:
         small = 1 if plan.area < 60.0 else 2 if plan.area < 160.0 else usual
-        levels_used = _LEVELS.get(kind, small)
+        levels_used = TABLES["levels"].get(kind, small)
     else:
         levels_used = levels
     if summary is not None:
-        summary.add("height" if height else "levels" if levels else "rule")
+        summary["height" if height else "levels" if levels else "rule"] += 1
     form = _ROOFS.get(tags.get("roof:shape", ""), "") or _usual_roof(area, kind, levels_used)
     # The roof slope spans half the narrower side.
     half = float(shapely.maximum_inscribed_circle(plan, tolerance=0.1).length)
@@ -235,26 +193,26 @@ def _usual_roof(area: Feature, kind: str, levels: int) -> str:
     if kind in ("house", "church"):
         return "gabled"
     old = kind in ("apartment_building", "building", "public_building", "school", "hotel") and 2 <= levels <= 8
-    return "hipped" if old and _pick(area, "roof", 10) < 6 else "flat"
+    return "hipped" if old and _rank(area, "roof") % 10 < 6 else "flat"
 
 
 def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
     """Material of the walls, and their colour word, empty for glass."""
     tags = area.tags
     given, material = colour(tags, "building:colour", "building:color"), tags.get("building:material", "")
-    paint = given or _PLASTER[_pick(area, "plaster", len(_PLASTER))]
-    brick = given or _BRICK[_pick(area, "brick", len(_BRICK))]
+    paint = given or _pick(area, "plaster")
+    brick = given or _pick(area, "brick")
     if material == "glass" or (
         kind == "office_building" and not given and material in ("", "glass", "steel", "metal")
     ):
-        spec = "curtain_wall" if material == "glass" else _OFFICE[_pick(area, "office", len(_OFFICE))]
+        spec = "curtain_wall" if material == "glass" else _pick(area, "office")
     elif material == "wood":
         spec = f"planks:{given or '#b59468'}"
     elif kind in ("church", "outbuilding", "garage_building", "canopy") or top_m < 2.8:
         spec = f"brick:{brick}" if material == "brick" else f"plaster:{paint}"
     elif kind == "factory_building":
         spec = f"facade_industrial:{given}" if given else "facade_industrial"
-    elif material == "brick" or (not material and not given and _pick(area, "wall", 10) < 2):
+    elif material == "brick" or (not material and not given and _rank(area, "wall") % 10 < 2):
         spec = f"facade_brick:{brick}"
     else:
         spec = f"facade_flats:{paint}"
@@ -268,16 +226,20 @@ def _wall(area: Feature, kind: str, top_m: float) -> tuple[str, str]:
 def _roofing(area: Feature, pitched: bool, kind: str) -> str:
     given, material = colour(area.tags, "roof:colour", "roof:color"), area.tags.get("roof:material", "")
     if not pitched:
-        return f"concrete:{given}" if given else _FLAT[_pick(area, "flat", len(_FLAT))]
+        return f"concrete:{given}" if given else _pick(area, "flat")
     tiled = material in ("roof_tiles", "tile", "tiles") or (not material and kind == "house")
     if given:
         return f"{'roof_tiles' if tiled else 'sheet_metal'}:{given}"
     if material == "copper":
         return "sheet_metal:#6fa08c"
-    choice = _TILES if tiled else _METAL
-    return choice[_pick(area, "roofing", len(choice))]
+    return _pick(area, "tiles" if tiled else "metal", "roofing")
 
 
-def _pick(area: Feature, what: str, n: int) -> int:
-    """Choose by the building's position alone: independent of ids, other buildings and the bounding box."""
-    return rank(0, "add-map", area.key, what) % n
+def _pick(area: Feature, kind: str, what: str = "") -> str:
+    """Choose a material of a kind."""
+    return _MATERIALS[kind][_rank(area, what or kind) % len(_MATERIALS[kind])]
+
+
+def _rank(area: Feature, what: str) -> int:
+    """Draw by the building's position alone: independent of ids, other buildings and the bounding box."""
+    return rank(0, "add-map", area.key, what)

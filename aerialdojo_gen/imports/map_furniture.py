@@ -12,6 +12,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.scenes.grammar_buildings import before_walls, oriented_rectangle
 from aerialdojo_gen.scenes.grammar_frames import Frame
@@ -20,20 +21,8 @@ from aerialdojo_gen.scenes.grammar_streets import parking_row
 from aerialdojo_gen.scenes.kit.roofs import PARAPET_M
 from aerialdojo_gen.scenes.kit.street_network import StreetLayout
 
-_PARKED = {
-    "sedan": 0.33, "hatchback": 0.31, "suv": 0.2, "delivery_van": 0.07, "motorcycle": 0.05, "pickup_truck": 0.04,
-}  # fmt: skip
-_DRIVEN = {
-    "sedan": 0.34, "hatchback": 0.24, "suv": 0.14, "delivery_van": 0.1, "city_bus": 0.08, "box_truck": 0.05,
-    "motorcycle": 0.05,
-}  # fmt: skip
-# Along pavements, in turn.
-_FURNITURE = (
-    "bench", "litter_bin", "bicycle_rack", "planter", "a_board", "newspaper_box", "mailbox", "parking_meter",
-    "recycling_bin", "bicycle", "advertising_column", "fire_hydrant",
-)  # fmt: skip
-_SHOPS = ("a_board", "cafe_table", "planter", "clothes_rack", "menu_board", "bicycle")
-_ON_ROOFS = ("air_conditioner", "vent_stack", "satellite_dish", "skylight", "solar_panels")
+# What stands along pavements, before shops and on roofs, in turn.
+_IN_TURN = {place: things.split() for place, things in TABLES["furniture"].items()}
 # What stands though the map does not say so: shares of what there could be.
 _SHARE_PARKED, _SHARE_DRIVING, _SHARE_FURNITURE = 0.55, 0.35, 0.6
 _FROM_EDGE_M, _MIN_ROOF_M2 = 1.8, 40.0
@@ -172,7 +161,7 @@ class Furniture:
             free = not shapely.intersects(self._streets.layout.busy, Point(pose.x, pose.y).buffer(2.5))
             if not free or rng.random() >= _SHARE_PARKED:
                 continue
-            category = _drawn(_PARKED, rng.random())
+            category = _drawn(TABLES["parked"], rng.random())
             turn = -90.0 if rng.random() < 0.75 or road.get("oneway") else 90.0
             self._try(category, Pose(pose.x, pose.y, pose.yaw_deg + turn + rng.uniform(-2.0, 2.0)))
 
@@ -192,7 +181,7 @@ class Furniture:
                 x, y = at.x - middle * math.sin(yaw), at.y + middle * math.cos(yaw)
                 if not shapely.intersects(self._streets.layout.busy, Point(x, y).buffer(1.0)):
                     facing = math.degrees(yaw) + (180.0 if back else 0.0)
-                    self._try(_drawn(_DRIVEN, rng.random()), Pose(x, y, facing))
+                    self._try(_drawn(TABLES["driven"], rng.random()), Pose(x, y, facing))
 
     def _car_park(self, area: Table, k: int) -> None:
         plan = plan_of(area).intersection(self._site.extent)
@@ -205,7 +194,7 @@ class Furniture:
                     back = 180.0 if rng.random() < 0.25 else 0.0
                     pose = Pose(bay.x, bay.y, bay.yaw_deg + back + rng.uniform(-2.0, 2.0))
                     phrase = f"in the car park {name}" if name else "in the car park"
-                    self._try(_drawn(_PARKED, rng.random()), pose, phrase)
+                    self._try(_drawn(TABLES["parked"], rng.random()), pose, phrase)
 
     def _lamps(self) -> None:
         if sum(thing["category"] == "street_lamp" for thing in self._town["things"]) >= _MIN_LAMPS:
@@ -224,7 +213,7 @@ class Furniture:
                 rng = self._site.rng_for("furniture", k, n)
                 busy = shapely.contains_xy(self._streets.layout.busy, pose.x, pose.y)
                 if rng.random() < _SHARE_FURNITURE * 0.5 and not busy:
-                    turn += self._on_street(_FURNITURE[turn % len(_FURNITURE)], pose)
+                    turn += self._on_street(_next("pavements", turn), pose)
 
     def _on_roofs(self, building: Table, k: int) -> None:
         """Set out what stands on flat roofs, away from their edges."""
@@ -239,7 +228,7 @@ class Furniture:
             for pose in poisson_disc(room, 7.0, rng, limit=4):
                 if rng.random() < _SHARE_FURNITURE:
                     self._placer.place(
-                        _ON_ROOFS[turn % len(_ON_ROOFS)], pose._replace(yaw_deg=90.0 * round(pose.yaw_deg / 90.0)),
+                        _next("roofs", turn), pose._replace(yaw_deg=90.0 * round(pose.yaw_deg / 90.0)),
                         phrase="on the roof", on=round(base + body["top_m"] - PARAPET_M, 3),
                     )  # fmt: skip
                     turn += 1
@@ -251,7 +240,7 @@ class Furniture:
             near = self._streets.nearest(pose.x, pose.y)
             if near is None or near[1] > 16.0 or rng.random() >= _SHARE_FURNITURE * 0.5:
                 continue
-            turn += self._on_street(_SHOPS[(turn + int(rng.integers(len(_SHOPS)))) % len(_SHOPS)], pose)
+            turn += self._on_street(_next("shops", turn + int(rng.integers(len(_IN_TURN["shops"])))), pose)
 
     def _grow(self, area: Table, k: int) -> None:
         whole = plan_of(area)
@@ -263,13 +252,9 @@ class Furniture:
         mapped = sum(t["category"] in _ROOTED and whole.contains(Point(t["at"])) for t in self._town["things"])
         if plan.is_empty or (area["grows"] == "park" and mapped >= _MIN_TREES):
             return
-        spacing, kinds = {
-            "wood": (4.5, ("oak_tree", "birch_tree", "urban_tree", "spruce_tree")),
-            "park": (11.0, ("urban_tree", "oak_tree", "birch_tree")),
-            "scrub": (2.6, ("bush", "bush", "fern")),
-        }[area["grows"]]
+        kinds = TABLES["grows"][area["grows"]]["plants"].split()
         rng = self._site.rng_for("grow", k)
-        for pose in poisson_disc(plan, spacing, rng, limit=200):
+        for pose in poisson_disc(plan, TABLES["grows"][area["grows"]]["spacing_m"], rng, limit=200):
             if self._site.is_free(pose.x, pose.y, 0.5):
                 phrase = f"in {area['name']}" if area.get("name") else ""
                 self._try(kinds[int(rng.integers(len(kinds)))], pose, phrase)
@@ -315,6 +300,10 @@ def _direction(line: LineString, s: float, reach_m: float) -> float:
     """Direction of a line at a place along it, radians."""
     a, b = line.interpolate(max(s - reach_m, 0.0)), line.interpolate(min(s + reach_m, line.length))
     return math.atan2(b.y - a.y, b.x - a.x)
+
+
+def _next(place: str, turn: int) -> str:
+    return _IN_TURN[place][turn % len(_IN_TURN[place])]
 
 
 def _drawn(weights: Mapping[str, float], u: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -10,61 +11,18 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import MapSummary, plans_of, rings_of
-from aerialdojo_gen.imports.map_tags import SURFACES, Tags, below_ground, count, metres
+from aerialdojo_gen.imports.map_buildings import plans_of, rings_of
+from aerialdojo_gen.imports.map_tags import SURFACES, TABLES, Tags, below_ground, by_word, count, metres
 from aerialdojo_gen.imports.osm import Feature
 
 _SPACING_M = 0.06
 _PARKED = ("parallel", "lane", "diagonal", "perpendicular", "street_side", "on_kerb", "half_on_kerb", "yes")
 _LANE_M, _PARKED_M = 3.2, 2.2
 _LEAST_AREA_M2 = 2.0
-# Kind, width without lanes, lanes, pavement: defaults by street class.
-_CLASSES: dict[str, tuple[str, float, int, float]] = {
-    "motorway": ("main", 12.0, 3, 0.0), "trunk": ("main", 10.0, 3, 2.0), "primary": ("main", 10.0, 3, 3.0),
-    "secondary": ("main", 8.0, 2, 2.8), "tertiary": ("main", 7.5, 2, 2.5), "unclassified": ("side", 6.5, 2, 2.2),
-    "residential": ("side", 6.0, 2, 2.2), "living_street": ("side", 5.5, 2, 1.5), "busway": ("side", 6.5, 2, 2.0),
-    "road": ("side", 6.0, 2, 1.5), "service": ("service", 3.6, 1, 0.0), "track": ("service", 3.0, 1, 0.0),
-    "pedestrian": ("path", 5.0, 1, 0.0), "footway": ("path", 2.2, 1, 0.0), "path": ("path", 1.6, 1, 0.0),
-    "cycleway": ("path", 2.4, 1, 0.0), "steps": ("path", 2.4, 1, 0.0), "bridleway": ("path", 2.0, 1, 0.0),
-}  # fmt: skip
-_PATH_SURFACE = {
-    "cycleway": "asphalt:#7d5a50", "footway": "paving:#b1aaa0", "pedestrian": "paving:#b5aca0",
-    "path": "gravel:#b0a38a", "steps": "concrete:#9b9890", "bridleway": "dirt",
-}  # fmt: skip
-# Material and vegetation by key and value.
-_AREAS: dict[str, dict[str, tuple[str, str]]] = {
-    "landuse": {
-        "grass": ("grass", ""), "village_green": ("grass", "park"), "recreation_ground": ("grass", "park"),
-        "meadow": ("meadow", ""), "forest": ("leaf_litter:#6b6a40", "wood"), "cemetery": ("grass:#5b7d45", "park"),
-        "flowerbed": ("soil", "scrub"), "farmland": ("dirt", ""), "orchard": ("grass", "park"),
-        "basin": ("water", ""), "reservoir": ("water", ""), "railway": ("gravel:#7f7b75", ""),
-        "construction": ("dirt", ""),
-        "brownfield": ("gravel", ""), "allotments": ("meadow", ""),
-    },
-    "leisure": {
-        "park": ("grass", "park"), "garden": ("grass:#648f3e", "park"), "playground": ("sand", ""),
-        "pitch": ("asphalt:#8a5a4a", ""), "dog_park": ("grass", ""), "swimming_pool": ("water:#5fb3cc", ""),
-        "golf_course": ("grass:#6fa04a", "park"), "common": ("grass", "park"), "track": ("asphalt:#a2563f", ""),
-    },
-    "natural": {
-        "wood": ("leaf_litter:#6b6a40", "wood"), "water": ("water", ""), "scrub": ("meadow", "scrub"),
-        "sand": ("sand", ""), "beach": ("sand", ""), "grassland": ("meadow", ""),
-        "heath": ("meadow:#95924f", "scrub"),
-        "bare_rock": ("rock", ""),         "shingle": ("gravel", ""), "wetland": ("mud", "scrub"),
-    },
-    "amenity": {"parking": ("asphalt", ""), "school": ("asphalt:#6b6c6e", ""), "kindergarten": ("sand", "")},
-    "place": {"square": ("paving:#b5aca0", "")},
-    "highway": {"pedestrian": ("paving:#b5aca0", ""), "footway": ("paving:#b1aaa0", ""), "service": ("asphalt", ""),
-                "platform": ("paving:#a5a199", "")},
-    "railway": {"platform": ("paving:#a5a199", "")},
-    "public_transport": {"platform": ("paving:#a5a199", "")},
-    "man_made": {"pier": ("planks", "")},
-    "waterway": {"riverbank": ("water", ""), "dock": ("water", "")},
-}  # fmt: skip
-_WATERWAYS = {"river": 8.0, "canal": 8.0, "stream": 1.6, "ditch": 1.0}
+_BARRIERS = by_word({kind: table["tags"] for kind, table in TABLES["barriers"].items()})
 
 
-def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> list[dict[str, Any]]:
+def streets(lines: Sequence[Feature], window: Polygon, summary: Counter[str]) -> list[dict[str, Any]]:
     """Make the plan's streets and paths, clipped to a window somewhat larger than the site."""
     out = []
     for feature in lines:
@@ -72,14 +30,14 @@ def streets(lines: Sequence[Feature], window: Polygon, summary: MapSummary) -> l
         if made is None:
             continue
         if below_ground(feature.tags):
-            summary.add("ways in tunnels or below ground left out")
+            summary["ways in tunnels or below ground left out"] += 1
             continue
         if BRIDGE in feature.tags:
             # No parking on bridges.
             made = {k: v for k, v in made.items() if k != "parking"} | {"bridge": int(feature.tags[BRIDGE])}
         for line in clipped(feature.shape, window):
             out.append({**made, "line": line})
-            summary.add("streets" if made["kind"] != "path" else "paths")
+            summary["streets" if made["kind"] != "path" else "paths"] += 1
     return out
 
 
@@ -102,13 +60,13 @@ def clipped(shape: BaseGeometry, window: Polygon) -> list[list[list[float]]]:
 
 def _street(tags: Tags) -> dict[str, Any] | None:
     kind_of = tags.get("highway", "").removesuffix("_link")
-    if kind_of not in _CLASSES or tags.get("footway") == "crossing" or tags.get("area") == "yes":
+    if kind_of not in TABLES["streets"] or tags.get("footway") == "crossing" or tags.get("area") == "yes":
         return None
-    kind, width, lanes, pavement = _CLASSES[kind_of]
+    kind, width, lanes, pavement = TABLES["streets"][kind_of]
     surface = SURFACES.get(tags.get("surface", ""), "")
     name = {"name": tags["name"][:80]} if tags.get("name") else {}
     if kind == "path":
-        paved = surface or _PATH_SURFACE[kind_of]
+        paved = surface or TABLES["path_surfaces"][kind_of]
         raised = tags.get("footway") == "sidewalk"
         own = metres(tags, "width", "est_width") or width
         return {"kind": kind, **name, "width_m": _wide(own), "surface": paved, **({"raised": True} if raised else {})}
@@ -154,7 +112,7 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 
 
 def areas(
-    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: MapSummary
+    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
@@ -168,7 +126,7 @@ def areas(
         for made in _areas(feature.shape.intersection(window), summary, material, grows, parking, name):
             out.append((material.startswith("water"), -feature.shape.area, feature.key, made))
     for feature in lines:
-        wide = _WATERWAYS.get(feature.tags.get("waterway", ""))
+        wide = TABLES["waterways"].get(feature.tags.get("waterway", ""))
         if wide and not below_ground(feature.tags):
             wide = metres(feature.tags, "width") or wide
             wet = feature.shape.buffer(wide / 2).intersection(window)
@@ -181,16 +139,16 @@ def areas(
 def _ground(tags: Tags) -> tuple[str, str] | None:
     if tags.get("parking") in ("underground", "multi-storey", "rooftop") or tags.get("amenity") == "parking_space":
         return None
-    for key, values in _AREAS.items():
+    for key, values in TABLES["areas"].items():
         if tags.get(key) in values:
-            material, grows = values[tags[key]]
+            material, _, grows = values[tags[key]].partition(" ")
             surface = SURFACES.get(tags.get("surface", ""), "")
             return (surface or material) if not material.startswith("water") else material, grows
     return None
 
 
 def _areas(
-    shape: BaseGeometry, summary: MapSummary, material: str, grows: str = "", parking: bool = False, name: str = ""
+    shape: BaseGeometry, summary: Counter[str], material: str, grows: str = "", parking: bool = False, name: str = ""
 ) -> list[dict[str, Any]]:
     optional = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
     plans = (plan for plan in plans_of(shape, 0.1, summary) if plan.area >= _LEAST_AREA_M2)
@@ -217,14 +175,11 @@ def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:
 
 def barriers(lines: Sequence[Feature], window: Polygon) -> list[dict[str, Any]]:
     """Make walls, fences and hedges."""
-    kinds = {"wall": "wall", "city_wall": "wall", "retaining_wall": "wall", "fence": "fence", "guard_rail": "fence",
-             "handrail": "fence", "hedge": "hedge"}  # fmt: skip
-    usual = {"wall": 1.4, "fence": 1.1, "hedge": 1.1}
     out = []
     for feature in lines:
-        kind = kinds.get(feature.tags.get("barrier", ""))
+        kind = _BARRIERS.get(feature.tags.get("barrier", ""))
         if kind is None or below_ground(feature.tags):
             continue
-        height = min(max(metres(feature.tags, "height") or usual[kind], 0.4), 8.0)
+        height = min(max(metres(feature.tags, "height") or TABLES["barriers"][kind]["height_m"], 0.4), 8.0)
         out += [{"kind": kind, "height_m": round(height, 2), "line": line} for line in clipped(feature.shape, window)]
     return out

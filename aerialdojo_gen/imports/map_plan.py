@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -15,8 +16,8 @@ from shapely.geometry import LineString
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports import map_bridges, map_buildings, map_ground, map_props
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
-from aerialdojo_gen.imports.map_buildings import MapSummary
 from aerialdojo_gen.imports.map_furniture import Furniture, Streets, car_park_rows, plan_of
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M, HeightTable, PlacePlan
@@ -78,7 +79,7 @@ class TownPlan:
 def town_plan(
     found: Map, bbox: Bbox, source: str, options: TownOptions,
     heights: Callable[[LocalFrame, tuple[float, float]], HeightTable] | None,
-) -> tuple[TownPlan, MapSummary]:  # fmt: skip
+) -> tuple[TownPlan, Counter[str]]:  # fmt: skip
     """Make the plan of a town; its origin is the centre of the bounding box (degrees)."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
     if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
@@ -88,7 +89,7 @@ def town_plan(
         )
     frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
     table = None if heights is None else heights(frame, (width, depth))
-    summary = MapSummary()
+    summary: Counter[str] = Counter()
     town, built_share = _town(found, frame, site, table, summary)
     if not any(town[key] for key in ("buildings", "roads", "areas", "things")):
         raise UsageError(
@@ -118,7 +119,7 @@ def town_plan(
 
 
 def _town(
-    found: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: MapSummary
+    found: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: Counter[str]
 ) -> tuple[dict[str, list[Any]], float]:
     """Collect what the map has, in metres, and the share of the site that is built up."""
     window = site.buffer(_BEYOND_M, join_style="mitre")
@@ -148,7 +149,7 @@ def _town(
     for key, value in town.items():
         most = _MAX_BUILDINGS if key == "buildings" else _MAX_ITEMS
         if len(value) > most:
-            summary.add(f"{key} beyond the first {most:,} left out", len(value) - most)
+            summary[f"{key} beyond the first {most:,} left out"] += len(value) - most
             town[key] = value[:most]
     return town, built.area / site.area
 
@@ -188,18 +189,11 @@ def _barriers(barriers: Sequence[Mapping[str, Any]], site: shapely.Polygon) -> l
             if isinstance(leg, LineString) and leg.length > 0.6:
                 points = [[round(x, 2), round(y, 2)] for x, y in leg.simplify(0.1).coords]
                 groups.setdefault((barrier["kind"], barrier["height_m"]), []).append(points)
-    made = {
-        "wall": lambda lines, high: {
-            "make": "walls",
-            "height_m": high,
-            "material": "stone",
-            "category": "garden_wall",
-            "lines": lines,
-        },
-        "fence": lambda lines, high: {"make": "bar_fences", "height_m": high, "lines": lines},
-        "hedge": lambda lines, high: {"make": "fence_panels", "of": "hedge_block", "panel_m": 4, "lines": lines},
-    }
-    return [made[kind](lines, high) for (kind, high), lines in groups.items()]
+    made = []
+    for (kind, high), lines in groups.items():
+        entry = TABLES["barriers"][kind]["entry"]
+        made.append({key: high if key == "height_m" else value for key, value in entry.items()} | {"lines": lines})
+    return made
 
 
 def _street(road: Mapping[str, Any]) -> dict[str, Any]:

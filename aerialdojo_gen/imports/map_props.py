@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,34 +11,9 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.imports.map_buildings import MapSummary
-from aerialdojo_gen.imports.map_tags import Tags, bearing_deg, below_ground, metres
+from aerialdojo_gen.imports.map_tags import TABLES, Tags, bearing_deg, below_ground, metres
 from aerialdojo_gen.imports.osm import Feature
 
-# By key and value; the first match counts.
-_THINGS: dict[str, dict[str, str]] = {
-    "natural": {"tree": "urban_tree", "shrub": "bush", "stone": "boulder"},
-    "highway": {"street_lamp": "street_lamp", "bus_stop": "bus_shelter", "stop": "stop_sign"},
-    "amenity": {
-        "bench": "bench", "waste_basket": "litter_bin", "waste_disposal": "dumpster", "recycling": "recycling_bin",
-        "post_box": "mailbox", "bicycle_parking": "bicycle_rack", "bicycle_rental": "bicycle_rack",
-        "telephone": "phone_booth", "vending_machine": "vending_machine", "atm": "atm_kiosk", "fountain": "fountain",
-        "charging_station": "ev_charger", "motorcycle_parking": "motorcycle", "taxi": "sedan", "bbq": "barbecue",
-        "ice_cream": "ice_cream_cart", "photo_booth": "photo_booth", "marketplace": "market_stall",
-    },
-    "emergency": {"fire_hydrant": "fire_hydrant"},
-    "historic": {"memorial": "statue", "monument": "statue", "statue": "statue"},
-    "tourism": {"artwork": "statue"},
-    "advertising": {"column": "advertising_column", "billboard": "billboard", "poster_box": "a_board",
-                    "totem": "advertising_column"},
-    "leisure": {"picnic_table": "picnic_set"},
-    "playground": {"slide": "playground_slide", "swing": "swing_set", "springy": "spring_rider", "seesaw": "seesaw",
-                   "sandpit": "sandbox", "carousel": "carousel"},
-    "man_made": {"flagpole": "flagpole", "water_tower": "water_tower", "street_cabinet": "vending_machine",
-                 "obelisk": "obelisk", "mast": "radio_mast"},
-    "barrier": {"bollard": "bollard", "block": "planter", "planter": "planter", "lift_gate": "boom_gate"},
-    "shop": {"kiosk": "kiosk"},
-}  # fmt: skip
 _PLATE = ("plaque", "stolperstein", "plate")
 _SMALL_ART = ("mural", "graffiti", "relief", "mosaic", "plaque", "painting")
 _PARKING_METER = ("parking_tickets", "parking")
@@ -47,7 +23,7 @@ _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 
 def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
-           built: BaseGeometry, summary: MapSummary) -> list[dict[str, Any]]:  # fmt: skip
+           built: BaseGeometry, summary: Counter[str]) -> list[dict[str, Any]]:  # fmt: skip
     """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas.
 
     What lies in a building is no street furniture, and is counted as left out; what is drawn within its wall's
@@ -60,7 +36,7 @@ def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[F
             continue
         at = _move_before_wall(feature.shape, built)
         if at is None:
-            summary.add("things inside buildings left out")
+            summary["things inside buildings left out"] += 1
             continue
         out.append(_thing(category, at, feature.tags))
     for feature in lines:
@@ -76,7 +52,7 @@ def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[F
         at = feature.shape.representative_point()
         if category and category != "urban_tree" and site.contains(at) and not built.contains(at):
             out.append(_thing(category, at, feature.tags))
-    summary.add("things of the map", len(out))
+    summary["things of the map"] += len(out)
     return out
 
 
@@ -115,7 +91,7 @@ def _category(tags: Tags) -> str | None:
         conifer = "conifer" in (tags.get("type"), tags.get("wood")) or tags.get("leaf_type") == "needleleaved"
         tall = (metres(tags, "height") or 0.0) > 9.0
         return "spruce_tree" if conifer else "oak_tree" if tall else "urban_tree"
-    for key, values in _THINGS.items():
+    for key, values in TABLES["things"].items():
         if tags.get(key) in values:
             return values[tags[key]]
     return None

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 from matplotlib.colors import CSS4_COLORS
+
+from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.safe_parse import read_toml
 
 Tags = Mapping[str, str]
 
@@ -14,6 +18,16 @@ _COLOUR = re.compile(r"#(?:[0-9a-fA-F]{3}){1,2}")
 _BEARING = re.compile(r"\d{1,3}(?:\.\d{1,6})?")
 _POINTS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 _FOOT_M = 0.3048
+# What tags become.
+TABLES = read_toml(Path(__file__).with_name("map.toml"), AssetError)
+
+
+def by_word(table: Mapping[str, str]) -> dict[str, str]:
+    """Return the keys of a table by each of the words of its values."""
+    return {word: key for key, words in table.items() for word in words.split()}
+
+
+SURFACES = by_word(TABLES["surfaces"])
 
 
 def metres(tags: Tags, *keys: str) -> float | None:
@@ -60,13 +74,3 @@ def below_ground(tags: Tags) -> bool:
     layer = tags.get("layer", "0")
     under = layer.startswith("-") or tags.get("location") in ("underground", "indoor")
     return tunnel or under or tags.get("indoor", "no") != "no" or tags.get("level", "0").startswith("-")
-
-
-SURFACES = {
-    "asphalt": "asphalt", "paved": "asphalt", "concrete": "concrete:#8f8d88", "concrete:plates": "concrete:#8f8d88",
-    "sett": "cobbles:#77746f", "cobblestone": "cobbles:#77746f", "unhewn_cobblestone": "cobbles:#77746f",
-    "paving_stones": "paving:#aaa59c", "gravel": "gravel", "fine_gravel": "gravel:#b0a38a",
-    "compacted": "gravel:#a89c88", "unpaved": "gravel:#a89c88", "pebblestone": "gravel", "dirt": "dirt",
-    "ground": "dirt", "earth": "dirt",
-    "grass": "grass", "sand": "sand", "wood": "planks", "mud": "mud",
-}  # fmt: skip

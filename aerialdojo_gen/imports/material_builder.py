@@ -55,16 +55,10 @@ class MaterialBuilder:
 
     def measure_texture_scales(self, nodes: Sequence[RawNode]) -> None:
         """Measure the metres that each texture's width covers, over all nodes that show it; vertices in metres."""
-        world: dict[str, float] = {}
-        flat: dict[str, float] = {}
-        for node in nodes:
-            kind = _face_kinds(node)
-            for k in np.unique(kind[kind >= 0]):
-                rows, key = kind == k, node.surfaces[k].digest
-                own = areas(node.vertices, node.faces[rows].astype(np.int32))
-                world[key] = world.get(key, 0.0) + float(own.sum())
-                flat[key] = flat.get(key, 0.0) + float(_uv_areas(node, rows).sum())
-        self._scales = {key: float(np.sqrt(world[key] / flat[key])) if flat[key] > 0 else 1.0 for key in world}
+        shown = _shown_areas(nodes)
+        self._scales = {
+            key: float(np.sqrt(world / flat)) if flat > 0 else 1.0 for key, (world, flat) in shown.items()
+        }
 
     def _textured(self, surface: RawSurface, double_sided: bool) -> Material:
         both = double_sided or (surface.mask is not None and surface.double_sided)
@@ -75,7 +69,8 @@ class MaterialBuilder:
         )  # fmt: skip
 
     def _build_parts(self, body: RawNode, rows: NDArray[np.bool_], material: Material) -> list[tuple[Material, Part]]:
-        material = replace(material, name=_material_name(material))
+        sides, light = ", both sides" if material.double_sided else "", ", unlit" if material.unlit else ""
+        material = replace(material, name=material.name.split(",")[0] + sides + light)
         material = self.materials.get(material.name, material)
         corners = None
         if material.texture is not None and body.corners is not None:
@@ -131,6 +126,19 @@ def _painted(body: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float32]:
     return np.where(np.isfinite(own), np.clip(own, 0.0, 255.0), face)
 
 
+def _shown_areas(nodes: Sequence[RawNode]) -> dict[str, tuple[float, float]]:
+    """Areas over all nodes that show a texture, and of it in its coordinates, by the texture's digest."""
+    shown: dict[str, tuple[float, float]] = {}
+    for node in nodes:
+        kind = _face_kinds(node)
+        for k in np.unique(kind[kind >= 0]):
+            rows, key = kind == k, node.surfaces[k].digest
+            own = float(areas(node.vertices, node.faces[rows].astype(np.int32)).sum())
+            world, flat = shown.get(key, (0.0, 0.0))
+            shown[key] = world + own, flat + float(_uv_areas(node, rows).sum())
+    return shown
+
+
 def _uv_areas(node: RawNode, rows: NDArray[np.bool_]) -> NDArray[np.float64]:
     assert node.corners is not None
     uv = node.corners[rows][..., :2].astype(np.float64)
@@ -151,26 +159,15 @@ def _split(
     return vertices[used[flat[first]]], index.reshape(-1, 3).astype(np.int32), carried[first]
 
 
-def _material_name(material: Material) -> str:
-    base = material.name.split(",")[0]
-    return base + (", both sides" if material.double_sided else "") + (", unlit" if material.unlit else "")
-
-
 def is_photographic(nodes: Sequence[RawNode]) -> bool:
     """Guess whether most of a mesh shows photographs with baked lighting rather than patterns."""
     whole = painted = 0.0
-    shown: dict[str, float] = {}
-    flat: dict[str, float] = {}
     colours: list[NDArray[np.uint8]] = []
     for node in nodes:
-        area, kind = areas(node.vertices, node.faces.astype(np.int32)), _face_kinds(node)
+        area, rows = areas(node.vertices, node.faces.astype(np.int32)), _face_kinds(node) == _PAINTED
         whole += float(area.sum())
-        painted += float(area[kind == _PAINTED].sum())
-        colours.append(np.unique(node.colours[kind == _PAINTED], axis=0))
-        for k in np.unique(kind[kind >= 0]):
-            key, rows = node.surfaces[k].digest, kind == k
-            shown[key] = shown.get(key, 0.0) + float(area[rows].sum())
-            flat[key] = flat.get(key, 0.0) + float(_uv_areas(node, rows).sum())
+        painted += float(area[rows].sum())
+        colours.append(np.unique(node.colours[rows], axis=0))
     many = len(np.unique(np.concatenate([*colours, np.zeros((0, 3), np.uint8)]), axis=0)) > _MAX_PAINTED
-    once = sum(area for key, area in shown.items() if flat[key] <= _REPEATED)
+    once = sum(area for area, flat in _shown_areas(nodes).values() if flat <= _REPEATED)
     return once + (painted if many else 0.0) > 0.5 * whole

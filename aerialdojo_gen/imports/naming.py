@@ -96,7 +96,8 @@ def _lists() -> dict[str, Any]:
 
 
 @cache
-def _list(key: str) -> frozenset[str]:
+def word_list(key: str) -> frozenset[str]:
+    """Return a list of words."""
     return frozenset(_lists()[key].split())
 
 
@@ -107,7 +108,7 @@ def words_in(node: str) -> list[str]:
     # Mesh and node often have the same name: "building building".
     words = [word for k, word in enumerate(words) if word not in words[:k]]
     # A cone or a box alone is a primitive of the modeller, a traffic cone and a letter box are none.
-    words = words if set(words) - _list("primitives") else []
+    words = words if set(words) - word_list("primitives") else []
     return words[:_MAX_WORDS]
 
 
@@ -117,9 +118,9 @@ def _word(token: str) -> str:
         token = stem.group(1)  # House03
     word = token.lower()
     plain = _ascii(word)
-    if not word.isalpha() or word in _list("noise") or not 2 <= len(plain) <= _MAX_LETTERS:
+    if not word.isalpha() or word in word_list("noise") or not 2 <= len(plain) <= _MAX_LETTERS:
         return ""
-    if word in _list("short"):
+    if word in word_list("short"):
         return word
     hexadecimal = re.fullmatch(r"[a-f]+", word)
     spoken = len(plain) > 2 and re.search(r"[aeiouy]", plain) and not re.search(r"[^aeiouy]{6}|([a-z])\1\1", plain)
@@ -135,7 +136,12 @@ def _ascii(word: str) -> str:
 def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
     """Tell the noun of a name from its attributes."""
     spelling, materials = _lists()["spelling"], _lists()["materials"]
-    kinds = {"colour": _list("colours"), "size": _list("sizes"), "material": materials, "state": _list("states")}
+    kinds = {
+        "colour": word_list("colours"),
+        "size": word_list("sizes"),
+        "material": materials,
+        "state": word_list("states"),
+    }
     said: dict[str, str] = {}
     rest: list[str] = []
     for k, word in enumerate(words):
@@ -146,9 +152,9 @@ def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
             continue
         if key:
             said[key] = spelt
-        elif word not in ("light", "dark", "pale", "bright") or not _list("colours").issuperset(shade or [""]):
+        elif word not in ("light", "dark", "pale", "bright") or not word_list("colours").issuperset(shade or [""]):
             rest.append(word)
-    noun = [word for word in rest[:-1] if word not in _list("kinds")] + rest[-1:]
+    noun = [word for word in rest[:-1] if word not in word_list("kinds")] + rest[-1:]
     if not noun and materials.get(said.get("material", "")):
         noun = [materials[said.pop("material")]]
     heads = _lists()["heads"]

@@ -62,7 +62,7 @@ def add_map(
     towns = []
     for one, box, found in zip(names, boxes, maps, strict=True):
         town, summary = town_plan(found, box, extract.name, options, heights)
-        towns.append((one, town, tuple(_summary_lines(dict(summary.counts)))))
+        towns.append((one, town, tuple(_summary_lines(dict(summary)))))
     return [_write_place(one, town, project, notes) for one, town, notes in towns]
 
 

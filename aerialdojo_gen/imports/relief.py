@@ -1,22 +1,26 @@
-"""Convert a height model to the plan of a scene."""
+"""Convert a height model to the plan of a scene: its ground, and what grows and lies on it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
+from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
+from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.imports.relief_props import place_things
+from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
 from aerialdojo_gen.scenes.height_table import heights_text
+from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
 
@@ -68,12 +72,6 @@ def choose_cell(size: tuple[float, float], cell_m: float | None, native_m: float
     return max(native_m, least, _FINEST_M * 2)
 
 
-def whole_cells(size: tuple[float, float], cell_m: float) -> tuple[float, float]:
-    """Round an extent down to whole cells, metres."""
-    x, y = (max(int(s / cell_m + 1e-6), 1) * cell_m for s in size)
-    return round(x, 6), round(y, 6)
-
-
 @dataclass(frozen=True, eq=False)
 class HeightTable:
     """Heights about the origin, on a square grid."""
@@ -108,6 +106,56 @@ class PlacePlan:
     heights: HeightTable | None = None
 
 
+_COUNTRY = TABLES["country"]
+_CAMP = _COUNTRY["camp"].split()
+
+
+def _grow_things(placer: Placer, surfaces: Mapping[str, float], water_z_m: float | None) -> None:
+    """Grow and strew what such ground has; `surfaces` are the arguments of the plan's surfaces."""
+    site = placer.site
+    areas = surface_areas(site, **surfaces, water_to_m=water_z_m)
+    bare = shapely.union_all([areas[key] for key in ("sand", "snow", "rock", "wet")])
+    free = {
+        "grass": site.extent.difference(bare), "rock": areas["rock"].difference(areas["wet"]),
+        "sand": areas["sand"].difference(areas["wet"]),
+    }  # fmt: skip
+    placer.begin("Landmarks, and a resting place on level grass")
+    _landmarks(placer, water_z_m)
+    for k, (x, y) in enumerate(_level_places(placer, free["grass"])):
+        placer.place(_CAMP[k % len(_CAMP)], Pose(x, y, 37.0 * k))
+    placer.begin("Trees, bushes and stones")
+    for category, spacing, most, kind in _COUNTRY["growth"]:
+        area = free[kind].intersection(site.extent.buffer(-1.5))
+        for x, y, yaw in poisson_disc(area, spacing, site.rng_for("grow", category, kind), limit=most):
+            placer.place(category, Pose(x, y, yaw), drawn=True)
+
+
+def _landmarks(placer: Placer, water_z_m: float | None) -> None:
+    site = placer.site
+    corners = site.terrain.corners()
+    spots = corners[shapely.contains_xy(site.extent.buffer(-8.0), corners[:, 0], corners[:, 1])]
+    for k, category in enumerate(_COUNTRY["landmarks"].split()):
+        dry = spots if water_z_m is None else spots[spots[:, 2] > water_z_m + 1.0]
+        if not len(dry):
+            return
+        x, y, _ = dry[int(np.argmax(dry[:, 2]))]
+        placer.place(category, Pose(float(x), float(y), 90.0 * k), settle_m=1.0, drawn=True)
+        # The next one stands far from it.
+        spots = spots[np.hypot(spots[:, 0] - x, spots[:, 1] - y) > 0.45 * max(site.head.size_m)]
+
+
+def _level_places(placer: Placer, grass: BaseGeometry) -> list[tuple[float, float]]:
+    site, ground = placer.site, placer.site.terrain
+    inner = grass.intersection(site.extent.buffer(-4.0)).buffer(-1.0)
+    spots = poisson_disc(inner, 14.0, site.rng_for("level"), limit=120)
+
+    def tilt(pose: tuple[float, float, float]) -> float:
+        x, y, _ = pose
+        return float(abs(ground.z(x + 1, y) - ground.z(x - 1, y)) + abs(ground.z(x, y + 1) - ground.z(x, y - 1)))
+
+    return [(x, y) for x, y, _ in sorted(spots, key=tilt)[: 2 * len(_CAMP)]]
+
+
 @dataclass(frozen=True)
 class ReliefPlan:
     """The plan of a relief, but what is placed on the ground that it builds."""
@@ -121,7 +169,7 @@ class ReliefPlan:
         """Place things on the site that the plan has built."""
         placer = Placer(site, _SETTLE_M)
         if not self.bare:
-            place_things(placer, self.surfaces, self.water_z_m)
+            _grow_things(placer, self.surfaces, self.water_z_m)
         return placer
 
 
@@ -158,18 +206,24 @@ def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[ReliefPlan, list[str]
             f"--size 400 400 crops to its centre, --bbox to a part; {describe_coverage(dem)}"
         )
     cell = round(choose_cell(size, options.cell_m, native_cell_m(dem, frame)), 4)
-    size = whole_cells(size, cell)
+    # Whole cells.
+    width, depth = (round(max(int(s / cell + 1e-6), 1) * cell, 6) for s in size)
+    size = width, depth
     table = HeightTable.of(grid(dem, size, cell, frame, middle), cell)
     top = float(table.rows_m.max())
     marks = {"water_m": options.water_m, "snow_from_m": options.snow_m, "sand_to_m": options.sand_m}
     surfaces = {key: round(value - table.datum_m, 2) for key, value in marks.items() if value is not None}
     water = surfaces.pop("water_m", None)
     surfaces["rock_slope"] = _ROCK_SLOPE
+    if frame is None:
+        origin = {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3)}
+    else:
+        origin = {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7)}
     plan = {
         "plan": 1, "seed": options.seed, "size_m": list(size),
         "ceiling_m": float(math.ceil(top + _HEADROOM_M)) if options.ceiling_m is None else options.ceiling_m,
         **({"attribution": options.attribution} if options.attribution else {}),
-        "origin": _origin(frame, middle, table.datum_m),
+        "origin": origin | {"z_m": table.datum_m},
         "ground": {"material": "meadow:#7a9148", "steps": [{"make": "surveyed_heights"}]},
         "site": [
             {"make": "surveyed_surfaces", **surfaces},
@@ -206,12 +260,6 @@ def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[f
     if dem.geographic:
         return LocalFrame(*middle), (0.0, 0.0), size or size_m(dem.extent)
     return None, middle, size or (east - west, north - south)
-
-
-def _origin(frame: LocalFrame | None, middle: tuple[float, float], datum: float) -> dict[str, float]:
-    if frame is None:
-        return {"x_m": round(middle[0], 3), "y_m": round(middle[1], 3), "z_m": datum}
-    return {"lon_deg": round(frame.lon_deg, 7), "lat_deg": round(frame.lat_deg, 7), "z_m": datum}
 
 
 def ground_sampler(dem: Dem, cell_m: float | None = None) -> Callable[[LocalFrame, tuple[float, float]], HeightTable]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import scipy.ndimage
@@ -15,6 +16,7 @@ from aerialdojo_gen.imports.raw import RawNode, extract_faces, merge_nodes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Cells = frozenset[tuple[int, int]]
 
 _TOUCH_M = 0.3
 # Wide nodes in many pieces are soups; a single thing this wide may be several.
@@ -82,8 +84,10 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
                 stats.attached += len(attached)
                 ground_bodies += [ground] if len(ground.faces) else []
                 things += attached
-            elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and (_materials(piece) > 0).any():
-                parts = _by_material(piece)
+            elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and ((kind := _materials(piece)) > 0).any():
+                parts = [
+                    p for k in np.unique(kind) for p in _connected(extract_faces(piece, np.flatnonzero(kind == k)))
+                ]
                 stats.materials += len(parts)
                 things += parts
             else:
@@ -119,11 +123,6 @@ def _materials(body: RawNode) -> Ints:
     surface = np.full(len(body.faces), -1) if body.surface is None else body.surface
     _, kind = np.unique(np.column_stack([body.colours // 16, surface]), axis=0, return_inverse=True)
     return np.asarray(kind.reshape(-1), dtype=np.int64)
-
-
-def _by_material(body: RawNode) -> list[RawNode]:
-    kind = _materials(body)
-    return [piece for k in np.unique(kind) for piece in _connected(extract_faces(body, np.flatnonzero(kind == k)))]
 
 
 def _is_ground_surface(body: RawNode, low: Floats, high: Floats) -> bool:
@@ -211,13 +210,13 @@ def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
     size = np.linalg.norm(high - low, axis=1)
     order = np.argsort(size, kind="stable")
     owner = np.arange(len(pieces))
-    maps: dict[int, frozenset[tuple[int, int]] | None] = {}
+    cells = cache(lambda k: _cells(pieces[k]))
     for rank, k in enumerate(order):
         larger = order[rank + 1 :]
         encloses = (low[larger] <= low[k] + _TOUCH_M).all(axis=1) & (high[larger] >= high[k] - _TOUCH_M).all(axis=1)
         encloses &= size[larger] > 1.5 * size[k]
         for j in larger[encloses]:
-            if _lies_over(pieces, int(j), int(k), maps):
+            if _lies_over(cells(int(j)), cells(int(k))):
                 owner[k] = j
                 break
     flat_low, flat_high = low[:, :2] - _TOUCH_M, high[:, :2] + _TOUCH_M
@@ -228,7 +227,7 @@ def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
         carried = np.flatnonzero(wider & above & (np.arange(len(pieces)) != k)).tolist()
         # Of several, the lowest: the beam of a roof before the roof.
         j = min(carried, key=lambda j: (float(low[j, 2]), j), default=k)
-        if j != k and owner[k] == k and _lies_over(pieces, j, int(k), maps):
+        if j != k and owner[k] == k and _lies_over(cells(j), cells(int(k))):
             owner[k] = j
     for _ in range(len(pieces)):
         if (owner == owner[owner]).all():
@@ -240,30 +239,19 @@ def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
     return [merge_nodes(pieces[k].name, members) for k, members in sorted(groups.items())]
 
 
-def _lies_over(
-    pieces: Sequence[RawNode], larger: int, smaller: int, maps: dict[int, frozenset[tuple[int, int]] | None]
-) -> bool:
+def _lies_over(larger: Cells | None, smaller: Cells | None) -> bool:
     """Whether half of a piece's plan lies over or next to another's: a fence does not contain the house inside."""
-    own, other = (_cells(pieces[k], k, maps) for k in (smaller, larger))
-    if own is None or other is None:
-        return True
-    return 2 * len(own & other) >= len(own)
+    return larger is None or smaller is None or 2 * len(smaller & larger) >= len(smaller)
 
 
-def _cells(
-    body: RawNode, k: int, maps: dict[int, frozenset[tuple[int, int]] | None]
-) -> frozenset[tuple[int, int]] | None:
+def _cells(body: RawNode) -> Cells | None:
     """Grid cells under a body's triangles and around them; None if there are too many."""
-    if k not in maps:
-        corners = body.vertices[body.faces][:, :, :2]
-        first = np.floor((corners.min(axis=1) - _TOUCH_M) / _MAP_M).astype(np.int64)
-        last = np.floor((corners.max(axis=1) + _TOUCH_M) / _MAP_M).astype(np.int64)
-        spans = np.unique(np.column_stack([first, last]), axis=0)
-        n = ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum()
-        cells: frozenset[tuple[int, int]] | None = None
-        if n <= _MAX_MAPPED:
-            cells = frozenset(
-                (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
-            )
-        maps[k] = cells
-    return maps[k]
+    corners = body.vertices[body.faces][:, :, :2]
+    first = np.floor((corners.min(axis=1) - _TOUCH_M) / _MAP_M).astype(np.int64)
+    last = np.floor((corners.max(axis=1) + _TOUCH_M) / _MAP_M).astype(np.int64)
+    spans = np.unique(np.column_stack([first, last]), axis=0)
+    if ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum() > _MAX_MAPPED:
+        return None
+    return frozenset(
+        (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
+    )

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.ground import Ground
-from aerialdojo_gen.imports.naming import words_in
+from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.imports.naming import word_list, words_in
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
@@ -19,12 +21,6 @@ Floats = NDArray[np.float64]
 
 # Category by which a naming table marks a sky dome.
 SKY = "sky"
-_SKY_WORDS = frozenset({"sky", "skybox", "skydome", "skysphere", "hdri", "panorama", "backdrop", "horizon", "env"})
-# Ambiguous words: the shape has to decide.
-_SKY_PERHAPS = frozenset({"dome", "hemisphere", "background", "environment", "backside", "bg"})
-_GROUND_WORDS = frozenset(
-    {"terrain", "ground", "landscape", "relief", "dem", "dtm", "topography", "heightfield", "heightmap", "earth"}
-)
 # Minimum ratio of a dome's size to its content: if named a sky, and if unnamed.
 _WIDER_CALLED, _WIDER = 1.05, 1.5
 _LARGE_M = 100.0
@@ -32,7 +28,6 @@ _LARGE_M = 100.0
 _HOLLOW, _SHELL = 0.4, 0.95
 # Share of columns over the content that a dome must cover.
 _ROOFED = 0.9
-_PROBES = 12
 _GROUND = (122, 132, 108)
 
 
@@ -45,8 +40,8 @@ def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[in
         rest = [j for j in range(len(bodies)) if j != k and j not in found]
         if not rest:
             break
-        words = [word for word in words_in(bodies[k].name) if word not in _SKY_PERHAPS]
-        sky = table_names[k] == SKY or (not table_names[k] and bool(_SKY_WORDS & set(words)))
+        words = [word for word in words_in(bodies[k].name) if word not in word_list("sky_perhaps")]
+        sky = table_names[k] == SKY or (not table_names[k] and bool(word_list("sky") & set(words)))
         if (table_names[k] or words) and not sky:
             break
         inner_low, inner_high = low[rest].min(axis=0), high[rest].max(axis=0)
@@ -72,14 +67,17 @@ def _is_hollow(body: RawNode) -> bool:
 
 def _covers_above(body: RawNode, low: Floats, high: Floats) -> bool:
     """Whether vertical rays from the top of a box hit the body."""
-    from aerialdojo_gen.geometry.rays import TriangleRayCaster
-
-    at = (np.arange(_PROBES) + 0.5) / _PROBES
-    x, y = np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * at), indexing="ij")
-    origins = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, high[2] - 1e-6)])
     caster = TriangleRayCaster(body.vertices, body.faces.astype(np.int32))
-    hit, _ = caster.first_hit(origins, np.tile([0.0, 0.0, 1.0], (len(origins), 1)))
-    return bool(np.isfinite(hit).mean() >= _ROOFED)
+    return _vertical_hits(caster, low, high, high[2] - 1e-6, 1.0, 12) >= _ROOFED
+
+
+def _vertical_hits(caster: TriangleRayCaster, low: Floats, high: Floats, z: float, way: float, n: int) -> float:
+    """Share of n by n rays from a height, upwards or downwards, that hit something."""
+    shares = (np.arange(n) + 0.5) / n
+    x, y = np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * shares), indexing="ij")
+    origins = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z)])
+    hit, _ = caster.first_hit(origins, np.tile([0.0, 0.0, way], (len(origins), 1)))
+    return float(np.isfinite(hit).mean())
 
 
 def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
@@ -93,7 +91,7 @@ def classify_surfaces(scene: Scene, source_names: dict[str, str]) -> Scene:
         if instance.surface != "sheet":
             return instance.surface
         wide = bool((np.ptp(instance.bounds, axis=0)[:2] >= 0.2 * extent).all())
-        named = wide and bool(_GROUND_WORDS & set(words_in(source_names.get(instance.node, ""))))
+        named = wide and bool(word_list("ground") & set(words_in(source_names.get(instance.node, ""))))
         return "ground" if instance.node in nodes or named else "sheet"
 
     return replace(scene, instances=tuple(replace(i, surface=surface(i)) for i in scene.instances))
@@ -117,16 +115,7 @@ def describe_surfaces(scene: Scene) -> list[str]:
 
 def ground_cover(instances: Sequence[Instance], low: Floats, high: Floats) -> float:
     """Share of a grid of vertical rays that hit the mesh."""
-    from aerialdojo_gen.geometry.rays import RayCaster
-
-    scene = Scene("probe", tuple(instances), {}, np.stack([low, high]))
-    fractions = (np.arange(24) + 0.5) / 24
-    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
-        -1, 2
-    )
-    origins = np.column_stack([places, np.full(len(places), high[2] + 1.0)])
-    hit, _ = RayCaster(scene).first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))
-    return float(np.isfinite(hit).mean())
+    return _vertical_hits(TriangleRayCaster(*soup(instances)), low, high, high[2] + 1.0, -1.0, 24)
 
 
 def ground_plane(low: Floats, high: Floats, margin_m: float, materials: dict[str, Material]) -> Instance:

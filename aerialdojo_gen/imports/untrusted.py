@@ -9,7 +9,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any
+
+import tomli
 
 from aerialdojo_gen.base import environment_errors
 from aerialdojo_gen.base.errors import AssetError
@@ -87,6 +88,8 @@ class SiblingFiles:
             self.loaded[name] = path.read_bytes()
         return self.loaded[name]
 
+    __getitem__ = get  # trimesh reads files by name
+
     def _resolve(self, name: str) -> Path | None:
         """Resolve a name; absolute paths of other machines by their last part, as exporters write them."""
         plain = name.replace("\\", "/")
@@ -100,41 +103,8 @@ class SiblingFiles:
                 continue
         return None
 
-    def keys(self) -> list[str]:
-        """Return nothing: files are looked up by name only."""
-        return []
-
-    def namespaced(self, namespace: str) -> Any:
-        """Return itself: there is one folder."""
-        return self
-
-    def write(self, name: str, data: bytes) -> None:
-        """Not supported."""
-        raise PermissionError(name)
-
 
 _HEAD = 1024
-# First bytes of other file types, and advice.
-_OTHER_TYPES = (
-    (b"\x1f\x8b", "is compressed by gzip: unpack it first"),
-    (b"7z\xbc\xaf\x27\x1c", "is a 7z archive: unpack it, and give the mesh in it"),
-    (b"Rar!", "is a RAR archive: unpack it, and give the mesh in it"),
-    (b"BZh", "is compressed by bzip2: unpack it first"),
-    (b"\xfd7zXZ", "is compressed by xz: unpack it first"),
-    (b"\x28\xb5\x2f\xfd", "is compressed by Zstandard: unpack it first"),
-    (b"BLENDER", "is a Blender file: export it as GLB (File, Export, glTF 2.0)"),
-    (b"%PDF", "is a PDF: export the mesh itself, as GLB"),
-    (b"\x89PNG", "is a PNG picture: give the mesh, and leave its textures beside it"),
-    (b"\xff\xd8\xff", "is a JPEG picture: give the mesh, and leave its textures beside it"),
-    (b"II*\0", "is a TIFF picture: give the mesh"),
-    (b"MM\0*", "is a TIFF picture: give the mesh"),
-    (b"LASF", "is a LAS point cloud: mesh it first (CloudCompare, Open3D, OpenDroneMap)"),
-    (b"version https://git-lfs", "is a Git LFS pointer: fetch the file itself (git lfs pull)"),
-    (b"-----BEGIN PGP", "is encrypted by PGP: decrypt it first"),
-    (b"Salted__", "is encrypted by OpenSSL: decrypt it first"),
-    (b"age-encryption.org", "is encrypted by age: decrypt it first"),
-    (b"SQLite format 3", "is an SQLite database: export the mesh itself, as GLB"),
-)
 # First bytes of supported formats.
 _MESHES = (
     (b"glTF", ".glb"), (b"ply\n", ".ply"), (b"ply\r", ".ply"), (b"Kaydara FBX Binary", ".fbx"),
@@ -155,8 +125,8 @@ def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
         locked = len(head) >= 8 and struct.unpack_from("<H", head, 6)[0] & _ENCRYPTED
         how = "unpack it with its password" if locked else "unpack it"
         return f"is {'an encrypted' if locked else 'a'} ZIP archive: {how}, and give the mesh in it"
-    for begin, message in _OTHER_TYPES:
-        if head.startswith(begin):
+    for start, message in tomli.loads(Path(__file__).with_name("file_types.toml").read_text("utf-8")).items():
+        if head.startswith(start.encode("latin-1")):
             return message
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text.lower().startswith(_PAGES):

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.csv
 
 from aerialdojo_gen.annotations.draft import DraftOptions
-from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
+from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -21,7 +21,7 @@ from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor
 from aerialdojo_gen.pipeline.interrupt import Interrupts
 from aerialdojo_gen.pipeline.stage import ProjectPaths
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.worlds.kinds import type_names
 from aerialdojo_gen.scenes.worlds.make import make_world
 from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
@@ -153,14 +153,8 @@ def _check_same(world: World, plan: Path) -> None:
         raise UsageError(f"{plan} is there with {other[0]}: take another folder for --out, or delete it")
 
 
-@cache
-def _catalogue() -> Catalogue:
-    return load_catalogue(home() / "scene_assets")
-
-
-@cache
-def _pipeline(path: Path) -> Pipeline:
-    return load_pipeline(path)
+_catalogue = cache(lambda: load_catalogue(home() / "scene_assets"))
+_pipeline = cache(load_pipeline)
 
 
 def _write_draws(project: Path, done: Sequence[VariedWorld]) -> None:

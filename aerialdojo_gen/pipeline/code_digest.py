@@ -58,6 +58,7 @@ DATA_FILES = {
     "annotations.language.grammar": "annotations/language/*.toml",
     "annotations.phrases": "annotations/phrases/*.toml",
     "annotations.places": "annotations/places/*.toml",
+    "annotations.words": "annotations/words.toml",
     "scenes.colours": "scenes/colour_names.toml",
 }
 

@@ -8,7 +8,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.foreign import raw
-from support.hills import hills, standing
+from support.hills import CELL_M, Hills, hills, standing
 
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.shipped import home
@@ -99,6 +99,12 @@ def test_terrain_by_name_is_ground_where_its_form_leaves_it_open():
     assert {i.category: i.surface for i in nameless.instances} == {"awning": "sheet", "yard": "solid"}
 
 
+def sheet(z: np.ndarray) -> trimesh.Trimesh:
+    """One surface of cells of a metre."""
+    field = Hills(z, np.zeros(np.subtract(z.shape, 1), dtype=bool))
+    return field.mesh().apply_scale((1 / CELL_M, 1 / CELL_M, 1))
+
+
 def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
     """One surface, as photogrammetry makes it: hills, out of which houses rise without a seam."""
     rng = np.random.default_rng(seed)
@@ -111,11 +117,7 @@ def scan(seed: int) -> tuple[RawNode, list[np.ndarray]]:
             at = np.s_[y0 : y0 + 9, x0 : x0 + 7]
             z[at] = ground[at].max() + rng.uniform(4, 9)
             places.append(np.array([x0 + 3, y0 + 4]))
-    n = 81
-    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
-    faces = np.concatenate([np.column_stack([a, a + 1, a + n + 1]), np.column_stack([a, a + n + 1, a + n])])
-    vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    return RawNode("", vertices, faces, default_colours(len(faces))), places
+    return raw(sheet(z)), places
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -209,12 +211,7 @@ def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():
     z = 4.0 * np.sin(x / 25.0) + 3.0 * np.cos(y / 20.0)
     for u, v in ((-30.0, -20.0), (10.0, 25.0), (35.0, -35.0)):
         z[(np.abs(x - u) < 6.0) & (np.abs(y - v) < 5.0)] += 6.0
-    cell = np.arange(120 * 121).reshape(120, 121)[:, :-1].ravel()
-    faces = np.concatenate(
-        [np.column_stack([cell, cell + 1, cell + 122]), np.column_stack([cell, cell + 122, cell + 121])]
-    )
-    scan = RawNode("Mesh_0", np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, default_colours(len(faces)))
-    scene, _ = import_mesh("Scan", [scan])
+    scene, _ = import_mesh("Scan", [raw(sheet(z), "Mesh_0")])
     wide = [i for i in scene.instances if np.ptp(i.bounds, axis=0)[:2].min() > 100.0]
     assert [(i.category, i.surface) for i in wide] == [("terrain", "ground")]
     # What stands on it stays: three blocks, each to be found.

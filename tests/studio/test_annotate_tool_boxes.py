@@ -22,6 +22,7 @@ import trimesh
 from starlette.testclient import TestClient
 from support import annotating
 from support.browser import until
+from support.hills import CELL_M, Hills
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.cli.common import open_pipeline
@@ -49,10 +50,10 @@ def terrain(tmp_path_factory):
     x, y = np.meshgrid(np.arange(-20, 20.5, 0.5), np.arange(-20, 20.5, 0.5))
     z = np.where((np.abs(x - 5) < 2.1) & (np.abs(y - 5) < 2.1), 3.0, 0.0)
     z = np.where((np.abs(x + 10) < 1.1) & (np.abs(y + 8) < 1.1), 9.0, z)
-    n = x.shape[0]
-    k = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
-    faces = np.concatenate([np.column_stack([k, k + 1, k + n + 1]), np.column_stack([k, k + n + 1, k + n])])
-    trimesh.Trimesh(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces).export(folder / "scan.ply")
+    field = Hills(z, np.zeros((80, 80), dtype=bool))
+    field.mesh().apply_scale((0.5 / CELL_M, 0.5 / CELL_M, 1)).apply_translation((-20, -20, 0)).export(
+        folder / "scan.ply"
+    )
     return add_scene("Scan", folder / "scan.ply", folder / "mine", MeshOptions())
 
 

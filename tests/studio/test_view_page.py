@@ -7,6 +7,8 @@ import time
 import cv2
 import numpy as np
 import pytest
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.keys import Keys
 from support.browser import errors, until
 from support.viewing import YARD
 
@@ -53,8 +55,10 @@ def view_of(driver, picture):
     return picture[top : top + height, left : left + width]
 
 
-def fresh(driver):
-    """Everything as it was when the page was loaded."""
+@pytest.fixture
+def driver(page):
+    """The browser, and everything as it was when the page was loaded."""
+    driver, _ = page
     driver.execute_script(
         "page.letGo(); page.mode('orbit'); page.view.home();"
         "for (const id of ['setting', 'split', 'modality', 'target']) document.getElementById(id).value = '';"
@@ -63,6 +67,15 @@ def fresh(driver):
         " { box.checked = box.dataset.layer !== 'anchors'; page.setLayer(box.dataset.layer, box.checked); }"
     )
     driver.execute_async_script("page.routes.draw().then(arguments[0])")
+    return driver
+
+
+@pytest.fixture
+def bare(driver):
+    """That browser, which shows the scene alone."""
+    for layer in ("routes", "objects", "landmarks"):
+        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+    return driver
 
 
 def test_the_page_asks_nobody_else_and_has_no_errors(page):
@@ -80,9 +93,7 @@ def test_the_page_asks_nobody_else_and_has_no_errors(page):
     assert [other for other in asked if not other.startswith((root, "data:", "blob:"))] == []
 
 
-def test_the_page_shows_the_scene_in_the_projects_colours(smoke, page):
-    driver, _ = page
-    fresh(driver)
+def test_the_page_shows_the_scene_in_the_projects_colours(smoke, driver):
     driver.execute_script(
         "for (const name of [...page.view.layers.keys()]) page.view.setVisible(name, false);"
         "page.view.overlay.style.display = 'none'"
@@ -104,9 +115,7 @@ def test_the_page_shows_the_scene_in_the_projects_colours(smoke, page):
     assert np.quantile(difference, 0.99) < 40.0
 
 
-def test_layers_are_switched_on_and_off(page):
-    driver, _ = page
-    fresh(driver)
+def test_layers_are_switched_on_and_off(driver):
     driver.execute_script("document.querySelector('[data-layer=routes]').click()")
     before = view_of(driver, canvas(driver))
     yellow = np.array([250, 204, 21])
@@ -129,8 +138,6 @@ def test_layers_are_switched_on_and_off(page):
 
 
 def click(driver, x, y):
-    from selenium.webdriver import ActionChains
-
     element = driver.execute_script("return page.view.canvas")
     size = element.rect
     ActionChains(driver, duration=0).move_to_element_with_offset(
@@ -138,9 +145,7 @@ def click(driver, x, y):
     ).click().perform()
 
 
-def test_a_route_is_picked_by_a_click(page):
-    driver, _ = page
-    fresh(driver)
+def test_a_route_is_picked_by_a_click(driver):
     # One route alone, seen freely: the click can mean nothing else.
     nav = driver.execute_script("return page.index.routes.nav_id[page.index.routes.setting.length - 1]")
     driver.execute_script(
@@ -202,11 +207,7 @@ def test_flying_along_looks_as_the_drone_looks(smoke, page):
     assert driver.execute_script("return page.view.camera.fov") == 60
 
 
-def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(page):
-    from selenium.webdriver import ActionChains
-
-    driver, _ = page
-    fresh(driver)
+def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(driver):
     driver.execute_script("page.mode('fly'); page.view.controls.lookFrom([0, 0, 12], [0, 20, 12])")
     canvas_of = driver.execute_script("return page.view.canvas")
     ActionChains(driver, duration=50).move_to_element(canvas_of).click_and_hold().move_by_offset(100, 0).perform()
@@ -221,57 +222,47 @@ def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(page):
     assert ahead[2] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_an_object_is_picked_by_a_click_on_its_mesh(page):
-    driver, _ = page
-    fresh(driver)
-    for layer in ("routes", "objects", "landmarks"):
-        driver.execute_script(f"page.view.setVisible('{layer}', false)")
+def test_an_object_is_picked_by_a_click_on_its_mesh(bare):
     picture = "const i = document.querySelector('#panel img'); return i.complete && i.naturalWidth"
-    for item in driver.execute_script("return page.index.objects.slice(0, 3)"):
-        driver.execute_script("page.letGo(); page.view.focusOn(arguments[0]); page.view.draw()", item["mesh_node"])
-        spot = driver.execute_script(
+    for item in bare.execute_script("return page.index.objects.slice(0, 3)"):
+        bare.execute_script("page.letGo(); page.view.focusOn(arguments[0]); page.view.draw()", item["mesh_node"])
+        spot = bare.execute_script(
             """for (let y = 30; y < page.view.height; y += 9) for (let x = 30; x < page.view.width; x += 9)
                  if (page.view.pickNode(x, y)?.node === arguments[0]) return [x, y];
                return null;""",
             item["mesh_node"],
         )
         assert spot, f"{item['name']} is not to be seen"
-        click(driver, *spot)
-        panel = driver.execute_script("return document.getElementById('panel').textContent")
+        click(bare, *spot)
+        panel = bare.execute_script("return document.getElementById('panel').textContent")
         assert item["name"] in panel
         assert item["description"] in panel
-        assert until("the reference image", lambda: driver.execute_script(picture)) >= 300
+        assert until("the reference image", lambda: bare.execute_script(picture)) >= 300
 
 
-def test_what_is_picked_keeps_its_colours(page):
-    driver, _ = page
-    fresh(driver)
-    for layer in ("routes", "objects", "landmarks"):
-        driver.execute_script(f"page.view.setVisible('{layer}', false)")
-    item = driver.execute_script("return page.index.objects[0]")
-    driver.execute_script("page.view.focusOn(arguments[0])", item["mesh_node"])
-    before = view_of(driver, canvas(driver))
-    own = driver.execute_script(
+def test_what_is_picked_keeps_its_colours(bare):
+    item = bare.execute_script("return page.index.objects[0]")
+    bare.execute_script("page.view.focusOn(arguments[0])", item["mesh_node"])
+    before = view_of(bare, canvas(bare))
+    own = bare.execute_script(
         """const found = [];
            for (let y = 4; y < page.view.height; y += 6) for (let x = 4; x < page.view.width; x += 6)
              if (page.view.pickNode(x, y)?.node === arguments[0]) found.push([x, y]);
            return found;""",
         item["mesh_node"],
     )
-    driver.execute_script("page.pickObject(arguments[0])", item["object_id"])
-    after = view_of(driver, canvas(driver))
+    bare.execute_script("page.pickObject(arguments[0])", item["object_id"])
+    after = view_of(bare, canvas(bare))
     changed = (before != after).any(axis=2)
     # The frame is there, and only its edges lie over the object.
     assert changed.sum() > 300
     assert np.mean([changed[y, x] for x, y in own]) < 0.12
-    assert driver.execute_script("return page.view.layers.has('frame')")
-    driver.execute_script("page.letGo()")
-    assert not driver.execute_script("return page.view.layers.has('frame')")
+    assert bare.execute_script("return page.view.layers.has('frame')")
+    bare.execute_script("page.letGo()")
+    assert not bare.execute_script("return page.view.layers.has('frame')")
 
 
-def test_filters_count_as_the_release_does(smoke, page):
-    driver, _ = page
-    fresh(driver)
+def test_filters_count_as_the_release_does(smoke, driver):
     routes = ReleasedScene(smoke, YARD).routes.to_pylist()
     target = routes[0]["target_object_id"]
     for choice, wanted in (
@@ -293,12 +284,7 @@ def test_filters_count_as_the_release_does(smoke, page):
         assert driver.execute_script("return document.getElementById('n-routes').textContent") == f"{len(wanted):,}"
 
 
-def test_search_and_keys(page):
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.keys import Keys
-
-    driver, _ = page
-    fresh(driver)
+def test_search_and_keys(driver):
     name = driver.execute_script("return page.index.objects[2].name")
     ActionChains(driver).send_keys("/").send_keys(name).send_keys(Keys.ENTER).perform()
     assert name == driver.execute_script("return document.querySelector('#panel h2').textContent")
@@ -318,8 +304,7 @@ def test_search_and_keys(page):
     assert driver.execute_script("return page.view.controls.mode") == "fly"
 
 
-def test_every_control_has_a_name(page):
-    driver, _ = page
+def test_every_control_has_a_name(driver):
     nameless = driver.execute_script(
         "return [...document.querySelectorAll('input, select, button')].filter((e) =>"
         " !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label'))).map((e) => e.outerHTML)"
@@ -327,9 +312,7 @@ def test_every_control_has_a_name(page):
     assert nameless == []
 
 
-def test_names_from_files_stay_text(page):
-    driver, _ = page
-    fresh(driver)
+def test_names_from_files_stay_text(driver):
     driver.execute_script(
         """const object = page.index.objects[0], was = { ...object };
         Object.assign(object, { name: "<img src=x onerror=window.hit=1>",

@@ -133,7 +133,9 @@ def choose(about: About, level: str, used: Collection[int], rng: np.random.Gener
             return None
         left = remaining
         _add(plan, about, best, rng)
-    _drop_needless(plan, about)
+    # The first place is needless if others that had to be added are enough.
+    if len(plan.places) > 1 and not about.distractors([k for k in plan.indices if k != plan.places[0]]):
+        del plan.places[0]
     if rng.random() < _MORE_PLACES[level] and len(plan.places) < _MAX_PLACES:
         plan.places += [k for k in ranked if k not in plan.places and not about.repeats(k, plan)][:1]
     spare = [w for w in about.details if w.index not in plan.indices]
@@ -168,11 +170,3 @@ def _add(plan: Plan, about: About, index: int, rng: np.random.Generator) -> None
         plan.details.append(wording)
     else:
         plan.adjectives.append(wording)
-
-
-def _drop_needless(plan: Plan, about: About) -> None:
-    """Leave out the first place if others that had to be added are enough."""
-    if len(plan.places) > 1:
-        rest = [k for k in plan.indices if k != plan.places[0]]
-        if not about.distractors(rest):
-            del plan.places[0]

@@ -10,25 +10,10 @@ from functools import cache, cached_property
 import numpy as np
 
 from aerialdojo_gen.annotations.phrases import CategoryWords, article, group_of
+from aerialdojo_gen.annotations.words import LISTS
 from aerialdojo_gen.base.rng import pick
 
-# What "a stack of fish crates" begins with: adjectives of colour and kind go before the crates.
-COLLECTIVES = frozenset(
-    {"row", "pile", "stack", "heap", "group", "bundle", "line", "pallet", "rack", "cluster", "clump", "patch", "set"}
-)
 _USUAL = 0.35  # How often the catalogue's own name is used where there are others
-# First words of names that go before other adjectives: "an overturned red car".
-LEADING = frozenset(
-    {"broken", "overturned", "fallen", "burnt-out", "ruined", "collapsed", "abandoned", "torn", "wrecked"}
-)
-# First words of names that no other adjective goes before: "a red big motorbike".
-SIZES = frozenset({
-    "big", "large", "great", "giant", "huge", "small", "little", "tall", "high", "long", "short", "low", "wide",
-    "slim", "old", "wee",
-})  # fmt: skip
-# Adjectives that stay before the collective: "a tall stack of grey pallets".
-_OF_THE_WHOLE = frozenset({"tall", "high", "low", "short", "long", "thick", "thin", "fat", "slim"})
-_NUMBERS = frozenset({"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"})
 
 
 @dataclass(frozen=True)
@@ -76,8 +61,10 @@ class NounPhrase:
 
 def noun_phrase(name: Name, adjectives: Sequence[str], tail: str = "") -> NounPhrase:
     """Put adjectives in their places: those of the whole before the collective, numbers before the others."""
-    whole = tuple(word for word in adjectives if name.group and word in _OF_THE_WHOLE)
-    own = sorted((word for word in adjectives if word not in whole), key=lambda word: word.split()[0] not in _NUMBERS)
+    whole = tuple(word for word in adjectives if name.group and word in LISTS["of_the_whole"])
+    own = sorted(
+        (word for word in adjectives if word not in whole), key=lambda word: word.split()[0] not in LISTS["numbers"]
+    )
     return NounPhrase(name, whole, tuple(own), tail)
 
 
@@ -85,10 +72,10 @@ def noun_phrase(name: Name, adjectives: Sequence[str], tail: str = "") -> NounPh
 def name_of(text: str) -> Name:
     """Split a noun into its collective and its head."""
     group, of, head = text.partition(" of ")
-    if of and group in COLLECTIVES:
+    if of and group in LISTS["collectives"]:
         return Name(head, group)
     first, _, rest = text.partition(" ")
-    return Name(rest, lead=first) if rest and first in LEADING else Name(text)
+    return Name(rest, lead=first) if rest and first in LISTS["leading"] else Name(text)
 
 
 class Names:
@@ -116,7 +103,9 @@ class Names:
         usual = _grouped(words, name)
         if name != words.name:
             return usual  # An imported thing has a name of its own
-        free = [noun for noun in words.nouns if noun in self._free and (alone or noun.split()[0] not in SIZES)]
+        free = [
+            noun for noun in words.nouns if noun in self._free and (alone or noun.split()[0] not in LISTS["sizes"])
+        ]
         others = [_grouped(words, noun) for noun in free]
         if words.collectives:
             others += [Name(head, group) for head in words.plural_heads for group in words.collectives]

@@ -13,6 +13,7 @@ from aerialdojo_gen.annotations.format import Annotations, Object, format_annota
 from aerialdojo_gen.annotations.relations import SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import is_unnamed
+from aerialdojo_gen.studio.annotate.document import called
 
 _PATH = re.compile(r"^(landmarks|objects)\[(\d+)\](?:\.(\w+))?")
 _MENTION = re.compile(r"\b(landmarks|objects)\[(\d+)\]")
@@ -32,7 +33,7 @@ class Describer:
         general = []
         faulty = check_source(source, self._vocabulary, self._counts, self._geometry).faults
         for fault in faulty:
-            message = _MENTION.sub(lambda m: _entry_name(annotations, m[1], int(m[2])), fault.message)
+            message = _MENTION.sub(lambda m: called(m[1], getattr(annotations, m[1])[int(m[2])]), fault.message)
             at = _PATH.match(fault.path)
             if at is None:
                 general.append(message)
@@ -74,8 +75,3 @@ class Describer:
         if found is None:
             return {"landmark": None, "direction": None}
         return {"landmark": marks[found.landmark].name, "direction": found.direction}
-
-
-def _entry_name(annotations: Annotations, kind: str, index: int) -> str:
-    entry: Any = getattr(annotations, kind)[index]
-    return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictInt, StrictStr
+from pydantic import AfterValidator, Field, StrictInt, StrictStr
 
-from aerialdojo_gen.annotations.format import Anchor, Annotations, Landmark, Object
+from aerialdojo_gen.annotations.format import Anchor, Annotations, Landmark, Object, Strict
 from aerialdojo_gen.base.errors import AerialDojoError
 
 Kind = Literal["landmarks", "objects"]
@@ -36,11 +36,7 @@ _Name, _Node, _Text = _line(120), _line(200), _line(2000)
 _Id = Annotated[StrictInt, Field(ge=0, le=2**31 - 1)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Fields(_Strict):
+class Fields(Strict):
     """Values of an entry's keys; a key that is left out stays as it is."""
 
     name: _Name | None = None  # type: ignore[valid-type]
@@ -55,7 +51,7 @@ class Fields(_Strict):
         return {key: value for key, value in values.items() if value is not None or key == "anchor"}
 
 
-class Add(_Strict):
+class Add(Strict):
     """Add an entry; it gets the next id."""
 
     do: Literal["add"]
@@ -63,7 +59,7 @@ class Add(_Strict):
     fields: Fields
 
 
-class Change(_Strict):
+class Change(Strict):
     """Change fields of an entry."""
 
     do: Literal["change"]
@@ -72,7 +68,7 @@ class Change(_Strict):
     fields: Fields
 
 
-class Remove(_Strict):
+class Remove(Strict):
     """Remove an entry; its id is not used again."""
 
     do: Literal["remove"]
@@ -83,7 +79,7 @@ class Remove(_Strict):
 Operation = Annotated[Add | Change | Remove, Field(discriminator="do")]
 
 
-class Edit(_Strict):
+class Edit(Strict):
     """One entry before and after."""
 
     kind: Kind
@@ -163,6 +159,11 @@ def difference(before: Annotations, after: Annotations) -> list[Edit]:
     return edits
 
 
+def called(kind: str, entry: Entry) -> str:
+    """Name an entry for people."""
+    return f"{kind[:-1]} {entry.id}" + (f" ({entry.name})" if entry.name else "")
+
+
 def describe(edits: Sequence[Edit]) -> str:
     """Say in a few words what edits do, for people."""
     if not edits:
@@ -171,7 +172,7 @@ def describe(edits: Sequence[Edit]) -> str:
     for edit in edits[:3]:
         entry = edit.after or edit.before
         assert entry is not None
-        thing = f"{edit.kind[:-1]} {edit.id}" + (f" ({entry.name})" if entry.name else "")
+        thing = called(edit.kind, entry)
         if edit.before is None:
             words.append(f"added {thing}")
         elif edit.after is None:

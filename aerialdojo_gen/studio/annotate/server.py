@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import hmac
 import ipaddress
@@ -11,19 +10,18 @@ import secrets
 import socket
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import parse_qs
 
 import numpy as np
 from fastapi import FastAPI, Header, Query, Request
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictStr, field_validator
+from pydantic import Field, StrictFloat, StrictStr, field_validator
 
+from aerialdojo_gen.annotations.format import Strict
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError, UsageError
 from aerialdojo_gen.studio.annotate.coco import coco_zip
 from aerialdojo_gen.studio.annotate.document import ConflictError, Operation
@@ -66,36 +64,27 @@ class TokenGate:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        headers = {name.lower(): value.decode("latin-1") for name, value in scope["headers"]}
-        address = (scope.get("client") or ("", 0))[0]
+        request = Request(scope)
+        address = request.client.host if request.client else ""
         failed = self._failed_logins.get(address)
         wait = 0.0 if failed is None else failed.wait(time.monotonic())
+        token, cookie = request.query_params.get("token", ""), request.cookies.get(COOKIE, "")
+        answer: Response | None = None
         if wait > 0.0 and address not in self._known:
-            after = [(b"retry-after", str(int(wait) + 1).encode())]
-            await _respond(send, 429, f"too many wrong tokens: try again in {int(wait) + 1} seconds", after)
-            return
-        token = cookie = ""
-        with contextlib.suppress(ValueError):
-            query = parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=8)
-            token = query.get("token", [""])[0]
-        with contextlib.suppress(CookieError):
-            morsel = SimpleCookie(headers.get(b"cookie", "")).get(COOKIE)
-            cookie = morsel.value if morsel else ""
-        if scope["path"] == "/" and self._is_token(token):
+            seconds = int(wait) + 1
+            after = {"retry-after": str(seconds)}
+            answer = PlainTextResponse(f"too many wrong tokens: try again in {seconds} seconds", 429, after)
+        elif scope["path"] == "/" and self._is_token(token):
             self._known.add(address)
             kept = f"{COOKIE}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-            await _respond(send, 303, "", [(b"location", b"/"), (b"set-cookie", kept.encode())])
-            return
-        if not self._is_token(cookie):
+            answer = RedirectResponse("/", 303, {"set-cookie": kept})
+        elif not self._is_token(cookie):
             for given in filter(None, (token, cookie)):
                 self._record_failed_login(address, given)
-            await _respond(send, 401, "open the address that the command printed; it contains the token")
-            return
-        origin = headers.get(b"origin")
-        if origin is not None and origin != f"http://{headers.get(b'host', '')}":
-            await _respond(send, 403, "requests from other sites are not allowed")
-            return
-        await self._app(scope, receive, send)
+            answer = PlainTextResponse("open the address that the command printed; it contains the token", 401)
+        elif request.headers.get("origin") not in (None, f"http://{request.headers.get('host', '')}"):
+            answer = PlainTextResponse("requests from other sites are not allowed", 403)
+        await (answer or self._app)(scope, receive, send)
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self._token.encode())
@@ -128,12 +117,6 @@ class _FailedLogins:
         self.seen.add(digest)
 
 
-async def _respond(send: Send, status: int, text: str, headers: Sequence[tuple[bytes, bytes]] = ()) -> None:
-    plain = (b"content-type", b"text/plain; charset=utf-8")
-    await send({"type": "http.response.start", "status": status, "headers": [plain, *headers]})
-    await send({"type": "http.response.body", "body": text.encode()})
-
-
 STATIC = Path(__file__).resolve().parent / "static"
 MAX_BYTES = 8 << 20
 
@@ -143,11 +126,7 @@ _Match = Annotated[str | None, Header(alias="If-Match", max_length=80)]
 _Object = Annotated[int, Field(ge=0, le=2**31 - 1)]
 
 
-class _Body(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class AuthoredRequest(_Body):
+class AuthoredRequest(Strict):
     """A request for a change, with its author."""
 
     who: Annotated[StrictStr, Field(max_length=80)] = ""
@@ -176,14 +155,14 @@ class ImportRequest(AuthoredRequest):
     text: StrictStr
 
 
-class Ray(_Body):
+class Ray(Strict):
     """A ray into the scene."""
 
     origin_m: _Triple
     direction: _Triple
 
 
-class Box(_Body):
+class Box(Strict):
     """A box around a thing that has no node in the mesh."""
 
     low_m: _Triple
@@ -191,7 +170,7 @@ class Box(_Body):
     category: Annotated[StrictStr, Field(min_length=1, max_length=60)]
 
 
-class Viewpoint(_Body):
+class Viewpoint(Strict):
     """A viewpoint of an object; without a yaw it faces the object, with `snap` it is moved to the standoff."""
 
     position_m: _Triple

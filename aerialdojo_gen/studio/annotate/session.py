@@ -27,7 +27,7 @@ from aerialdojo_gen.studio.annotate import boxes
 from aerialdojo_gen.studio.annotate.anchors import AnchorService
 from aerialdojo_gen.studio.annotate.describe import Describer
 from aerialdojo_gen.studio.annotate.document import Add, Change, ConflictError, Operation, apply, edits_of, find
-from aerialdojo_gen.studio.annotate.storage import Author, Record, State, Storage
+from aerialdojo_gen.studio.annotate.storage import Author, History, Record, State, Storage
 from aerialdojo_gen.studio.web.payload import scene_payload
 
 _MAX_CHANGES = 200
@@ -86,8 +86,7 @@ class AnnotationSession:
 
     def _document(self, state: State, client: str) -> dict[str, Any]:
         with self._lock:
-            self.storage.history.refresh()
-            undo, redo = self.storage.history.stacks(client)
+            undo, redo = self._history().stacks(client)
             if self._described is None or self._described[0] != state.version:
                 self._described = (state.version, self._describer.describe(state.annotations))
             return {
@@ -125,16 +124,15 @@ class AnnotationSession:
 
     def changes_since(self, version: str) -> list[dict[str, Any]]:
         """Return the changes after a version."""
-        with self._lock:
-            self.storage.history.refresh()
-            return [record.model_dump(mode="json") for record in self.storage.history.since(version)][-50:]
+        return [record.model_dump(mode="json") for record in self._history().since(version)][-50:]
 
     def history(self) -> list[dict[str, Any]]:
         """Return the last changes, newest first."""
-        with self._lock:
-            self.storage.history.refresh()
-            last = reversed(self.storage.history.records[-_MAX_CHANGES:])
-            return [record.model_dump(mode="json") for record in last]
+        return [record.model_dump(mode="json") for record in reversed(self._history().records[-_MAX_CHANGES:])]
+
+    def _history(self) -> History:
+        self.storage.history.refresh()
+        return self.storage.history
 
     # Picking, and anchors.
 

@@ -17,9 +17,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
-from aerialdojo_gen.annotations.format import Annotations, format_annotations, parse_annotations
+from aerialdojo_gen.annotations.format import Annotations, Strict, format_annotations, parse_annotations
 from aerialdojo_gen.base.errors import AnnotationError, brief, disk_error
 from aerialdojo_gen.store.layout import check_scene_name
 from aerialdojo_gen.studio.annotate import document
@@ -28,10 +28,9 @@ from aerialdojo_gen.studio.annotate.document import ConflictError, Edit, Kind, O
 Action = Literal["do", "undo", "redo", "import", "outside"]
 
 
-class Record(BaseModel):
+class Record(Strict):
     """A line of the history."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     time: str  # UTC, ISO 8601
     who: str  # Name that the person entered
     client: str  # The browser tab that the change's undo belongs to

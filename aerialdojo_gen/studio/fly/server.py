@@ -10,8 +10,9 @@ import numpy as np
 from fastapi import FastAPI, Query, Request
 from fastapi.responses import JSONResponse, Response
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, StrictInt
+from pydantic import Field, StrictInt
 
+from aerialdojo_gen.annotations.format import Strict
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.pictures import PAGE_JPEG, encode_jpeg
 from aerialdojo_gen.benchmark.agents.goal import N_ACTIONS
@@ -23,10 +24,9 @@ from aerialdojo_gen.studio.web.serving import local_app, one_line, open_socket, 
 _Share = Annotated[float, Query(ge=0, lt=1)]
 
 
-class _Body(BaseModel):
+class _Body(Strict):
     """What every request that changes something says: the state that it is an answer to."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     version: Annotated[StrictInt, Field(ge=0, le=2**31)]
 
 

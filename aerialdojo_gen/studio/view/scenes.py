@@ -140,20 +140,9 @@ THUMB_PX = 224
 class SceneData(ReleasedScene):
     """The data of one scene, computed lazily."""
 
-    @cached_property
-    def payload(self) -> bytes:
-        """The mesh for the browser; AssetError if it is missing or does not match."""
-        return scene_payload(self.model)
-
-    @cached_property
-    def index(self) -> dict[str, Any]:
-        """What the page lists and filters."""
-        return scene_index(self)
-
-    @cached_property
-    def points(self) -> bytes:
-        """The points of all routes."""
-        return route_points(self)
+    payload = cached_property(lambda self: scene_payload(self.model))
+    index = cached_property(scene_index)
+    points = cached_property(route_points)
 
     def image(self, object_id: int) -> bytes:
         """Return the reference image of an object, PNG; UsageError if it has none."""

@@ -9,7 +9,6 @@ import asyncio
 import logging
 import resource
 import time
-from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -147,12 +146,6 @@ class BoundedLog(logging.Filter):
             return False
         self._passed += 1
         return True
-
-
-def limits() -> dict[str, Any]:
-    """Settings of `uvicorn.Config` that enforce these limits."""
-    # uvicorn's limit_concurrency counts all connections: half requests would lock out everybody else.
-    return {"http": LimitedProtocol, "ws": "none", "backlog": 128, "timeout_keep_alive": 5}
 
 
 def bound_log() -> None:

@@ -181,7 +181,7 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
     """Serve until Ctrl-C."""
     import uvicorn
 
-    from aerialdojo_gen.studio.web.limits import bound_log, limits
+    from aerialdojo_gen.studio.web.limits import LimitedProtocol, bound_log
 
     class Server(uvicorn.Server):
         @contextlib.contextmanager
@@ -194,8 +194,11 @@ def serve(app: FastAPI, listener: socket.socket, browser: bool = False, path: st
                 yield
 
     url = url_of(listener) + path
-    config = uvicorn.Config(app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1,
-                            proxy_headers=False, server_header=False, use_colors=False, **limits())  # fmt: skip
+    config = uvicorn.Config(
+        app, log_level="warning", access_log=False, lifespan="off", timeout_graceful_shutdown=1, proxy_headers=False,
+        server_header=False, use_colors=False, http=LimitedProtocol, ws="none", backlog=128, timeout_keep_alive=5,
+    )  # fmt: skip
+    # uvicorn's limit_concurrency is not set: it counts all connections, and half requests would lock out all others.
     server = Server(config)
     bound_log()
     if browser:
