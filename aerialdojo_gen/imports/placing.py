@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.grammar import Pose
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.site import MAX_NODES, Site
 

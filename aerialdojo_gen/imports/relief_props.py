@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
+from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
 
 _LANDMARKS = ("summit_cross", "fire_tower", "radio_mast")

@@ -37,6 +37,10 @@ class Mesh:
         return float(volume_terms(*_for_kernels(self.vertices, self.faces)).sum() / 6.0)
 
 
+Parts = list[tuple[str, Mesh]]
+"""Meshes with their materials, or with the roles that these have."""
+
+
 def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
     """Make a mesh of array-likes; faces of fewer than three distinct vertices or of no area are dropped."""
     v = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)

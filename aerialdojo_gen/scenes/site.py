@@ -59,7 +59,7 @@ class Site:
         self._moved_nodes: set[str] = set()
         self._on_ground: list[int] = []  # Indices of the things that stand on the ground
         self._footprints = Footprints()
-        self._terrain = flat_terrain(head.size_m)
+        self.terrain = flat_terrain(head.size_m)  # Heights of the ground
         self._base = "grass"
         self._surfaces: list[Surface] = []
         self._areas = np.empty(0, dtype=object)
@@ -89,17 +89,12 @@ class Site:
 
     def set_ground(self, terrain: Terrain | None = None, material: str = "grass") -> None:
         """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
-        self._terrain = flat_terrain(self.head.size_m) if terrain is None else terrain
+        self.terrain = flat_terrain(self.head.size_m) if terrain is None else terrain
         for level in self.head.level:
             spot = Point(level.at)
             area = spot.buffer(level.radius_m) if level.radius_m else spot
-            self._terrain = self._terrain.flattened(area, level.z_m, level.blend_m)
+            self.terrain = self.terrain.flattened(area, level.z_m, level.blend_m)
         self._base = material
-
-    @property
-    def terrain(self) -> Terrain:
-        """Heights of the ground."""
-        return self._terrain
 
     def paint(self, area: BaseGeometry, material: str, rise_m: float = 0.0, edge: str = "concrete") -> None:
         """Paint an area of the ground over what was painted before; see `Surface`."""
@@ -111,7 +106,7 @@ class Site:
     def ground_z(self, x: float, y: float) -> float:
         """Height of the painted ground at a point, metres."""
         surface = self._surface(x, y)
-        return self._terrain.at(x, y) + (0.0 if surface is None else surface.rise_m)
+        return self.terrain.at(x, y) + (0.0 if surface is None else surface.rise_m)
 
     def ground_material(self, x: float, y: float) -> str:
         """Material of the painted ground at a point."""
@@ -256,13 +251,12 @@ class Site:
         parts: Sequence[Part | tuple[str, Mesh]],
         attributes: Mapping[str, str] | None = None,
         *,
-        variant: str = "",
         footprint: BaseGeometry | None = None,
     ) -> Instance:
         """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
         name = self._reserve_node(node or self.node(category))
         shape = tuple(replace(part, material=self.laid_out(part.material, name)) for part in self._as_parts(parts))
-        instance = Instance(name, category, variant, dict(attributes or {}), placed(shape, (0, 0, 0)))
+        instance = Instance(name, category, "", dict(attributes or {}), placed(shape, (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
         self.instances.append(instance)
@@ -295,8 +289,7 @@ class Site:
     def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
         """Whether a disc of ground inside the site is free up to `height_m` above the ground (or above `z`)."""
         base = self.ground_z(x, y) if z is None else z
-        area = disc(x, y, radius_m)
-        return bool(self.extent.contains(area)) and self._footprints.is_free(area, base, base + height_m)
+        return self._has_room(disc(x, y, radius_m), base, base + height_m)
 
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
@@ -328,7 +321,7 @@ class Site:
         for k in self._on_ground:
             thing = self.instances[k]
             (x0, y0, _), (x1, y1, _) = thing.bounds
-            under = self._terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
+            under = self.terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
             if np.ptp(under) <= CONTACT_M / 2.0:
                 continue
             self.instances[k], plinth = rest_on_ground(thing, self.catalogue[thing.category].kind, heights)
@@ -336,7 +329,7 @@ class Site:
                 self.add(f"plinth_{thing.node}", "plinth", [(self.material("plinth", "concrete"), plinth)])
 
     def _ground(self) -> Instance:
-        meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)
+        meshes = ground_meshes(self.terrain, self.extent, self._base, self._surfaces)
         parts = placed(self._as_parts(meshes), (0, 0, 0))
         return Instance(self._reserve_node("ground"), "ground", "", {}, parts)
 

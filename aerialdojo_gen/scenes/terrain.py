@@ -15,6 +15,8 @@ from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import exp
 from aerialdojo_gen.scenes.mesh import Floats, Ints
 
+_GAIN = 0.45  # Of an octave of noise over the one before
+
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
@@ -131,7 +133,6 @@ def rolling_terrain(
     amplitude_m: float,
     wavelength_m: float,
     octaves: int = 4,
-    gain: float = 0.45,
     ridged: bool = False,
 ) -> Terrain:
     """Make a terrain about the origin, in metres, by fractal simplex noise.
@@ -146,8 +147,8 @@ def rolling_terrain(
     weight = 0.0
     for k in range(octaves):
         noise = OpenSimplex(seed=seed * 31 + k).noise2array(x * 2**k / wavelength_m, y * 2**k / wavelength_m)
-        total += gain**k * ((0.5 - np.abs(noise)) * 2.0 if ridged else noise)
-        weight += gain**k
+        total += _GAIN**k * ((0.5 - np.abs(noise)) * 2.0 if ridged else noise)
+        weight += _GAIN**k
     return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, total / weight * amplitude_m * 1.4)
 
 

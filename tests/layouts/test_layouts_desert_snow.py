@@ -7,9 +7,8 @@ import pytest
 import shapely
 from support.layout_checks import blank_site, each_scene, props_of
 
-from aerialdojo_gen.scenes.kit.layered_rocks import Rock, layered_rocks
-from aerialdojo_gen.scenes.kit.mudbrick import MudbrickHouse, mudbrick_houses
-from aerialdojo_gen.scenes.kit.sands import dunes, stepped_valley
+from aerialdojo_gen.scenes.kit.huts import MudbrickHouse, mudbrick_houses
+from aerialdojo_gen.scenes.kit.layered_rocks import Rock, dunes, layered_rocks, stepped_valley
 from aerialdojo_gen.scenes.kit.snow import banks_beside, moguls, profile_slope
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 

@@ -8,14 +8,12 @@ import shapely
 from shapely.geometry import Polygon
 from support.layout_checks import blank_site, clashes, floating
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.landforms import level_area
-from aerialdojo_gen.scenes.kit.relief import strew_things
-from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile
+from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile, strew_things
 from aerialdojo_gen.scenes.kit.ruins import Shored, broken_arcade, damaged_building, put_up, raking_shores
-from aerialdojo_gen.scenes.kit.wreckage import Bite, broken_edge, torn_floor, torn_wall
-from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.kit.wreckage import Bite, Style, Wreck, broken_edge, torn_floor, torn_wall
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 

@@ -6,11 +6,10 @@ import shapely
 from support.layout_checks import blank_site, each_scene, props_of
 
 from aerialdojo_gen.scenes.footprints import footprint
-from aerialdojo_gen.scenes.grammar_houses import HouseStyle
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit.houses import house_row
+from aerialdojo_gen.scenes.kit.building_sites import HIGH_M, LONG_M, Stack, container_stacks
+from aerialdojo_gen.scenes.kit.houses import HouseStyle, house_row
 from aerialdojo_gen.scenes.kit.quays import quay
-from aerialdojo_gen.scenes.kit.yards import HIGH_M, LONG_M, Stack, container_stacks
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = ["I_Harbor_0", "I_Harbor_1"]

@@ -5,8 +5,7 @@ import shapely
 from support.layout_checks import distances
 
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit.stand_shells import stand_platforms
-from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, tier_parts
+from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, stand_platforms, tier_parts
 
 
 @pytest.mark.parametrize("x", [-12.0, 0.0, 12.0])

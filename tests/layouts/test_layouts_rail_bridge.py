@@ -7,10 +7,9 @@ import pytest
 from shapely.geometry import Polygon
 from support.layout_checks import blank_site, distances, each_scene, props_of
 
-from aerialdojo_gen.scenes.grammar_scatter import s_curve
-from aerialdojo_gen.scenes.kit.bridges import bridge_deck, bridge_parapets
+from aerialdojo_gen.scenes.grammar import s_curve
+from aerialdojo_gen.scenes.kit.bridges import arcade, bridge_deck, bridge_parapets
 from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
-from aerialdojo_gen.scenes.kit.viaducts import arcade
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.shapes_extruded import upright
 

@@ -10,10 +10,10 @@ from support.layout_checks import blank_site
 
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.expressions import eased
+from aerialdojo_gen.scenes.kit.ground_cover import steep_area
 from aerialdojo_gen.scenes.kit.landforms import ground_by_formula, inland_m
 from aerialdojo_gen.scenes.kit.natural_ground import ragged_outline
 from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
-from aerialdojo_gen.scenes.kit.shores import steep_area
 from aerialdojo_gen.scenes.kit.structures import flights
 
 blank = partial(blank_site, "N_T_0")

@@ -10,10 +10,9 @@ from support.layout_checks import blank_site, catalogue
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house
-from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.grammar import Frame, Pose
+from aerialdojo_gen.scenes.kit.fences import fence
+from aerialdojo_gen.scenes.kit.houses import HouseStyle, house
 from aerialdojo_gen.scenes.placement import Placement
 
 blank = partial(blank_site, "U_T_0")

@@ -9,8 +9,8 @@ from support.layout_checks import blank_site, catalogue, distances, each_scene, 
 
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
-from aerialdojo_gen.scenes.kit.earthworks import earth_ramp, level_grid, terraces
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
+from aerialdojo_gen.scenes.kit.landforms import earth_ramp, level_grid, terraces
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 
 blank = partial(blank_site, "U_T_0")

@@ -10,15 +10,15 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Point, Polygon
 from support.layout_checks import blank_site, distances
 
-from aerialdojo_gen.scenes.grammar_buildings import (
+from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.buildings import (
     Roof,
     before_walls,
-    building,
     facade,
     pitched_roof,
+    put_up_building,
     wall_with_openings,
 )
-from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
 
 
@@ -62,7 +62,7 @@ def test_pitched_roofs_are_closed_and_as_high_as_asked(length, width, turn, hip)
 def test_buildings_leave_no_gap_to_the_sky(roof_kind, parapet):
     site = blank_site("U_T_0", ceiling_m=30)
     plan = rotate(rectangle(-8, -5, 8, 5), 20)
-    house = building(site, plan, "facade_brick", Roof("roof_tiles", roof_kind, parapet_m=parapet))
+    house = put_up_building(site, plan, "facade_brick", Roof("roof_tiles", roof_kind, parapet_m=parapet))
     assert not site.is_free(0, 0, 0.5)
     inside = np.array([(x, y) for x in np.arange(-9, 9, 0.37) for y in np.arange(-9, 9, 0.37)])
     inside = inside[shapely.contains_xy(plan.buffer(-0.03), inside[:, 0], inside[:, 1])]

@@ -8,8 +8,8 @@ from support.layout_checks import ASSETS, blank_site
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.rendering.lighting import is_fine, texel_m
-from aerialdojo_gen.scenes.grammar_buildings import Roof, building
 from aerialdojo_gen.scenes.ground import rectangle
+from aerialdojo_gen.scenes.kit.buildings import Roof, put_up_building
 from aerialdojo_gen.scenes.kit.flats import flats
 from aerialdojo_gen.scenes.materials import load_materials
 
@@ -27,7 +27,7 @@ openings.b = { size = [2.0, 1.5], frame = "#303030" }
 
 
 def walls(site, node, wall):
-    house = building(site, rectangle(-8, -5, 8, 5), wall, Roof("gravel"), node=node)
+    house = put_up_building(site, rectangle(-8, -5, 8, 5), wall, Roof("gravel"), node=node)
     (found,) = (part.material for part in house.parts if part.material.partition(":")[0] in LAYOUTS)
     return found
 

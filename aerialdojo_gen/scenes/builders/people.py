@@ -9,10 +9,9 @@ import numpy as np
 
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import limb, vec
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, stretched, translated
+from aerialdojo_gen.scenes.mesh import Floats, Parts, merge, posed, rotation, stretched, translated
 from aerialdojo_gen.scenes.shapes import box, lathe, sphere
 
-Parts = list[tuple[str, Mesh]]
 # Joints of a body of 1.75 m that stands, metres above its soles.
 _BODY_M = 1.75
 _HIP, _KNEE, _ANKLE = 0.93, 0.5, 0.08

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from aerialdojo_gen.scenes.builders import builder
-from aerialdojo_gen.scenes.builders.people import RIDE, Parts, person
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.builders.people import RIDE, person
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, cylinder, sphere, torus
 from aerialdojo_gen.scenes.shapes_extruded import profile, sweep
 

@@ -14,9 +14,8 @@ import numpy as np
 from aerialdojo_gen.geometry.portable import norm, power
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import clump, limb, split_by_slope, vec, whorl
-from aerialdojo_gen.scenes.mesh import Floats, Mesh
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts
 
-Parts = list[tuple[str, Mesh]]
 _ROOT_M = 0.5
 
 

@@ -8,10 +8,8 @@ import numpy as np
 
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import blade, clump, limb, split_by_slope, stone, vec
-from aerialdojo_gen.scenes.mesh import Mesh, translated
+from aerialdojo_gen.scenes.mesh import Parts, translated
 from aerialdojo_gen.scenes.shapes import lathe, sphere
-
-Parts = list[tuple[str, Mesh]]
 
 
 @builder

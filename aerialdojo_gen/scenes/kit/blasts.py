@@ -13,14 +13,14 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 from aerialdojo_gen.geometry.portable import dot, norm
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.rubble import Breadth
 from aerialdojo_gen.scenes.kit.ruins import Extent
 from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
-from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.kit.wreckage import Bite, bars, tilted_plate, torn_wall
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder
 from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep

@@ -16,13 +16,13 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
 from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, plates, posts, rim
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg, stairs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.kit.structures import Point, block, leg, stairs
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.site import Site

@@ -9,11 +9,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, deck, railing, stairs
-from aerialdojo_gen.scenes.mesh import merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.kit.structures import Point, block, deck, railing, stairs
+from aerialdojo_gen.scenes.mesh import Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, sphere

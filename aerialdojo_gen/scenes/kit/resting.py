@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.grammar import Frame, Pose
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement

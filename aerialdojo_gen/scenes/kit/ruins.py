@@ -1,6 +1,6 @@
 """Buildings after a disaster: torn open, pancaked, leaning, or stripped to their frame.
 
-Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.wrecks`.
+Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.wreckage`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import shapely
 from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 
-from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.grammar import Frame, slab
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
 from aerialdojo_gen.scenes.kit.structures import block, columns
 from aerialdojo_gen.scenes.kit.wreckage import (
     XY,
     Bite,
-    Parts,
+    Style,
+    Wreck,
     bars,
     broken_edge,
     hanging_slab,
@@ -32,8 +32,7 @@ from aerialdojo_gen.scenes.kit.wreckage import (
     torn_floor,
     torn_wall,
 )
-from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes import box

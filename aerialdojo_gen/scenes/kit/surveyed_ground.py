@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
-from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.grammar import slab
 from aerialdojo_gen.scenes.height_table import read_heights
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX

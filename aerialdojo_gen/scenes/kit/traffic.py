@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.grammar import Frame, Pose
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.site import Site

@@ -19,8 +19,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
-from aerialdojo_gen.scenes.worlds.paints import repainted
-from aerialdojo_gen.scenes.worlds.sizes import extents_m
+from aerialdojo_gen.scenes.worlds.paints import extents_m, repainted
 from aerialdojo_gen.scenes.worlds.world import World
 
 STAGE = "vary"

@@ -10,9 +10,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import Pose, beside
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import step
+from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, step
 
 Point = tuple[float, float]
 STOREY_M = 3.1
@@ -133,7 +132,7 @@ def pancaked(draft: Draft, box: Box, name: str, floors: int) -> None:
     draft.take(box.shape())
 
 
-def littered(draft: Draft, scattered_m: float = 4.2) -> None:
+def littered(draft: Draft) -> None:
     """Paint the heaps, and strew loose pieces about them and over the site."""
     heaps = [name for name in draft.areas if name.startswith("heap_")]
     w, d = draft.width_m / 2 - 2.0, draft.depth_m / 2 - 2.0
@@ -141,7 +140,7 @@ def littered(draft: Draft, scattered_m: float = 4.2) -> None:
         draft.make(
             "strew_about_heaps", heaps=heaps, spacing_m=1.5, margin_m=2.0, brick=draft.material("wall", "bricks")
         )
-    draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=scattered_m, stream="everywhere", size_m=[0.35, 0.8])
+    draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=4.2, stream="everywhere", size_m=[0.35, 0.8])
 
 
 def paint_heaps(draft: Draft) -> None:
@@ -171,13 +170,13 @@ def open_landmarks(draft: Draft, open_: Sequence[Box], shut: BaseGeometry) -> No
     draft.landmark([(*p, draft.pick(yaws, "landmark", *p)) for p in draft.shuffled(free, "landmarks")])
 
 
-def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point, *, spread: float = 0.6) -> None:
+def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point) -> None:
     """Offer slots over a box, unevenly."""
     from_, n_x, n_y = (box.x0, box.y0), max(int(box.width // step_m), 1), max(int(box.depth // step_m), 1)
     for i in range(n_x):
         for j in range(n_y):
             rng: Any = draft.rng("things", kind, i, j, *box)
-            u, v = (float(rng.uniform(-spread, spread)) for _ in range(2))
+            u, v = (float(rng.uniform(-0.6, 0.6)) for _ in range(2))
             x = from_[0] + (i + 0.5) * box.width / n_x + u
             y = from_[1] + (j + 0.5) * box.depth / n_y + v
             draft.slot(kind, x, y, float(rng.uniform(0, 360)), room_m, settle_m=0.5)
