@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.portable import product
-from aerialdojo_gen.scenes.mesh_kernels import face_areas, larger_faces, textured, volume_terms
+from aerialdojo_gen.scenes.kernels import face_areas, larger_faces, textured, volume_terms
 from aerialdojo_gen.scenes.model import Part
 
 Floats = NDArray[np.float64]

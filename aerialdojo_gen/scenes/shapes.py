@@ -16,8 +16,8 @@ import numpy as np
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.portable import distances_along, product, unit
+from aerialdojo_gen.scenes.kernels import band_faces
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
-from aerialdojo_gen.scenes.shape_kernels import band_faces
 
 Numbers = Sequence[float]
 

@@ -15,8 +15,8 @@ from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.geometry.portable import norm
+from aerialdojo_gen.scenes.kernels import band_faces, extruded, swept_rings
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, merge, mesh, outward
-from aerialdojo_gen.scenes.shape_kernels import band_faces, extruded, swept_rings
 from aerialdojo_gen.scenes.shapes import MAX_SIDES, Numbers, _numbers, _positive, circle, fan, number, rows_of, whole
 
 _SECTIONS = ("gable", "wedge", "trapezoid")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from aerialdojo_gen.geometry.portable import UP, cross, dot, norm, product, unit
+from aerialdojo_gen.scenes.kernels import band_faces, limb_vertices
 from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, mesh, outward
-from aerialdojo_gen.scenes.shape_kernels import band_faces, limb_vertices
 from aerialdojo_gen.scenes.shapes import circle, fan
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
