@@ -139,21 +139,27 @@ def rolling_terrain(
 
     `ridged` makes crests in place of hills.
     """
-    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
-    cell = max(size_m[0] / columns, size_m[1] / rows)
-    x = -size_m[0] / 2 + np.arange(columns + 1) * cell
-    y = -size_m[1] / 2 + np.arange(rows + 1) * cell
-    total = np.zeros((rows + 1, columns + 1))
+    level = level_terrain(size_m, cell_m)
+    total = level.heights_m
+    y, x = (start + np.arange(n) * level.cell_m
+            for start, n in zip((level.y0_m, level.x0_m), total.shape, strict=True))  # fmt: skip
     weight = 0.0
     for k in range(octaves):
         noise = OpenSimplex(seed=seed * 31 + k).noise2array(x * 2**k / wavelength_m, y * 2**k / wavelength_m)
         total += _GAIN**k * ((0.5 - np.abs(noise)) * 2.0 if ridged else noise)
         weight += _GAIN**k
-    return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, total / weight * amplitude_m * 1.4)
+    return replace(level, heights_m=total / weight * amplitude_m * 1.4)
+
+
+def level_terrain(size_m: tuple[float, float], cell_m: float) -> Terrain:
+    """Make level ground about the origin at z = 0, of about square cells of a size."""
+    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
+    cell = max(size_m[0] / columns, size_m[1] / rows)
+    return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, np.zeros((rows + 1, columns + 1)))
 
 
 def flat_terrain(size_m: tuple[float, float], z_m: float = 0.0) -> Terrain:
-    """Make level ground about the origin."""
+    """Make level ground about the origin, of one cell."""
     return Terrain(-size_m[0] / 2, -size_m[1] / 2, max(size_m), np.full((2, 2), z_m))
 
 

@@ -239,7 +239,11 @@ def mudbrick_houses(site: Site, *, houses: list[MudbrickHouse]) -> list[float]:
 def _mudbrick_house(site: Site, house: MudbrickHouse) -> float:
     (depth, width, height), yaw_deg, wall = house.size_m, house.yaw_deg, house.wall
     frame = Frame(*house.at, yaw_deg)
-    plan, terrace = _plan(frame, depth, width, 0.0), _plan(frame, depth, width, -0.3)
+    deep, wide = depth / 2, width / 2
+    plan, terrace, stair = (
+        Polygon([frame.at(a, b) for a, b in ((-x, low), (x, low), (x, high), (-x, high))])
+        for x, low, high in ((deep, -wide, wide), (deep - 0.3, 0.3 - wide, wide - 0.3), (deep, wide, wide + 1.0))
+    )
     z = min(site.ground_z(float(x), float(y)) for x, y in shapely.get_coordinates(plan))
     rng = site.rng_for("house", house.name)
     top = z + height
@@ -275,8 +279,7 @@ def _mudbrick_house(site: Site, house: MudbrickHouse) -> float:
         u = -depth / 2 + 0.3 + k * 0.3
         if u < depth / 2 - 0.3:
             parts.append((wall, put(box(size=(0.3, 0.9, 0.32 * (k + 1))), u, width / 2 + 0.46, 0.0)))
-    footprint = plan.union(_stair_plan(frame, depth, width))
-    site.add(None, "mudbrick_house", parts, footprint=footprint.buffer(0.1))
+    site.add(None, "mudbrick_house", parts, footprint=plan.union(stair).buffer(0.1))
     return top + 0.01
 
 
@@ -315,13 +318,3 @@ def _crumbling_wall(site: Site, wall: CrumblingWall, material: str, rng: np.rand
         parts.append((material, posed(body, rotation(0.0, 0.0, yaw), (ax, ay, foot))))
     area = LineString(wall.line).buffer(wall.thickness_m / 2 + 0.2, cap_style="flat")
     site.add(None, "ruin_wall", parts, footprint=area)
-
-
-def _plan(frame: Frame, depth: float, width: float, out_m: float) -> shapely.Polygon:
-    u, v = depth / 2 + out_m, width / 2 + out_m
-    return shapely.Polygon([frame.at(a, b) for a, b in ((-u, -v), (u, -v), (u, v), (-u, v))])
-
-
-def _stair_plan(frame: Frame, depth: float, width: float) -> shapely.Polygon:
-    half = rectangle(-depth / 2, width / 2, depth / 2, width / 2 + 1.0)
-    return shapely.Polygon([frame.at(float(u), float(v)) for u, v in shapely.get_coordinates(half)])

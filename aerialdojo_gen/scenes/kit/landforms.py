@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number, Point3
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain, smooth
+from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, mound, rolling_terrain, smooth
 
 # Smoothing a way takes the square of its length.
 _LONGEST_M = 3000.0
@@ -226,10 +226,7 @@ _Steps = Annotated[list[tuple[Number, Number]], Field(min_length=2, max_length=1
 @ground_builder
 def level_grid(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
     """Make level ground at z = 0 that is fine enough to be dug in, in place of what was there."""
-    size_m = site.head.size_m
-    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
-    cell = max(size_m[0] / columns, size_m[1] / rows)
-    return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, np.zeros((rows + 1, columns + 1)))
+    return level_terrain(site.head.size_m, cell_m)
 
 
 @ground_builder

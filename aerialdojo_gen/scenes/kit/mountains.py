@@ -21,7 +21,7 @@ from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import crown
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain, smooth
+from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, rolling_terrain, smooth
 
 _SMOOTH_MAX = 5.0
 
@@ -55,9 +55,7 @@ def massif(
     The flanks fall in steps of `bench_m`, if any; gullies and spurs on the steepest ground are `rough_m` high.
     """
     size_m, seed = site.head.size_m, site.head.seed
-    columns, rows = (int(np.ceil(s / cell_m - 1e-9)) for s in size_m)
-    cell = max(size_m[0] / columns, size_m[1] / rows)
-    ground = replace(flat_terrain(size_m), cell_m=cell, heights_m=np.zeros((rows + 1, columns + 1)))
+    ground = level_terrain(size_m, cell_m)
     corners = ground.corners()
     places = shapely.points(corners[:, :2])
     total = np.zeros(len(corners))
