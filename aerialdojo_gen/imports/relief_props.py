@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
-from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
+from aerialdojo_gen.scenes.kit.town_buildings import surface_areas
 
 _LANDMARKS = ("summit_cross", "fire_tower", "radio_mast")
 # Category, least distance, most of them, on which ground.

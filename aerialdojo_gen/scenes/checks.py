@@ -10,8 +10,8 @@ import shapely
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.placement import footprint
 
 # They hang on walls.
 HUNG = frozenset({"dock_door", "shop_sign", "storefront", "wall_banner", "wall_clock"})

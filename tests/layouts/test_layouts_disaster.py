@@ -1,4 +1,4 @@
-"""Earthquakes and explosions: broken structure holds together, and each scene stands up to a look from close by."""
+"""Earthquakes, explosions and floods: broken structure holds together, and everything is on something or afloat."""
 
 from functools import partial
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely.geometry import Polygon
-from support.layout_checks import blank_site, clashes, floating
+from support.layout_checks import blank_site, clashes, each_scene, floating, props_of
 
 from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import rectangle
@@ -138,3 +138,35 @@ def test_heaps_rise_inside_their_area_only():
     ground = heap(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
     assert float(ground.z(0.0, 0.0)) > 1.0
     assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)
+
+
+SCENES = ["D_Flood_0", "D_Flood_1"]
+of_each_scene = each_scene(SCENES)
+
+
+@of_each_scene
+def test_the_water_stands_up_to_the_windows(scene_of, name):
+    houses = [i for i in scene_of(name).instances if i.category in ("house", "flat_house")]
+    assert len(houses) >= 3
+    for house in houses:
+        glass = np.concatenate([p.vertices[:, 2] for p in house.parts if p.material == "window"])
+        assert house.bounds[0, 2] < -1.0
+        assert -0.3 < glass.min() < 0.3
+
+
+@of_each_scene
+def test_what_is_half_under_shows_more_than_half(scene_of, name):
+    for prop in props_of(scene_of(name)):
+        if prop.attributes.get("place", "").startswith("half under"):
+            low, high = prop.bounds[:, 2]
+            assert low < -0.5
+            assert low + high > 0.0
+
+
+@of_each_scene
+def test_the_dyke_has_a_gap_at_water_level(scene_of, name):
+    ground = next(i for i in scene_of(name).instances if i.category == "ground")
+    crest = ground.vertices[ground.vertices[:, 2] > 2.5]
+    gap_x = np.sort(crest[:, 0])
+    assert np.diff(gap_x).max() > 5.0
+    assert ground.bounds[0, 2] == pytest.approx(0.0, abs=0.05)

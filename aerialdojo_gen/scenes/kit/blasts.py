@@ -65,7 +65,7 @@ def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: 
     if sheets:
         parts.append((hall.cladding, merge(sheets)))
     x, y = hall.length_m / 2, hall.depth_m / 2
-    parts.append(("concrete", merge([block(-x, s * y - 0.15, x, s * y + 0.15, -0.8, 0.5) for s in (1,)])))
+    parts.append(("concrete", block(-x, y - 0.15, x, y + 0.15, -0.8, 0.5)))
     if hall.gallery_m:
         parts += _gallery(hall)
     site.add(node, "wrecked_hall", Frame(*at, yaw_deg).parts(parts, base))
@@ -195,9 +195,7 @@ def broken_bridge(
                 steel.append(sweep(path=[(float(s), v * 1.25, foot), (float(s), v, z_m - 0.2)], section=(0.2, 0.2)))
             steel.append(block(float(s) - 0.08, -w, float(s) + 0.08, w, z_m - 0.42, z_m - 0.2))
             site.occupy(frame.area(Point(float(s), 0.0).buffer(1.6)), -100.0, z_m - 0.5)
-        toward = 1.0 if s0 == 0.0 else -1.0
-        torn = s1 if s0 == 0.0 else s0
-        start = s0 if s0 == 0.0 else s1
+        start, torn, toward = (s0, s1, 1.0) if s0 == 0.0 else (s1, s0, -1.0)
         lines = ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"),
                  (w + 0.45, 0.18, "paint:#3f7d4e"))  # fmt: skip
         for k, (v, radius, colour) in enumerate(lines if pipes else ()):

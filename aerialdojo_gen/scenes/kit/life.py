@@ -12,8 +12,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.resting import perch_on_wires, seat_people
-from aerialdojo_gen.scenes.kit.traffic import set_out_traffic
+from aerialdojo_gen.scenes.kit.resting import perch_on_wires, seat_people, set_out_traffic
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement

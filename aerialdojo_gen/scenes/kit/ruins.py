@@ -16,7 +16,7 @@ from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 
 from aerialdojo_gen.scenes.grammar import Frame, slab
-from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
 from aerialdojo_gen.scenes.kit.structures import block, columns
@@ -150,16 +150,12 @@ def _shell(wreck: Wreck, rng: np.random.Generator) -> Parts:
     top = wreck.height_m + (0.0 if wreck.ridge_m else _PARAPET_M)
     for side, (a, b) in enumerate(_edges(wreck)):
         length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        outline = [(0.0, -_FOOT_M), (length, -_FOOT_M), (length, top), (0.0, top)]
-        if side % 2 == 0:
-            # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
-            half = style.wall_m / 2
-            outline = [(-half, -_FOOT_M), (length + half, -_FOOT_M), (length + half, top), (-half, top)]
-        else:
-            half = style.wall_m / 2
-            outline = [(half, -_FOOT_M), (length - half, -_FOOT_M), (length - half, top), (half, top)]
-            if wreck.ridge_m:
-                outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
+        half = style.wall_m / 2
+        # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
+        out = half if side % 2 == 0 else -half
+        outline = [(-out, -_FOOT_M), (length + out, -_FOOT_M), (length + out, top), (-out, top)]
+        if side % 2 and wreck.ridge_m:
+            outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
         openings = _openings(wreck, length, side)
         body = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
         if body is not None:
@@ -284,9 +280,8 @@ def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
     covers, rafters = [], []
     for side in (-1, 1):
         half = rectangle(-x, min(0.0, side * (y + over)), x, max(0.0, side * (y + over)))
-        for piece in (p for p in getattr(remains(half, wreck.height_m + rise / 2, wreck.bites), "geoms", None)
-                      or [remains(half, wreck.height_m + rise / 2, wreck.bites)]):  # fmt: skip
-            if isinstance(piece, Polygon) and piece.area > 1.0:
+        for piece in polygons_of(remains(half, wreck.height_m + rise / 2, wreck.bites)):
+            if piece.area > 1.0:
                 flat = extrude(piece, 0.14)
                 v = flat.vertices.copy()
                 v[:, 2] += wreck.height_m + rise - np.abs(v[:, 1]) * pitch

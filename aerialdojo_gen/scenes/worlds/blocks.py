@@ -100,8 +100,7 @@ def dressed(draft: Draft, box: Box, name: str, storeys: int, sides: Sequence[flo
 def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float = 5.6) -> None:
     """Hang washing and lights across lanes, from house to house."""
     walls = shapely.union_all([house.shape() for house in houses])
-    washing: list[list[float]] = []
-    lights: list[list[float]] = []
+    ropes: dict[str, list[list[float]]] = {"washing_lines": [], "light_strings": []}
     for lane in lanes:
         upright = lane.depth > lane.width
         for k in range(int(max(lane.width, lane.depth) // 9.0)):
@@ -113,11 +112,10 @@ def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float
             if not all(walls.buffer(0.05).contains(shapely.Point(*end)) for end in (ends[:2], ends[2:])):
                 continue
             rope = [*(round(e, 2) for e in ends), round(z_m - draft.number(0.0, 0.9, "across", "z", *ends), 2)]
-            (washing if draft.chance(0.5, "washing", *ends) else lights).append(rope)
-    if washing:
-        draft.make("washing_lines", across=washing)
-    if lights:
-        draft.make("light_strings", across=lights)
+            ropes["washing_lines" if draft.chance(0.5, "washing", *ends) else "light_strings"].append(rope)
+    for builder, across in ropes.items():
+        if across:
+            draft.make(builder, across=across)
 
 
 def square(draft: Draft, box: Box) -> Point:

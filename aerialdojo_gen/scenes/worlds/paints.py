@@ -9,7 +9,7 @@ import numpy as np
 
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.footprints import footprint
+from aerialdojo_gen.scenes.placement import footprint
 
 # What `scenes.colours.colour_name` calls these, and a test holds it, is the key or one of its shades.
 PAINTS = {
