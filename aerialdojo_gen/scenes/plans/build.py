@@ -22,6 +22,7 @@ from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar import Frame, Pose, along, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.materials import refuse_unknown
 from aerialdojo_gen.scenes.mesh import Parts
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.placement import Placement, Room
@@ -245,8 +246,7 @@ class _Building:
             made: Parts = self._call("parts", part, where)
             return made
         shape, role = part.get("shape"), part.get("role")
-        if not isinstance(shape, str) or shape not in SHAPES:
-            raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
+        refuse_unknown([shape], SHAPES, where, "shape")
         try:
             material = self._names.material(role)
             return [(material, part_mesh(part, self._names.heights, {}))]
@@ -284,8 +284,7 @@ class _Building:
     def _pose(self, thing: Thing, entry: Place, where: str) -> tuple[str, str | None, tuple[float, float, float]]:
         """Category, variant and world pose of a thing."""
         category, _, variant = thing.what.partition(":")
-        if category not in self._site.catalogue:
-            raise AssetError(f"{where}: unknown category {category!r}{nearest(category, self._site.catalogue)}")
+        refuse_unknown([category], self._site.catalogue, where, "category")
         frame = Frame(*entry.frame)
         pose = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
         return category, variant or None, pose
