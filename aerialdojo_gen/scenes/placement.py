@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypedDict
+from typing import Literal
 
 import numpy as np
 import shapely
@@ -18,15 +18,6 @@ from aerialdojo_gen.scenes.model import Instance
 Fit = Literal["as_is", "skip", "must"]
 # In place of a variant: the thing draws it.
 DRAWN = "*"
-
-
-class Room(TypedDict, total=False):
-    """How a thing is settled, and what it keeps free of what follows, metres; see `Site.place`."""
-
-    settle_m: float | None
-    clear_m: float
-    margin_m: float
-    room_m: float
 
 
 @dataclass(frozen=True)
@@ -48,6 +39,11 @@ class Placement:
     roles: Mapping[str, str] | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)
     solid: bool = True  # Whether it takes the ground that it stands on
+    settle_m: float | None = None  # On a slope it stands between the heights about a foot of this radius, metres
+    # Kept free of what follows: a disc about it, so much about its rectangle, so much about its outline.
+    clear_m: float = 0.0
+    margin_m: float = 0.0
+    room_m: float = 0.0
 
 
 _CELL_M = 10.0

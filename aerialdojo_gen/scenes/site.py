@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, Unpack, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import shapely
@@ -26,7 +26,7 @@ from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
-from aerialdojo_gen.scenes.placement import DRAWN, Fit, Footprints, Placement, Room, disc, footprint, hull
+from aerialdojo_gen.scenes.placement import DRAWN, Fit, Footprints, Placement, disc, footprint, hull
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 from aerialdojo_gen.scenes.turn import turned
@@ -120,12 +120,12 @@ class Site:
         return self._surfaces[holds[-1]] if len(holds) else None
 
     @overload
-    def place(self, thing: Placement, fit: Literal["as_is", "must"] = ..., **room: Unpack[Room]) -> Instance: ...
+    def place(self, thing: Placement, fit: Literal["as_is", "must"] = ...) -> Instance: ...
 
     @overload
-    def place(self, thing: Placement, fit: Fit, **room: Unpack[Room]) -> Instance | None: ...
+    def place(self, thing: Placement, fit: Fit) -> Instance | None: ...
 
-    def place(self, thing: Placement, fit: Fit = "as_is", **room: Unpack[Room]) -> Instance | None:
+    def place(self, thing: Placement, fit: Fit = "as_is") -> Instance | None:
         """Place a prop of the catalogue; None where it has no room and `fit` is ``"skip"``.
 
         Parameters
@@ -134,15 +134,10 @@ class Site:
         fit : str
             Without room on the site for its footprint: ``"as_is"`` places it all the same, ``"skip"`` leaves it out,
             ``"must"`` raises an `AssetError`.
-        settle_m : float, optional
-            On a slope, stand it between the heights about a foot of this radius, metres.
-        clear_m, margin_m, room_m : float, optional
-            Keep free of what follows: a disc about it, so much about its rectangle, so much about its outline.
         """
         z, at = thing.z, (thing.x, thing.y)
-        settle_m = room.get("settle_m")
-        if z is None and settle_m is not None:
-            z = self.foot_z(*at, settle_m)
+        if z is None and thing.settle_m is not None:
+            z = self.foot_z(*at, thing.settle_m)
         base = self.ground_z(*at) if z is None else z
         before = dict(self._counts)
         name = thing.node or self.node(thing.category)
@@ -170,24 +165,24 @@ class Site:
         if thing.z is None:
             self._on_ground.append(len(self.instances))
         self.instances.append(moved or instance)
-        self._reserve(thing, instance, room)
+        self._reserve(thing, instance)
         return instance
 
     def _has_room(self, area: BaseGeometry, low: float, high: float) -> bool:
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
 
-    def _reserve(self, thing: Placement, instance: Instance, room: Room) -> None:
-        if room.get("clear_m"):
-            self.occupy(disc(thing.x, thing.y, room["clear_m"]))
-        if room.get("margin_m"):
+    def _reserve(self, thing: Placement, instance: Instance) -> None:
+        if thing.clear_m:
+            self.occupy(disc(thing.x, thing.y, thing.clear_m))
+        if thing.margin_m:
             (x0, y0, _), (x1, y1, z1) = instance.bounds
             corners = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-            self.occupy(corners.buffer(room["margin_m"], quad_segs=2), -_BELOW_M, float(z1) + 8.0)
-        if room.get("room_m"):
+            self.occupy(corners.buffer(thing.margin_m, quad_segs=2), -_BELOW_M, float(z1) + 8.0)
+        if thing.room_m:
             low, high = instance.bounds[:, 2]
             variant = instance.variant or None
             outline = self.outline_of(thing.category, variant, (thing.x, thing.y), thing.yaw_deg)
-            self.occupy(outline.buffer(room["room_m"], quad_segs=2), float(low) - 1.0, float(high) + 6.0)
+            self.occupy(outline.buffer(thing.room_m, quad_segs=2), float(low) - 1.0, float(high) + 6.0)
 
     def design(self, category: str, node: str) -> str:
         """Draw the design of a node among those of the scene's side."""

@@ -155,8 +155,8 @@ def footbridge(
     """Lay a footbridge of the catalogue over a gap, a little lower than the higher bank."""
     frame = Frame(*at, yaw_deg)
     z = max(site.ground_z(*frame.at(side * span_m / 2, 0.0)) for side in (-1.0, 1.0)) - sunk_m
-    bridge = Placement("footbridge", *at, yaw_deg, DRAWN, z, place, params={"span": span_m})
-    site.place(bridge, margin_m=margin_m)
+    bridge = Placement("footbridge", *at, yaw_deg, DRAWN, z, place, params={"span": span_m}, margin_m=margin_m)
+    site.place(bridge)
 
 
 _SIDES = (-2.4, 2.4)

@@ -139,8 +139,8 @@ def fence_panels(
     category, _, variant = of.partition(":")
     for line in lines:
         for x, y, yaw_deg in stretches(line, panel_m):
-            panel = Placement(category, x, y, yaw_deg + turn_deg, variant or DRAWN, place=place)
-            site.place(panel, margin_m=margin_m)
+            turned = yaw_deg + turn_deg
+            site.place(Placement(category, x, y, turned, variant or DRAWN, place=place, margin_m=margin_m))
 
 
 @site_builder

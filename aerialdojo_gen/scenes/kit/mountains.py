@@ -199,8 +199,8 @@ def by_stream(
     """Place things by how far east of a winding stream they are, y, and yaw; on its banks, or at a height."""
     for category, dx, y, yaw in things:
         x = stream.x(y) + dx
-        thing = Placement(category, x, y, yaw, z=on, place=phrase)
-        site.place(thing, settle_m=0.5, margin_m=1.6 if on is None else 0.0)
+        margin_m = 1.6 if on is None else 0.0
+        site.place(Placement(category, x, y, yaw, z=on, place=phrase, settle_m=0.5, margin_m=margin_m))
 
 
 @ground_builder

@@ -118,7 +118,7 @@ def woods(
         if rng.random() > species[pick].share:
             continue
         category, _, variant = named[pick]
-        site.place(Placement(category, x, y, yaw, variant or DRAWN, place=place), "skip", settle_m=0.3)
+        site.place(Placement(category, x, y, yaw, variant or DRAWN, place=place, settle_m=0.3), "skip")
 
 
 @site_builder
@@ -141,9 +141,9 @@ def strew(
         turn = downhill_deg(site, x, y) if category == "fallen_log" else yaw
         thing = Placement(
             category, x, y, turn, variant or DRAWN, scale=scale, roles=roles, params=params, attributes=words,
-            solid=solid,
+            solid=solid, settle_m=0.5,
         )  # fmt: skip
-        count += site.place(thing, "skip", settle_m=0.5) is not None
+        count += site.place(thing, "skip") is not None
 
 
 @site_builder

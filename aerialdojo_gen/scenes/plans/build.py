@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.kit import kit
 from aerialdojo_gen.scenes.materials import refuse_unknown
 from aerialdojo_gen.scenes.mesh import Parts
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.placement import Placement, Room
+from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Pattern, Place, PlanHead, Structure, Thing
 from aerialdojo_gen.scenes.plans.values import PlanNames
 from aerialdojo_gen.scenes.recipe import validated
@@ -304,13 +304,12 @@ class _Building:
         given = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
         given = {key: value for key, value in given.items() if value}
         one = Placement(
-            category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid, **given
-        )
-        room: Room = {"clear_m": entry.clear_m, "margin_m": entry.margin_m, "room_m": entry.room_m}
-        if settles:
-            room["settle_m"] = entry.settle_m
+            category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid,
+            settle_m=entry.settle_m if settles else None, clear_m=entry.clear_m, margin_m=entry.margin_m,
+            room_m=entry.room_m, **given,
+        )  # fmt: skip
         try:
-            placed = self._site.place(one, entry.fit, **room) is not None
+            placed = self._site.place(one, entry.fit) is not None
         except AssetError as error:
             raise AssetError(f"{where}: {error}") from error
         if placed and entry.spots:

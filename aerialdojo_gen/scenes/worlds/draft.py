@@ -41,7 +41,7 @@ class Slot:
     yaw_deg: float  # Where the front of what stands there looks
     room_m: tuple[float, float]  # Room along the front's direction, and across it
     on: float | str | None  # Height, or its name; the ground where None
-    settle_m: float | None  # On a slope: see `Site.place`
+    settle_m: float | None  # On a slope: see `Placement`
 
 
 class Draft:
