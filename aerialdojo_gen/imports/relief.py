@@ -16,9 +16,8 @@ from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.relief_props import place_things
-from aerialdojo_gen.scenes.height_table import heights_text
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.terrain import Terrain, heights_text
 
 Floats = NDArray[np.float64]
 

@@ -147,9 +147,8 @@ def burst_tank(
         face = Polygon(
             [(0, 0.3), (length, 0.3), (length, top + fray[0]), (length / 2, top + fray[1]), (0, top + fray[2])]
         )
-        body = torn_wall(p0, p1, face, (), rng, (), 0.08)
-        if body is not None:
-            parts.append((shell if near < 0.6 else "rust", body))
+        material = shell if near < 0.6 else "rust"
+        parts += [(material, body) for body in torn_wall(p0, p1, face, (), rng, (), 0.08)]
         if near > 0.45 and k % 2 == 0:
             plate = translated(
                 box(size=[height_m * 0.45, length * 1.3, 0.07], taper=(0.6, 1.0)), (height_m * 0.2, 0, 0)
@@ -282,9 +281,7 @@ def torn_yard_wall(
         top = max(site.ground_z(*a), site.ground_z(*b)) + height_m
         face = Polygon([(0, low - 0.6), (length, low - 0.6), (length, top), (0, top)])
         tear = replace(hole, z0_m=low + hole.z0_m, z1_m=low + hole.z1_m)
-        body = torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)
-        if body is not None:
-            parts.append((brick, body))
+        parts += [(brick, body) for body in torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)]
     site.add("yard_wall", "yard_wall", parts)
     for a, b in runs:
         corners = [(a[0] - 0.4, a[1] - 0.4), (b[0] + 0.4, a[1] - 0.4), (b[0] + 0.4, b[1] + 0.4),
@@ -299,9 +296,8 @@ def step_walls(site: Site, *, y: Number, spans: list[tuple[Number, Number]]) -> 
     for x0, x1 in spans:
         low, high = site.ground_z((x0 + x1) / 2, y - 1.5), site.ground_z((x0 + x1) / 2, y + 1.5)
         face = Polygon([(0, low - 0.5), (x1 - x0, low - 0.5), (x1 - x0, high + 0.5), (0, high + 0.5)])
-        body = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
-        if body is not None:
-            parts.append(("concrete", body))
+        wall = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
+        parts += [("concrete", body) for body in wall]
         site.occupy(rectangle(x0, y - 1.0, x1, y + 0.4))
     site.add("retaining_wall", "retaining_wall", parts)
 

@@ -157,9 +157,8 @@ def _shell(wreck: Wreck, rng: np.random.Generator) -> Parts:
         if side % 2 and wreck.ridge_m:
             outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
         openings = _openings(wreck, length, side)
-        body = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
-        if body is not None:
-            parts.append((style.wall, body))
+        wall = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
+        parts += [(style.wall, body) for body in wall]
         parts += _windows(wreck, a, b, openings, rng)
     return parts
 
@@ -252,9 +251,8 @@ def _partitions(wreck: Wreck, rng: np.random.Generator) -> Parts:
             x = -wreck.length_m / 2 + k * wreck.length_m / count
             face = Polygon([(0, z0), (2 * y, z0), (2 * y, z1), (0, z1)])
             u = y * (0.6 + 0.8 * ((storey + k) % 2))
-            body = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
-            if body is not None:
-                parts.append((style.inner[(storey + k) % len(style.inner)], body))
+            wall = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
+            parts += [(style.inner[(storey + k) % len(style.inner)], body) for body in wall]
     return parts
 
 

@@ -19,7 +19,6 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.scenes.grammar import box_between, slab
 from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
-from aerialdojo_gen.scenes.height_table import read_heights
 from aerialdojo_gen.scenes.kit import ground_builder, part_builder, site_builder
 from aerialdojo_gen.scenes.kit.buildings import facade, pitched_roof
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, translated
@@ -27,7 +26,7 @@ from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 from aerialdojo_gen.scenes.plans.values import Area, Box, Material, Number
 from aerialdojo_gen.scenes.shapes_extruded import triangulate
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.terrain import Terrain, read_heights
 
 _SHOP_M = 4.0
 # A shop window wants storeys above it, or it is the whole house.

@@ -96,11 +96,11 @@ def _wave(seed: int) -> Floats:
 def torn_wall(
     a: XY, b: XY, face: BaseGeometry, bites: Sequence[Bite], rng: np.random.Generator,
     openings: Sequence[tuple[float, float, float, float]] = (), thickness_m: float = 0.28,
-) -> Mesh | None:  # fmt: skip
-    """Make what is left of an upright wall.
+) -> list[Mesh]:  # fmt: skip
+    """Make what is left of an upright wall: one mesh, or none where nothing stands.
 
     `a` and `b` are the ends of its middle line, `face` is the whole wall as (along, up) in metres, openings are
-    (from, to, sill, head). None where nothing stands.
+    (from, to, sill, head).
     """
     top = face.bounds[3]
     face = opened(face, openings)
@@ -109,9 +109,8 @@ def torn_wall(
     yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
     # Tears and openings that all but touch leave slivers that cannot be triangulated.
     pieces = [p for p in polygons_of(shapely.set_precision(face, _GRID_M)) if p.area >= _CRUMB_M2]
-    if not pieces:
-        return None
-    return posed(upright(pieces, thickness_m), rotation(0.0, 0.0, yaw), (*a, 0.0))
+    turn = rotation(0.0, 0.0, yaw)
+    return [posed(upright(pieces, thickness_m), turn, (*a, 0.0))] if pieces else []
 
 
 def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh | None:
