@@ -85,7 +85,8 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
         for instance in instances:
             rest = []
             for part in instance.parts:
-                boxed = _in_box(part, cut)
+                middle = part.vertices[part.faces].mean(axis=1)
+                boxed = ((middle >= cut.low_m) & (middle <= cut.high_m)).all(axis=1)
                 inside += [_subset(part, boxed)] if boxed.any() else []
                 surfaces |= {instance.surface} if boxed.any() else set()
                 rest += [part if not boxed.any() else _subset(part, ~boxed)] if not boxed.all() else []
@@ -100,11 +101,6 @@ def cut_out(scene: Scene, cuts: tuple[Cut, ...]) -> Scene:
         surface = "ground" if "ground" in surfaces else "sheet" if surfaces - {""} else ""
         instances = [*kept, Instance(cut.node, cut.category, "", attributes, tuple(inside), surface=surface)]
     return replace(scene, instances=tuple(instances))
-
-
-def _in_box(part: Part, cut: Cut) -> NDArray[np.bool_]:
-    middle = part.vertices[part.faces].mean(axis=1)
-    return np.asarray(((middle >= cut.low_m) & (middle <= cut.high_m)).all(axis=1))
 
 
 def _subset(part: Part, faces: NDArray[np.bool_]) -> Part:

@@ -92,7 +92,9 @@ def _snapped(area: BaseGeometry) -> BaseGeometry:
 
 def _flat_mesh(layer: Surface, terrain: Terrain) -> Mesh:
     z = float(terrain.heights_m[0, 0]) + layer.rise_m
-    pieces = [_lifted(*triangulate(p), z=z) for p in polygons_of(layer.area)]
+    pieces = []
+    for flat, faces in map(triangulate, polygons_of(layer.area)):
+        pieces.append(_from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces)))
     return merge(pieces) if pieces else mesh([], [])
 
 
@@ -133,8 +135,9 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
         pieces.append(Mesh(np.column_stack([flat, z]), cut_faces))
     if not pieces:
         return mesh([], [])
-    whole = _compact(merge(pieces))
-    return _from_above(mesh(whole.vertices + np.array([0.0, 0.0, layer.rise_m]), whole.faces))
+    whole = merge(pieces)
+    used, faces = np.unique(whole.faces, return_inverse=True)
+    return _from_above(mesh(whole.vertices[used] + np.array([0.0, 0.0, layer.rise_m]), faces))
 
 
 def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
@@ -146,11 +149,6 @@ def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
         alone = np.bincount(plan, minlength=len(plans))[plan] == 1
         whole[plan[alone]] = pieces[piece[alone]]
     return np.asarray(shapely.intersection(whole, plans))
-
-
-def _compact(m: Mesh) -> Mesh:
-    used, faces = np.unique(m.faces, return_inverse=True)
-    return Mesh(m.vertices[used], faces.reshape(-1, 3).astype(np.int32))
 
 
 def _kerb(layer: Surface, terrain: Terrain) -> Mesh:
@@ -174,10 +172,6 @@ def outer_walls(plan: Polygon, longest_m: float, heights: Callable[[Floats], tup
         # Shapely leaves the sense of rings open; the filled side must lie behind the wall.
         walls.append(mesh(corners, faces if ring.is_ccw == (k == 0) else faces[:, ::-1]))
     return walls
-
-
-def _lifted(flat: Floats, faces: np.ndarray, z: float) -> Mesh:
-    return _from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces))
 
 
 def _from_above(m: Mesh) -> Mesh:

@@ -44,7 +44,12 @@ def stilt_huts(
         frame, wall = Frame(x, y, yaw_deg), walls[number % len(walls)]
         floor = site.ground_z(x, y) + 0.9 if on is None else on
         ground = min(site.ground_z(*frame.at(u, v)) for u in (-d, front) for v in (-w, w))
-        parts = _stilts(d, w, front, ground, floor) + _room(d, w, front, floor, wall, roof, trim)
+        feet = [(u, v) for u in (-d + 0.2, 0.0, d, front - 0.15) for v in (-w + 0.2, w - 0.2)]
+        parts: Parts = [
+            ("boards:#b0956a", block(-d - 0.1, -w - 0.1, front, w + 0.1, floor - 0.16, floor)),
+            ("logs:#7a6248", columns(feet, ground - 0.8, floor - 0.16, 0.13, 7)),
+            *_room(d, w, front, floor, wall, roof, trim),
+        ]
         plan = rectangle(-d - 0.2, -w - 0.2, front + 0.1, w + 0.2)
         if steps:
             foot = front + 0.9 * (floor - ground) + 0.3
@@ -53,14 +58,6 @@ def stilt_huts(
                             stringer="wood")  # fmt: skip
             plan = plan.union(rectangle(front, -0.8, foot, 0.8))
         site.add(None, "thatched_hut", frame.parts(parts), footprint=frame.area(plan))
-
-
-def _stilts(d: float, w: float, front: float, ground: float, floor: float) -> Parts:
-    feet = [(u, v) for u in (-d + 0.2, 0.0, d, front - 0.15) for v in (-w + 0.2, w - 0.2)]
-    return [
-        ("boards:#b0956a", block(-d - 0.1, -w - 0.1, front, w + 0.1, floor - 0.16, floor)),
-        ("logs:#7a6248", columns(feet, ground - 0.8, floor - 0.16, 0.13, 7)),
-    ]
 
 
 def _room(d: float, w: float, front: float, z: float, wall: str, roof: str, trim: str) -> Parts:

@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.portable import distances_along, power
 from aerialdojo_gen.scenes.ground import ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.landforms import grid
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
 from aerialdojo_gen.scenes.shapes import crown
@@ -123,19 +123,13 @@ def crags(site: Site, *, crags: list[Crag], materials: tuple[Material, Material]
             # A crown reaches as far below its middle as above: half of it stays in the ground.
             body = crown(radii=(wide, wide * 0.8, tall), noise=0.34, subdivisions=2, seed=int(rng.integers(1 << 20)))
             tilt = (float(rng.uniform(-8, 8)), float(rng.uniform(-8, 8)), float(rng.uniform(0, 360)))
-            body = _faceted(rotated(body, rotation(*tilt)))
+            body = rotated(body, rotation(*tilt))
+            # The lower half is cut away where it would lie deep in the ground, so that no triangle is wasted.
+            body = Mesh(np.maximum(body.vertices, (-np.inf, -np.inf, body.vertices[:, 2].min() * 0.45)), body.faces)
             parts.append((materials[k % 2], translated(body, (x, y, site.ground_z(x, y) - 0.15 * tall))))
         by_material = {m: merge([b for n, b in parts if n == m]) for m in dict.fromkeys(m for m, _ in parts)}
         area = Point(crag.at).buffer(crag.radius_m * 1.15, quad_segs=4)
         site.add(None, "crag", list(by_material.items()), footprint=area)
-
-
-def _faceted(body: Mesh) -> Mesh:
-    """Cut the lower half away where it would lie deep in the ground, so that no triangle is wasted."""
-    low = float(body.vertices[:, 2].min()) * 0.45
-    v: Floats = body.vertices.copy()
-    v[:, 2] = np.maximum(v[:, 2], low)
-    return Mesh(v, body.faces)
 
 
 @dataclass(frozen=True)

@@ -204,12 +204,9 @@ def _seats(
             yaw = math.atan2(q.y - p.y, q.x - p.x)
             places.setdefault(seat(p.x, p.y, row), []).append((p.x, p.y, tier.level_m(row), yaw))
     # Shapely's outlines run clockwise, so that outwards lies to the left of the way.
-    return [(material, _copies(_seat(), np.array(where))) for material, where in sorted(places.items())]
-
-
-def _seat() -> Mesh:
     back = translated(box(size=(0.44, 0.06, 0.46), taper=(0.85, 1.0)), (0.0, 0.13, 0.36))
-    return merge([back, translated(box(size=(0.44, 0.34, 0.43), taper=(1.0, 0.9)), (0.0, -0.09, 0.0))])
+    one = merge([back, translated(box(size=(0.44, 0.34, 0.43), taper=(1.0, 0.9)), (0.0, -0.09, 0.0))])
+    return [(material, _copies(one, np.array(where))) for material, where in sorted(places.items())]
 
 
 def _copies(body: Mesh, where: np.ndarray) -> Mesh:

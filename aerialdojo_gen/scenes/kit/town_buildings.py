@@ -74,7 +74,8 @@ def buildings(site: Site, *, buildings: list[Building]) -> None:
     Its floor is the lowest ground about it, as maps count heights, and its walls reach a little below.
     """
     for one in buildings:
-        plans, base = [body.plan for body in one.bodies], building_base(site, one)
+        plans = [body.plan for body in one.bodies]
+        base = min(site.ground_z(x, y) for plan in plans for x, y in plan.exterior.coords)
         parts: Parts = []
         for body, plan in zip(one.bodies, plans, strict=True):
             parts += _canopy(body, plan, base, one) if one.canopy else _body(site, body, plan, base, one)
@@ -86,11 +87,6 @@ def buildings(site: Site, *, buildings: list[Building]) -> None:
             # What stands on a flat roof stands within its parapet.
             top = base + body.top_m - (PARAPET_M if body.roof == "flat" else 0.0)
             site.occupy(plan.buffer(0.15), low if body.base_m < 3.0 else base + body.base_m, top - 0.01)
-
-
-def building_base(site: Site, building: Building) -> float:
-    """Height of a building's ground floor: the lowest ground about it, metres."""
-    return min(site.ground_z(x, y) for body in building.bodies for x, y in body.plan.exterior.coords)
 
 
 def _body(site: Site, body: Body, plan: Polygon, base: float, building: Building) -> Parts:

@@ -43,7 +43,10 @@ def wreck(
     if lean_deg:
         return
     for k, bite in enumerate(bites):
-        _rubble(draft, pose, bite, f"{name}_{k}")
+        # What fell out of the hole.
+        at = beside(pose, bite["x"], bite["y"] + (1.8 if bite["y"] > 0 else -1.8))
+        radius = 2.4 + 0.5 * bite["foot_m"] + 0.25 * bite["head_m"]
+        heap(draft, f"heap_{name}_{k}", at, radius, draft.number(1.0, 2.4, f"{name}_{k}"))
     if bites:
         _rooms(draft, pose, (long, deep), name, storeys, bites)
     if not pitched:
@@ -75,13 +78,6 @@ def _bite(
         "x": round(u, 2), "y": round(side * deep * 0.5, 2), "foot_m": min(foot, head), "head_m": round(head, 1),
         "z0_m": z0, "z1_m": round(max(STOREY_M * storeys, z0 + 2.0), 1), "seed": draft.whole(0, 99, name, "bite", k),
     }  # fmt: skip
-
-
-def _rubble(draft: Draft, pose: Pose, bite: dict[str, float], name: str) -> None:
-    """Heap up what fell out of a hole."""
-    out = 1.8 if bite["y"] > 0 else -1.8
-    at = beside(pose, bite["x"], bite["y"] + out)
-    heap(draft, f"heap_{name}", at, 2.4 + 0.5 * bite["foot_m"] + 0.25 * bite["head_m"], draft.number(1.0, 2.4, name))
 
 
 def heap(draft: Draft, name: str, at: Point, radius_m: float, height_m: float) -> None:
