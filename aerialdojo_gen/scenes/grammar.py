@@ -17,8 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, rotated, rotation, translated
-from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 Polyline = Sequence[Sequence[float]]

@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mesh
-from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
+from aerialdojo_gen.scenes.shapes import triangulate, triangulate_all
 from aerialdojo_gen.scenes.terrain import Terrain
 
 # Polygons meet on this grid (metres), so that rounding cannot open slits between them.

@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, stand_plat
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.placement import footprint
-from aerialdojo_gen.scenes.shapes_extruded import upright
+from aerialdojo_gen.scenes.shapes import upright
 
 HARBORS = ["I_Harbor_0", "I_Harbor_1"]
 of_each_harbor = each_scene(HARBORS)

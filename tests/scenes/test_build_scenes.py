@@ -26,7 +26,7 @@ from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle
 from aerialdojo_gen.scenes.kit.streets import crossings, parking_row, streets
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
+from aerialdojo_gen.scenes.shapes import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
 

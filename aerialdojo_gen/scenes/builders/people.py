@@ -10,8 +10,7 @@ import numpy as np
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import limb, vec
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, merge, posed, rotation, stretched, translated
-from aerialdojo_gen.scenes.shapes import box, cylinder, lathe, sphere, torus
-from aerialdojo_gen.scenes.shapes_extruded import profile, sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, lathe, profile, sphere, sweep, torus
 
 # Joints of a body of 1.75 m that stands, metres above its soles.
 _BODY_M = 1.75

@@ -22,8 +22,7 @@ from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
 from aerialdojo_gen.scenes.kit.wreckage import Bite, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 

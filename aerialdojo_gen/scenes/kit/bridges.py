@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.kit.structures import block, columns, deck, railing, 
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Box, Line, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import sweep, upright
+from aerialdojo_gen.scenes.shapes import sweep, upright
 from aerialdojo_gen.scenes.site import Site
 
 FOOTWAY_M = 0.12

@@ -24,8 +24,7 @@ from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, posed, rotated,
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Material, Number
-from aerialdojo_gen.scenes.shapes import box, sphere
-from aerialdojo_gen.scenes.shapes_extruded import prism, profile, sweep, upright
+from aerialdojo_gen.scenes.shapes import box, prism, profile, sphere, sweep, upright
 from aerialdojo_gen.scenes.site import Site
 
 _RoofKind = Literal["flat", "gable", "hip"]

@@ -21,8 +21,7 @@ from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translat
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 

@@ -18,7 +18,7 @@ from aerialdojo_gen.scenes.kit.steelwork import bars, plates, posts
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.plans.values import Box, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.shapes import extrude
 from aerialdojo_gen.scenes.site import Site
 
 _Opening = tuple[Number, Number, Number, Number]

@@ -20,8 +20,7 @@ from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translat
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
-from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import prism
+from aerialdojo_gen.scenes.shapes import box, prism
 from aerialdojo_gen.scenes.site import Site
 
 

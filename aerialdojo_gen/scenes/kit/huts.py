@@ -21,8 +21,7 @@ from aerialdojo_gen.scenes.kit.quays import bars
 from aerialdojo_gen.scenes.kit.structures import block, columns, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import profile, sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, profile, sweep
 from aerialdojo_gen.scenes.site import Site
 
 _Pose = tuple[Number, Number, Number]

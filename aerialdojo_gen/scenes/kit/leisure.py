@@ -18,8 +18,7 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cone, cylinder, sphere
-from aerialdojo_gen.scenes.shapes_extruded import prism, sweep
+from aerialdojo_gen.scenes.shapes import box, cone, cylinder, prism, sphere, sweep
 from aerialdojo_gen.scenes.site import Site
 
 _Words = Annotated[list[str], Field(min_length=1)]

@@ -17,7 +17,7 @@ from aerialdojo_gen.scenes.kit.structures import block
 from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import prism
+from aerialdojo_gen.scenes.shapes import prism
 from aerialdojo_gen.scenes.site import Site
 
 _GARAGE_ROOF_M = 3.12

@@ -20,8 +20,7 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Point, block, columns, leg, rail_legs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3
-from aerialdojo_gen.scenes.shapes import box, crown, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 

@@ -23,8 +23,7 @@ from aerialdojo_gen.scenes.kit.structures import Point, block, leg
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
-from aerialdojo_gen.scenes.shapes import cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 BED_M = 0.35

@@ -35,8 +35,7 @@ from aerialdojo_gen.scenes.kit.wreckage import (
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
-from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 Extent = Annotated[Number, Field(ge=3, le=200)]

@@ -24,8 +24,7 @@ from aerialdojo_gen.scenes.ground import polygons_of
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, crown, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 

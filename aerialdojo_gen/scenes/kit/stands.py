@@ -22,8 +22,7 @@ from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Material, Number
-from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, sweep
 from aerialdojo_gen.scenes.site import Site
 
 SEAT_M = 0.6

@@ -17,8 +17,7 @@ from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Point, block, leg, rail_legs, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number, Point3
-from aerialdojo_gen.scenes.shapes import box, lathe
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, lathe, sweep
 from aerialdojo_gen.scenes.site import Site
 
 

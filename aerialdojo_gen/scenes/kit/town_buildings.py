@@ -24,7 +24,7 @@ from aerialdojo_gen.scenes.kit.buildings import facade, pitched_roof
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, translated
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
 from aerialdojo_gen.scenes.plans.values import Area, Box, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import triangulate
+from aerialdojo_gen.scenes.shapes import triangulate
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, read_heights
 

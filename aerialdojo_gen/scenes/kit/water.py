@@ -25,7 +25,7 @@ from aerialdojo_gen.scenes.kit.structures import block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 

@@ -24,8 +24,7 @@ from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit.buildings import opened
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Material, Number
-from aerialdojo_gen.scenes.shapes import box, crown
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep, upright
+from aerialdojo_gen.scenes.shapes import box, crown, extrude, sweep, upright
 
 XY = tuple[float, float]
 
