@@ -136,8 +136,8 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
     if not pieces:
         return mesh([], [])
     whole = merge(pieces)
-    used, faces = np.unique(whole.faces, return_inverse=True)
-    return _from_above(mesh(whole.vertices[used] + np.array([0.0, 0.0, layer.rise_m]), faces))
+    used, index = np.unique(whole.faces, return_inverse=True)
+    return _from_above(mesh(whole.vertices[used] + np.array([0.0, 0.0, layer.rise_m]), index.reshape(-1, 3)))
 
 
 def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
