@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError, check_regular, no_package
 from aerialdojo_gen.imports.earth import Bbox, format_bbox
-from aerialdojo_gen.scenes.height_table import read_ascii_grid
+from aerialdojo_gen.scenes.terrain import read_ascii_grid
 
 Floats = NDArray[np.float64]
 # Surveys have far fewer; crop a continental model first.

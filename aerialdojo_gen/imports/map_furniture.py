@@ -14,12 +14,11 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.scenes.grammar_buildings import before_walls, oriented_rectangle
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
-from aerialdojo_gen.scenes.grammar_streets import parking_row
-from aerialdojo_gen.scenes.kit.roofs import PARAPET_M
+from aerialdojo_gen.scenes.grammar import Frame, Pose, poisson_disc
+from aerialdojo_gen.scenes.kit.buildings import before_walls, oriented_rectangle
 from aerialdojo_gen.scenes.kit.street_network import StreetLayout
+from aerialdojo_gen.scenes.kit.streets import parking_row
+from aerialdojo_gen.scenes.kit.town_buildings import PARAPET_M
 
 # What stands along pavements, before shops and on roofs, in turn.
 _IN_TURN = {place: things.split() for place, things in TABLES["furniture"].items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerialdojo_gen.scenes.grammar_scatter import Pose
+from aerialdojo_gen.scenes.grammar import Pose
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.site import MAX_NODES, Site
 
@@ -37,8 +37,8 @@ class Placer:
         x, y, yaw_deg = round(pose.x, 2), round(pose.y, 2), round(pose.yaw_deg % 360.0, 1)
         settle_m = None if on is not None else settle_m or self._settle_m
         variant = DRAWN if drawn and variant is None else variant
-        one = Placement(category, x, y, yaw_deg, variant, on, phrase, scale=scale)
-        thing = self.site.place(one, "skip", settle_m=settle_m)
+        one = Placement(category, x, y, yaw_deg, variant, on, phrase, scale=scale, settle_m=settle_m)
+        thing = self.site.place(one, "skip")
         if thing is None:
             return False
         what = f"{category}:{thing.variant}" if thing.variant else category

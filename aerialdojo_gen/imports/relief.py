@@ -18,11 +18,10 @@ from aerialdojo_gen.imports.dem import Dem, describe_coverage
 from aerialdojo_gen.imports.earth import Bbox, LocalFrame, format_bbox, size_m
 from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
-from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
-from aerialdojo_gen.scenes.height_table import heights_text
-from aerialdojo_gen.scenes.kit.surveyed_ground import surface_areas
+from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
+from aerialdojo_gen.scenes.kit.town_buildings import surface_areas
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.terrain import Terrain, heights_text
 
 Floats = NDArray[np.float64]
 

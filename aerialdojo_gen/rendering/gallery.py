@@ -21,7 +21,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.mesh import to_part
 from aerialdojo_gen.scenes.model import Instance, Scene
-from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.shapes import extrude
 from aerialdojo_gen.store.atomic import atomic_file
 
 Image = NDArray[np.uint8]

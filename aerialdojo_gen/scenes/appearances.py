@@ -10,6 +10,7 @@ from typing import Any
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.colours import COLOURS
+from aerialdojo_gen.scenes.materials import refuse_unknown
 
 FORMS = ("round", "boxy", "flat", "slender", "tapering", "pointed", "sloping", "upright", "level")
 MEASURES = ("length", "width", "height")
@@ -104,9 +105,7 @@ def parse_appearances(raw: Any, names: Sequence[str], materials: Sequence[str], 
 def _appearance(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Appearance:
     if not isinstance(entry, dict) or not {"say", "adjective"} & set(entry):
         raise AssetError(f"{where}: must be a table with say or adjective: its words, and what they claim")
-    for key in entry:
-        if key not in _KEYS:
-            raise AssetError(f"{where}: unknown key {key!r}{nearest(key, _KEYS)}")
+    refuse_unknown(entry, _KEYS, where)
     if "also" in entry and "say" not in entry:
         raise AssetError(f"{where}: also needs say")
     say, also = _words(entry, "say", where), _words(entry, "also", where)
@@ -163,9 +162,7 @@ def _choices(entry: Mapping[str, Any], key: str, known: Sequence[str], where: st
     out = {}
     for name, value in _table(entry, key, where).items():
         words = tuple(value.split("|")) if isinstance(value, str) else ()
-        for word in words or (str(value),):
-            if word not in known:
-                raise AssetError(f"{where} {key}: unknown {key} {word!r}{nearest(word, known)}")
+        refuse_unknown(words or (str(value),), known, f"{where} {key}", key)
         out[name] = words
     return out
 

@@ -10,8 +10,8 @@ import shapely
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.footprints import footprint
 from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.placement import footprint
 
 # They hang on walls.
 HUNG = frozenset({"dock_door", "shop_sign", "storefront", "wall_banner", "wall_clock"})
@@ -26,14 +26,14 @@ _MIN_SEEN = 1 / 3  # of the free volume, by each landmark
 _VIEWS = 300
 
 
-def faults(scene: Scene, catalogue: Catalogue, reach_m: float = 1.5) -> Iterator[tuple[str, str]]:
+def faults(scene: Scene, catalogue: Catalogue) -> Iterator[tuple[str, str]]:
     """Yield what is wrong with a scene: a reason that is counted, and what it is about."""
     if not MIN_TRIANGLES <= scene.n_triangles <= MAX_TRIANGLES:
         yield "triangles", f"{scene.n_triangles:,}"
     things = {(i.category, i.variant, i.attributes.get("colour", "")) for i in targets_of(scene, catalogue)}
     if len(things) < _MIN_THINGS:
         yield "few things to look for", str(len(things))
-    for node in floating(scene, catalogue, HUNG, reach_m):
+    for node in floating(scene, catalogue, HUNG, 1.5):
         yield "floats", node
     for one, other in clashes(scene, catalogue, 0.1, SPANNING):
         yield "stands in another", f"{one} and {other}"

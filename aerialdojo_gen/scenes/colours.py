@@ -24,9 +24,9 @@ _NEUTRAL, _AS_MUCH = ("white", "grey", "black"), 1.5
 
 
 def shown_colours(
-    parts: Sequence[Part], materials: Mapping[str, Material], n: int = _SAMPLES
+    parts: Sequence[Part], materials: Mapping[str, Material]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Sample about n surface colours of parts by area: colours (k, 3) uint8 sRGB and weights (k,)."""
+    """Sample some thousand surface colours of parts by area: colours (k, 3) uint8 sRGB and weights (k,)."""
     found: list[NDArray[np.uint8]] = []
     weights: list[NDArray[np.float64]] = []
     sizes = [areas(part.vertices, part.faces) for part in parts]
@@ -39,7 +39,7 @@ def shown_colours(
             found.append(np.array([material.colour], dtype=np.uint8))
             weights.append(np.array([own]))
             continue
-        colours = _sampled(part, material, size, max(16, round(n * own / whole)))
+        colours = _sampled(part, material, size, max(16, round(_SAMPLES * own / whole)))
         found.append(colours)
         weights.append(np.full(len(colours), own / max(len(colours), 1)))
     if not found:

@@ -14,7 +14,7 @@ from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.scenes.catalogue import single
 from aerialdojo_gen.scenes.mesh import Mesh, areas, translated
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.shapes_extruded import extrude
+from aerialdojo_gen.scenes.shapes import extrude
 
 Floats = NDArray[np.float64]
 # Heights of the ground at points: x and y, metres.

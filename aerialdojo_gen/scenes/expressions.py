@@ -108,49 +108,40 @@ def _parse(text: str, arrays: bool = False) -> tuple[Computed, frozenset[str]]:
         raise ShapeError(f"{text!r} is no arithmetic expression") from error
     used: set[str] = set()
     arity = {name: (_ARITY_OF_ARRAYS.get(name, 1),) * 2 for name in _OF_ARRAYS} if arrays else _ALL_ARITIES
-    _check(tree, text, used, arity)
-    return _compiled(tree, _OF_ARRAYS if arrays else _FUNCTIONS), frozenset(used)
+    computed = _compiled(tree, text, used, _OF_ARRAYS if arrays else _FUNCTIONS, arity)
+    return computed, frozenset(used)
 
 
-def _check(node: ast.expr, text: str, used: set[str], arities: Mapping[str, tuple[int, int]]) -> None:
+def _compiled(
+    node: ast.expr,
+    text: str,
+    used: set[str],
+    functions: Mapping[str, Callable[..., Any]],
+    arities: Mapping[str, tuple[int, int]],
+) -> Computed:
+    """Check an expression, collect its names, and make a function of them: it is computed many times."""
+
+    def inner(part: ast.expr) -> Computed:
+        return _compiled(part, text, used, functions, arities)
+
     match node:
-        case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
-            return
-        case ast.Name(id=name):
-            if name not in _CONSTANTS:
-                used.add(name)
-        case ast.BinOp() if type(node.op) in _BINARY:
-            _check(node.left, text, used, arities)
-            _check(node.right, text, used, arities)
-        case ast.UnaryOp() if type(node.op) in _UNARY:
-            _check(node.operand, text, used, arities)
-        case ast.Call(func=ast.Name(id=name), keywords=[]) if name in arities:
-            least, most = arities[name]
-            if not least <= len(node.args) <= most:
-                raise ShapeError(f"{text!r}: {name} does not take {len(node.args)} arguments")
-            for argument in node.args:
-                _check(argument, text, used, arities)
-        case _:
-            raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")
-
-
-def _compiled(node: ast.expr, functions: Mapping[str, Callable[..., Any]]) -> Computed:
-    """Make a function of names, by which an expression that has been checked is computed many times."""
-    match node:
-        case ast.Constant(value=int() | float() as number):
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return lambda _names: number
         case ast.Name(id=name) if name in _CONSTANTS:
             return lambda names: names.get(name, _CONSTANTS[name])
         case ast.Name(id=name):
+            used.add(name)
             return lambda names: names[name]
-        case ast.BinOp():
-            left, right = _compiled(node.left, functions), _compiled(node.right, functions)
-            both = _BINARY[type(node.op)]
+        case ast.BinOp() if type(node.op) in _BINARY:
+            left, right, both = inner(node.left), inner(node.right), _BINARY[type(node.op)]
             return lambda names: both(left(names), right(names))
-        case ast.UnaryOp():
-            operand, sign = _compiled(node.operand, functions), _UNARY[type(node.op)]
+        case ast.UnaryOp() if type(node.op) in _UNARY:
+            operand, sign = inner(node.operand), _UNARY[type(node.op)]
             return lambda names: sign(operand(names))
-        case ast.Call(func=ast.Name(id=name)):
-            function, arguments = functions[name], [_compiled(one, functions) for one in node.args]
+        case ast.Call(func=ast.Name(id=name), keywords=[]) if name in functions:
+            least, most = arities[name]
+            if not least <= len(node.args) <= most:
+                raise ShapeError(f"{text!r}: {name} does not take {len(node.args)} arguments")
+            function, arguments = functions[name], [inner(one) for one in node.args]
             return lambda names: function(*[one(names) for one in arguments])
-    raise ShapeError(f"{ast.unparse(node)!r} is not allowed")
+    raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")

@@ -92,9 +92,12 @@ def read_glb(path: Path, sha256: str = "") -> Scene:
                 f"{path}: scene format {extras['version']} is not {_VERSION}; "
                 f"run {command('build-scenes', scene=path.stem)}"
             )
-        materials = [
-            read_material(m, lambda texture: _image_file(texture, document, data)) for m in document["materials"]
-        ]
+
+        def image(texture: int) -> memoryview:
+            found = document["images"][document["textures"][texture]["source"]]
+            return _view_bytes(found["bufferView"], document, data)
+
+        materials = [read_material(m, image) for m in document["materials"]]
         names = [m.name for m in materials]
         instances = tuple(
             _read_instance(document["nodes"][k], document, data, names) for k in document["nodes"][0]["children"]
@@ -263,11 +266,6 @@ def _check(scene: Scene) -> None:
         raise ValueError("a coordinate is no finite number")
     if not all(i.parts and all(len(p.faces) and len(p.uv) == len(p.vertices) for p in i.parts) for i in shown):
         raise ValueError("a node has no triangle")
-
-
-def _image_file(texture: int, document: dict[str, Any], data: memoryview) -> memoryview:
-    image = document["images"][document["textures"][texture]["source"]]
-    return _view_bytes(image["bufferView"], document, data)
 
 
 def _read_instance(

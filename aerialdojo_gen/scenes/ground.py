@@ -6,7 +6,7 @@ terrain's own triangles. So a mark lies exactly in the road, nothing overlaps, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.geometry.portable import dot
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, mesh
-from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
+from aerialdojo_gen.scenes.shapes import triangulate, triangulate_all
 from aerialdojo_gen.scenes.terrain import Terrain
 
 # Polygons meet on this grid (metres), so that rounding cannot open slits between them.
@@ -92,7 +92,9 @@ def _snapped(area: BaseGeometry) -> BaseGeometry:
 
 def _flat_mesh(layer: Surface, terrain: Terrain) -> Mesh:
     z = float(terrain.heights_m[0, 0]) + layer.rise_m
-    pieces = [_lifted(*triangulate(p), z=z) for p in polygons_of(layer.area)]
+    pieces = []
+    for flat, faces in map(triangulate, polygons_of(layer.area)):
+        pieces.append(_from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces)))
     return merge(pieces) if pieces else mesh([], [])
 
 
@@ -133,8 +135,9 @@ def _draped_mesh(layer: Surface, tiles: _Tiles) -> Mesh:
         pieces.append(Mesh(np.column_stack([flat, z]), cut_faces))
     if not pieces:
         return mesh([], [])
-    whole = _compact(merge(pieces))
-    return _from_above(mesh(whole.vertices + np.array([0.0, 0.0, layer.rise_m]), whole.faces))
+    whole = merge(pieces)
+    used, index = np.unique(whole.faces, return_inverse=True)
+    return _from_above(mesh(whole.vertices[used] + np.array([0.0, 0.0, layer.rise_m]), index.reshape(-1, 3)))
 
 
 def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
@@ -148,33 +151,27 @@ def _cut(area: BaseGeometry, plans: NDArray[np.object_]) -> NDArray[np.object_]:
     return np.asarray(shapely.intersection(whole, plans))
 
 
-def _compact(m: Mesh) -> Mesh:
-    used, faces = np.unique(m.faces, return_inverse=True)
-    return Mesh(m.vertices[used], faces.reshape(-1, 3).astype(np.int32))
-
-
 def _kerb(layer: Surface, terrain: Terrain) -> Mesh:
-    walls: list[Mesh] = []
-    for piece in polygons_of(layer.area):
-        for k, ring in enumerate((piece.exterior, *piece.interiors)):
-            # Walls follow the ground: no stretch is longer than a cell of the terrain.
-            xy = np.array(shapely.segmentize(ring, terrain.cell_m).coords)[:, :2]
-            z = terrain.z(xy[:, 0], xy[:, 1])
-            low, high = np.column_stack([xy, z - 0.02]), np.column_stack([xy, z + layer.rise_m])
-            n = len(xy)
-            a = np.arange(n - 1)
-            outwards = np.concatenate(
-                [np.column_stack([a, a + 1, a + 1 + n]), np.column_stack([a, a + 1 + n, a + n])]
-            )
-            # Shapely leaves the sense of rings open; the filled side must lie behind the wall.
-            if ring.is_ccw != (k == 0):
-                outwards = outwards[:, ::-1]
-            walls.append(mesh(np.concatenate([low, high]), outwards))
-    return merge(walls)
+    def heights(xy: Floats) -> tuple[Floats, Floats]:
+        z = terrain.z(*xy.T)
+        return z - 0.02, z + layer.rise_m
+
+    # Walls follow the ground: no stretch is longer than a cell of the terrain.
+    return merge([w for piece in polygons_of(layer.area) for w in outer_walls(piece, terrain.cell_m, heights)])
 
 
-def _lifted(flat: Floats, faces: np.ndarray, z: float) -> Mesh:
-    return _from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces))
+def outer_walls(plan: Polygon, longest_m: float, heights: Callable[[Floats], tuple[Floats, Floats]]) -> list[Mesh]:
+    """Make the walls of a plan's rings between lower and upper heights, (n,) each, that its points (n, 2) have."""
+    walls = []
+    for k, ring in enumerate((plan.exterior, *plan.interiors)):
+        xy = np.array(shapely.segmentize(ring, longest_m).coords)[:, :2]
+        corners = np.concatenate([np.column_stack([xy, z]) for z in heights(xy)])
+        n = len(xy)
+        a = np.arange(n - 1)
+        faces = np.concatenate([np.column_stack([a, a + 1, a + 1 + n]), np.column_stack([a, a + 1 + n, a + n])])
+        # Shapely leaves the sense of rings open; the filled side must lie behind the wall.
+        walls.append(mesh(corners, faces if ring.is_ccw == (k == 0) else faces[:, ::-1]))
+    return walls
 
 
 def _from_above(m: Mesh) -> Mesh:

@@ -10,8 +10,7 @@ from shapely.ops import unary_union
 
 from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mesh, translated
-from aerialdojo_gen.scenes.shapes import _positive, number
-from aerialdojo_gen.scenes.shapes_extruded import extrude, triangulate
+from aerialdojo_gen.scenes.shapes import _positive, extrude, number, triangulate
 
 # Strokes are parted by blanks; every point is two digits, x 0-4 and y 0-6.
 _STROKES = {

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from aerialdojo_gen.base import rng
 
@@ -24,10 +24,8 @@ _TILT_DEG = 23.44
 _DUSK_DEG, _LOWEST_DEG, _HIGHEST_DEG = 7.0, 12.0, 65.0
 
 
-class LightHead(BaseModel):
+class LightHead(BaseModel, frozen=True, extra="forbid"):
     """The table ``[light]`` of a plan: when and where on earth it is, and the weather."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     latitude_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
     date: Annotated[str, Field(pattern=r"^[0-9]{2}-[0-9]{2}$")] = "06-21"  # Month and day

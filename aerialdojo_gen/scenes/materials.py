@@ -119,8 +119,7 @@ def load_materials(path: Path) -> MaterialLibrary:
             raise AssetError(f"{where} is no table")
         refuse_unknown(body, _KEYS, where)
         texture, colour, tile_m = body.get("texture"), body.get("colour"), body.get("tile_m", 1.0)
-        if texture is not None and (not isinstance(texture, str) or texture not in TEXTURES):
-            raise AssetError(f"{where}: unknown texture {texture!r}{nearest(str(texture), TEXTURES)}")
+        refuse_unknown([] if texture is None else [texture], TEXTURES, where, "texture")
         if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
             raise AssetError(f"{where}: colour must be of the form #rrggbb, got {colour!r}")
         if not isinstance(tile_m, int | float) or not _SMALLEST_TILE_M <= tile_m <= _LARGEST_TILE_M:
@@ -154,12 +153,12 @@ def parse_colour(text: str) -> tuple[int, int, int]:
     return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
 
 
-def refuse_unknown(body: Iterable[str], known: Iterable[str], where: str) -> None:
-    """Raise an `AssetError` for the first key that is not among the known ones."""
-    names = set(known)
+def refuse_unknown(body: Iterable[Any], known: Iterable[str], where: str, what: str = "key") -> None:
+    """Raise an `AssetError` for the first key, or name of another thing, that is not among the known ones."""
+    names = list(known)
     for key in body:
         if key not in names:
-            raise AssetError(f"{where}: unknown key {key!r}{nearest(key, names)}")
+            raise AssetError(f"{where}: unknown {what} {key!r}{nearest(str(key), names)}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.geometry.portable import product
-from aerialdojo_gen.scenes.mesh_kernels import face_areas, larger_faces, textured, volume_terms
+from aerialdojo_gen.scenes.kernels import face_areas, larger_faces, textured, volume_terms
 from aerialdojo_gen.scenes.model import Part
 
 Floats = NDArray[np.float64]
@@ -35,6 +35,10 @@ class Mesh:
     def volume_m3(self) -> float:
         """Signed volume: positive for a closed mesh whose faces are wound outwards."""
         return float(volume_terms(*_for_kernels(self.vertices, self.faces)).sum() / 6.0)
+
+
+Parts = list[tuple[str, Mesh]]
+"""Meshes with their materials, or with the roles that these have."""
 
 
 def mesh(vertices: ArrayLike, faces: ArrayLike, corner_uv: Floats | None = None) -> Mesh:
@@ -64,7 +68,9 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
     offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
     uv = None
     if any(m.corner_uv is not None for m in meshes):
-        uv = np.concatenate([_uv_or_nan(m) for m in meshes])
+        uv = np.concatenate(
+            [np.full((len(m.faces), 3, 2), np.nan) if m.corner_uv is None else m.corner_uv for m in meshes]
+        )
     return Mesh(
         np.concatenate([m.vertices for m in meshes]),
         np.concatenate([m.faces + np.int32(o) for m, o in zip(meshes, offsets, strict=True)]),
@@ -126,10 +132,6 @@ def to_part(m: Mesh, material: str, tile_m: float) -> Part:
     given = _NO_UV if m.corner_uv is None else np.ascontiguousarray(m.corner_uv, np.float64)
     vertices, faces, uv = textured(*_for_kernels(m.vertices, m.faces), given, float(tile_m))
     return Part(vertices, faces, uv, material)
-
-
-def _uv_or_nan(m: Mesh) -> Floats:
-    return np.full((len(m.faces), 3, 2), np.nan) if m.corner_uv is None else m.corner_uv
 
 
 def areas(v: Floats, f: Ints) -> Floats:

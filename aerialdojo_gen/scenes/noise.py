@@ -48,8 +48,13 @@ def cells(size: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floa
 def _cells(size: int, points: bytes) -> tuple[Floats, Floats, NDArray[np.int64]]:
     axis = (np.arange(size) + 0.5) / size
     x, y = np.meshgrid(axis, axis)
-    distance, owner = _nearest_two(np.frombuffer(points).reshape(-1, 2), np.column_stack([x.ravel(), y.ravel()]))
-    first, second = distance.T.reshape(2, size, size)
+    # Few textures need it, and it takes as long to load as all else that a catalogue needs.
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(np.frombuffer(points).reshape(-1, 2), boxsize=np.ones(2))
+    distance, index = tree.query(np.column_stack([x.ravel(), y.ravel()]), k=2)
+    owner = np.asarray(index, dtype=np.int64)
+    first, second = np.asarray(distance, dtype=np.float64).T.reshape(2, size, size)
     found = first, second, owner[:, 0].reshape(size, size)
     for array in found:
         array.flags.writeable = False
@@ -99,14 +104,6 @@ def texture_rng(name: str) -> np.random.Generator:
 def shade(colour: Floats, value: Floats) -> Floats:
     """Multiply a colour (3,) or an image (H, W, 3) by a brightness (H, W)."""
     return np.asarray(np.broadcast_to(colour, (*value.shape, 3)) * value[..., None])
-
-
-def _nearest_two(points: Floats, queries: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    # Few textures need it, and it takes as long to load as all else that a catalogue needs.
-    from scipy.spatial import cKDTree
-
-    distance, index = cKDTree(points, boxsize=np.ones(2)).query(queries, k=2)
-    return np.asarray(distance, dtype=np.float64), np.asarray(index, dtype=np.int64)
 
 
 def _smooth(t: Floats) -> Floats:

@@ -99,8 +99,7 @@ def parse_category(
     builder, parts = body.get("builder"), body.get("parts", [])
     if (builder is None) == (not parts):
         raise AssetError(f"{where}: give parts or a builder, one of them")
-    if builder is not None and (not isinstance(builder, str) or builder not in builders()):
-        raise AssetError(f"{where}: unknown builder {builder!r}{nearest(str(builder), builders())}")
+    refuse_unknown([] if builder is None else [builder], builders(), where, "builder")
     if not isinstance(parts, list):
         raise AssetError(f"{where}: parts must be an array of tables, [[{category}.parts]]")
     for k, part in enumerate(parts):
@@ -123,17 +122,14 @@ def parse_category(
         variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
     chosen = body.get("designs", "plain")
     sets = {"plain": (PLAIN,), **sets}
-    if isinstance(chosen, str) and chosen not in sets:
-        raise AssetError(f"{where}: unknown set of designs {chosen!r}{nearest(chosen, sets)}")
+    refuse_unknown([chosen] if isinstance(chosen, str) else [], sets, where, "set of designs")
     designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
     scale = body.get("scale", 1.0)
     if not isinstance(scale, int | float) or isinstance(scale, bool) or not _MIN_SCALE <= scale <= _MAX_SCALE:
         raise AssetError(f"{where}: scale must be a number from {_MIN_SCALE:g} to {_MAX_SCALE:g}, got {scale!r}")
     known = [one.name for one in designs]
     for k, part in enumerate(parts):
-        for one in designs_of(part):
-            if one not in known:
-                raise AssetError(f"{where} parts[{k}]: unknown design {one!r}{nearest(one, known)}")
+        refuse_unknown(designs_of(part), known, f"{where} parts[{k}]", "design")
     return Category(
         category,
         name,
@@ -181,8 +177,7 @@ def _check_part(
     if not isinstance(part, dict) or "shape" not in part:
         raise AssetError(f"{where}: shape is missing")
     shape = part["shape"]
-    if not isinstance(shape, str) or shape not in SHAPES:
-        raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
+    refuse_unknown([shape], SHAPES, where, "shape")
     where = f"{where} ({shape})"
     required, known = shape_keys(shape)
     refuse_unknown(part, PLACEMENT_KEYS | known, where)
@@ -209,11 +204,10 @@ def _check_part(
     if role not in roles:
         _check_material(role, roles, materials, where)
     try:
-        unknown = sorted(names_used(part) - params.keys())
+        used = sorted(names_used(part))
     except ShapeError as error:
         raise AssetError(f"{where}: {error}") from error
-    if unknown:
-        raise AssetError(f"{where}: unknown parameter {unknown[0]!r}{nearest(unknown[0], params)}")
+    refuse_unknown(used, params, where, "parameter")
 
 
 def _variant(

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import pydantic_core
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
@@ -44,10 +44,8 @@ HorizonKind = Literal[
 ]  # fmt: skip
 
 
-class Level(BaseModel):
+class Level(BaseModel, frozen=True, extra="forbid"):
     """A round place that is levelled for what stands on it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     at: tuple[Place, Place]  # (x, y); middle, metres, world frame
     radius_m: Annotated[float, Field(ge=0, le=50)] = 0.5
@@ -55,10 +53,8 @@ class Level(BaseModel):
     blend_m: Annotated[float, Field(ge=0, le=50)] = 2.0  # Width of the slope about it
 
 
-class Move(BaseModel):
+class Move(BaseModel, frozen=True, extra="forbid"):
     """Displacement of one node from where its plan places it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     by_m: tuple[Place, Place] = (0.0, 0.0)  # World frame, metres; what stands on the ground keeps its height above it
     up_m: Place = 0.0  # Upwards, metres
@@ -66,10 +62,8 @@ class Move(BaseModel):
     place: Annotated[str, Field(min_length=1, max_length=_MAX_TEXT)] | None = None
 
 
-class Origin(BaseModel):
+class Origin(BaseModel, frozen=True, extra="forbid"):
     """Geographic position of the origin of a real place's scene."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     lon_deg: Annotated[float, Field(ge=-180, le=180)] | None = None  # Longitude and latitude, WGS 84
     lat_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
@@ -78,10 +72,8 @@ class Origin(BaseModel):
     z_m: Annotated[float, Field(ge=-1e5, le=1e5)] = 0.0  # The height that is z = 0, metres
 
 
-class HorizonHead(BaseModel):
+class HorizonHead(BaseModel, frozen=True, extra="forbid"):
     """What lies beyond the flight volume."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: HorizonKind = ""  # The scene type's own where empty
     seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0
@@ -89,10 +81,8 @@ class HorizonHead(BaseModel):
     ground: Annotated[str, Field(max_length=60)] = ""  # Material of the land; that of the scene's edge
 
 
-class SceneHead(BaseModel):
+class SceneHead(BaseModel, frozen=True, extra="forbid"):
     """What a scene's file says of the scene as a whole."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     seed: Annotated[int, Field(ge=-(2**31), lt=2**31)] = 0  # Of everything drawn in the scene
     size_m: tuple[Extent, Extent]  # Extent along x and y, metres; the origin lies in the middle
@@ -127,10 +117,8 @@ class SceneHead(BaseModel):
         return float(x), float(y), float(z)
 
 
-class Cut(BaseModel):
+class Cut(BaseModel, frozen=True, extra="forbid"):
     """A box that a person drew around a thing for which a foreign mesh has no node."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     node: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]{0,79}$")  # Of the new node
     category: str = Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")
@@ -138,10 +126,8 @@ class Cut(BaseModel):
     high_m: tuple[Place, Place, Place]
 
 
-class Imported(BaseModel):
+class Imported(BaseModel, frozen=True, extra="forbid"):
     """Source and settings of a scene that ``add-scene`` imported from a mesh."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     source: str  # Name and digest of the mesh file
     source_sha256: str

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, Unpack, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import shapely
@@ -21,13 +21,12 @@ from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
 from aerialdojo_gen.scenes.contact import CONTACT_M, rest_on_ground
 from aerialdojo_gen.scenes.designs import of_side
-from aerialdojo_gen.scenes.footprints import Footprints, disc, footprint, hull
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
-from aerialdojo_gen.scenes.placement import DRAWN, Fit, Placement, Room
+from aerialdojo_gen.scenes.placement import DRAWN, Fit, Footprints, Placement, disc, footprint, hull
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 from aerialdojo_gen.scenes.turn import turned
@@ -59,7 +58,7 @@ class Site:
         self._moved_nodes: set[str] = set()
         self._on_ground: list[int] = []  # Indices of the things that stand on the ground
         self._footprints = Footprints()
-        self._terrain = flat_terrain(head.size_m)
+        self.terrain = flat_terrain(head.size_m)  # Heights of the ground
         self._base = "grass"
         self._surfaces: list[Surface] = []
         self._areas = np.empty(0, dtype=object)
@@ -89,17 +88,12 @@ class Site:
 
     def set_ground(self, terrain: Terrain | None = None, material: str = "grass") -> None:
         """Choose the heights (level at z = 0 by default) and what shows where nothing is painted; do it first."""
-        self._terrain = flat_terrain(self.head.size_m) if terrain is None else terrain
+        self.terrain = flat_terrain(self.head.size_m) if terrain is None else terrain
         for level in self.head.level:
             spot = Point(level.at)
             area = spot.buffer(level.radius_m) if level.radius_m else spot
-            self._terrain = self._terrain.flattened(area, level.z_m, level.blend_m)
+            self.terrain = self.terrain.flattened(area, level.z_m, level.blend_m)
         self._base = material
-
-    @property
-    def terrain(self) -> Terrain:
-        """Heights of the ground."""
-        return self._terrain
 
     def paint(self, area: BaseGeometry, material: str, rise_m: float = 0.0, edge: str = "concrete") -> None:
         """Paint an area of the ground over what was painted before; see `Surface`."""
@@ -111,7 +105,7 @@ class Site:
     def ground_z(self, x: float, y: float) -> float:
         """Height of the painted ground at a point, metres."""
         surface = self._surface(x, y)
-        return self._terrain.at(x, y) + (0.0 if surface is None else surface.rise_m)
+        return self.terrain.at(x, y) + (0.0 if surface is None else surface.rise_m)
 
     def ground_material(self, x: float, y: float) -> str:
         """Material of the painted ground at a point."""
@@ -126,12 +120,12 @@ class Site:
         return self._surfaces[holds[-1]] if len(holds) else None
 
     @overload
-    def place(self, thing: Placement, fit: Literal["as_is", "must"] = ..., **room: Unpack[Room]) -> Instance: ...
+    def place(self, thing: Placement, fit: Literal["as_is", "must"] = ...) -> Instance: ...
 
     @overload
-    def place(self, thing: Placement, fit: Fit, **room: Unpack[Room]) -> Instance | None: ...
+    def place(self, thing: Placement, fit: Fit) -> Instance | None: ...
 
-    def place(self, thing: Placement, fit: Fit = "as_is", **room: Unpack[Room]) -> Instance | None:
+    def place(self, thing: Placement, fit: Fit = "as_is") -> Instance | None:
         """Place a prop of the catalogue; None where it has no room and `fit` is ``"skip"``.
 
         Parameters
@@ -140,15 +134,10 @@ class Site:
         fit : str
             Without room on the site for its footprint: ``"as_is"`` places it all the same, ``"skip"`` leaves it out,
             ``"must"`` raises an `AssetError`.
-        settle_m : float, optional
-            On a slope, stand it between the heights about a foot of this radius, metres.
-        clear_m, margin_m, room_m : float, optional
-            Keep free of what follows: a disc about it, so much about its rectangle, so much about its outline.
         """
         z, at = thing.z, (thing.x, thing.y)
-        settle_m = room.get("settle_m")
-        if z is None and settle_m is not None:
-            z = self.foot_z(*at, settle_m)
+        if z is None and thing.settle_m is not None:
+            z = self.foot_z(*at, thing.settle_m)
         base = self.ground_z(*at) if z is None else z
         before = dict(self._counts)
         name = thing.node or self.node(thing.category)
@@ -176,24 +165,24 @@ class Site:
         if thing.z is None:
             self._on_ground.append(len(self.instances))
         self.instances.append(moved or instance)
-        self._reserve(thing, instance, room)
+        self._reserve(thing, instance)
         return instance
 
     def _has_room(self, area: BaseGeometry, low: float, high: float) -> bool:
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
 
-    def _reserve(self, thing: Placement, instance: Instance, room: Room) -> None:
-        if room.get("clear_m"):
-            self.occupy(disc(thing.x, thing.y, room["clear_m"]))
-        if room.get("margin_m"):
+    def _reserve(self, thing: Placement, instance: Instance) -> None:
+        if thing.clear_m:
+            self.occupy(disc(thing.x, thing.y, thing.clear_m))
+        if thing.margin_m:
             (x0, y0, _), (x1, y1, z1) = instance.bounds
             corners = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-            self.occupy(corners.buffer(room["margin_m"], quad_segs=2), -_BELOW_M, float(z1) + 8.0)
-        if room.get("room_m"):
+            self.occupy(corners.buffer(thing.margin_m, quad_segs=2), -_BELOW_M, float(z1) + 8.0)
+        if thing.room_m:
             low, high = instance.bounds[:, 2]
             variant = instance.variant or None
             outline = self.outline_of(thing.category, variant, (thing.x, thing.y), thing.yaw_deg)
-            self.occupy(outline.buffer(room["room_m"], quad_segs=2), float(low) - 1.0, float(high) + 6.0)
+            self.occupy(outline.buffer(thing.room_m, quad_segs=2), float(low) - 1.0, float(high) + 6.0)
 
     def design(self, category: str, node: str) -> str:
         """Draw the design of a node among those of the scene's side."""
@@ -256,13 +245,12 @@ class Site:
         parts: Sequence[Part | tuple[str, Mesh]],
         attributes: Mapping[str, str] | None = None,
         *,
-        variant: str = "",
         footprint: BaseGeometry | None = None,
     ) -> Instance:
         """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
         name = self._reserve_node(node or self.node(category))
         shape = tuple(replace(part, material=self.laid_out(part.material, name)) for part in self._as_parts(parts))
-        instance = Instance(name, category, variant, dict(attributes or {}), placed(shape, (0, 0, 0)))
+        instance = Instance(name, category, "", dict(attributes or {}), placed(shape, (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
         self.instances.append(instance)
@@ -295,8 +283,7 @@ class Site:
     def is_free(self, x: float, y: float, radius_m: float, z: float | None = None, height_m: float = 2.0) -> bool:
         """Whether a disc of ground inside the site is free up to `height_m` above the ground (or above `z`)."""
         base = self.ground_z(x, y) if z is None else z
-        area = disc(x, y, radius_m)
-        return bool(self.extent.contains(area)) and self._footprints.is_free(area, base, base + height_m)
+        return self._has_room(disc(x, y, radius_m), base, base + height_m)
 
     def scene(self) -> Scene:
         """Finish: cut the ground, check that everything has its material, and make the scene."""
@@ -328,7 +315,7 @@ class Site:
         for k in self._on_ground:
             thing = self.instances[k]
             (x0, y0, _), (x1, y1, _) = thing.bounds
-            under = self._terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
+            under = self.terrain.z([x0, x1, x1, x0], [y0, y0, y1, y1])
             if np.ptp(under) <= CONTACT_M / 2.0:
                 continue
             self.instances[k], plinth = rest_on_ground(thing, self.catalogue[thing.category].kind, heights)
@@ -336,7 +323,7 @@ class Site:
                 self.add(f"plinth_{thing.node}", "plinth", [(self.material("plinth", "concrete"), plinth)])
 
     def _ground(self) -> Instance:
-        meshes = ground_meshes(self._terrain, self.extent, self._base, self._surfaces)
+        meshes = ground_meshes(self.terrain, self.extent, self._base, self._surfaces)
         parts = placed(self._as_parts(meshes), (0, 0, 0))
         return Instance(self._reserve_node("ground"), "ground", "", {}, parts)
 

@@ -12,26 +12,6 @@ Generator = Callable[[Floats], Floats]
 _LIGHT = np.array([205.0, 198.0, 188.0])
 
 
-def brick(colour: Floats) -> Floats:
-    """Running bond with mortar joints: 8 courses of 4 bricks, drawn for 1 m."""
-    return _courses("brick", colour, 256, 8, 4, 3, _LIGHT * 0.92, 0.13)
-
-
-def blocks(colour: Floats) -> Floats:
-    """Ashlar or concrete blocks: 4 courses of 2, drawn for 1.6 m."""
-    return _courses("blocks", colour, 256, 4, 2, 3, colour * 0.66, 0.07)
-
-
-def paving(colour: Floats) -> Floats:
-    """Square slabs, 4 by 4, drawn for 2 m."""
-    return _slabs("paving", colour, 256, 4, 3, 0.10, 0.66)
-
-
-def tiles(colour: Floats) -> Floats:
-    """Glazed tiles, 8 by 8, drawn for 1.2 m."""
-    return _slabs("tiles", colour, 128, 8, 1, 0.05, 0.72)
-
-
 def cobbles(colour: Floats) -> Floats:
     """Cobblestones, drawn for 1.5 m."""
     rng = texture_rng("cobbles")
@@ -113,11 +93,6 @@ def roof_tiles(colour: Floats) -> Floats:
     arch = 0.72 + 0.36 * np.sin(np.pi * (shift % 1.0))
     lip = 0.62 + 0.45 * np.clip((1.0 - y % 1.0) * 3.0, 0, 1)
     return shade(colour, tone * arch * lip)
-
-
-def shingles(colour: Floats) -> Floats:
-    """Flat shingles in running courses, drawn for 2 m."""
-    return _courses("shingles", colour, 256, 10, 6, 2, colour * 0.5, 0.16)
 
 
 def corrugated(colour: Floats) -> Floats:
@@ -219,7 +194,15 @@ def _slabs(name: str, colour: Floats, size: int, count: int, joint: int, spread:
 
 
 BUILT: dict[str, Generator] = {
+    # Running bond with mortar joints for 1 m, ashlar or concrete blocks for 1.6 m, slabs for 2 m, glazed tiles for
+    # 1.2 m, and flat shingles for 2 m.
+    "brick": lambda colour: _courses("brick", colour, 256, 8, 4, 3, _LIGHT * 0.92, 0.13),
+    "blocks": lambda colour: _courses("blocks", colour, 256, 4, 2, 3, colour * 0.66, 0.07),
+    "paving": lambda colour: _slabs("paving", colour, 256, 4, 3, 0.10, 0.66),
+    "tiles": lambda colour: _slabs("tiles", colour, 128, 8, 1, 0.05, 0.72),
+    "shingles": lambda colour: _courses("shingles", colour, 256, 10, 6, 2, colour * 0.5, 0.16),
+} | {
     f.__name__: f
-    for f in (brick, blocks, paving, tiles, cobbles, asphalt, concrete, plaster, planks, boards, logs, roof_tiles,
-              shingles, corrugated, metal, rust, glass, fabric, stripes, hazard, checker, chain_link)
+    for f in (cobbles, asphalt, concrete, plaster, planks, boards, logs, roof_tiles, corrugated, metal, rust, glass,
+              fabric, stripes, hazard, checker, chain_link)
 }  # fmt: skip

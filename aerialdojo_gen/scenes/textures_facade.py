@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import BaseModel, Field, StringConstraints, model_validator
 
 from aerialdojo_gen.scenes.noise import Floats, fractal, shade, texture_rng, value_noise
 
 SIZE = 512
-_STRICT = ConfigDict(frozen=True, extra="forbid")
 _SKY, _DEEP = np.array([140.0, 162.0, 178.0]), np.array([58.0, 74.0, 86.0])
 _LINEN, _LAMP = np.array([222.0, 216.0, 202.0]), np.array([232.0, 200.0, 138.0])
 Metres = Annotated[float, Field(ge=0, le=20)]
@@ -21,10 +20,8 @@ Paint = Annotated[float, Field(ge=0, le=3)] | Colour  # A factor of what is ther
 _NONE = "-"
 
 
-class Opening(BaseModel):
+class Opening(BaseModel, frozen=True, extra="forbid"):
     """A window, door or loggia of a bay, metres."""
-
-    model_config = _STRICT
 
     size: tuple[Metres, Metres] = (1.2, 1.5)  # Width and height
     sill: Metres = 0.9  # Above the floor
@@ -48,10 +45,8 @@ class Opening(BaseModel):
     cooler: Share = 0.0  # Air conditioner below
 
 
-class Layout(BaseModel):
+class Layout(BaseModel, frozen=True, extra="forbid"):
     """Openings of the bays of a tile, and what runs across it."""
-
-    model_config = _STRICT
 
     rows: Annotated[list[str], Field(min_length=1, max_length=8)]  # Openings by name, bay by bay, "-" for none
     openings: dict[str, Opening]

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.model import Instance, Scene
 
 
@@ -32,13 +31,12 @@ def _quarter(scene: Scene) -> Scene:
 
 
 def _thing(thing: Instance) -> Instance:
-    parts = tuple(replace(part, vertices=_quarter_of(part.vertices)) for part in thing.parts)
+    parts = tuple(
+        replace(part, vertices=np.column_stack([-part.vertices[:, 1], part.vertices[:, 0], part.vertices[:, 2]]))
+        for part in thing.parts
+    )
     anatomy = thing.anatomy
     if anatomy is not None:
         yaw, *fronts = wrap_angle_rad(np.array([anatomy.yaw_rad, *anatomy.fronts_rad]) + math.pi / 2).tolist()
         anatomy = replace(anatomy, yaw_rad=yaw, fronts_rad=tuple(fronts))
     return replace(thing, parts=parts, anatomy=anatomy)
-
-
-def _quarter_of(points: Floats) -> Floats:
-    return np.column_stack([-points[:, 1], points[:, 0], points[:, 2]])

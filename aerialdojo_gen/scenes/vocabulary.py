@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aerialdojo_gen.base.errors import ShapeError
-from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
+from aerialdojo_gen.scenes import lettering, shapes
 from aerialdojo_gen.scenes.designs import ROUND
 from aerialdojo_gen.scenes.expressions import evaluate, names_in
 from aerialdojo_gen.scenes.mesh import (
@@ -30,8 +30,8 @@ SHAPES: dict[str, Callable[..., Mesh]] = {
     f.__name__: f
     for f in (
         shapes.box, shapes.cylinder, shapes.cone, shapes.sphere, shapes.capsule, shapes.torus, shapes.lathe,
-        shapes.sheet, shapes.crown, shapes_extruded.prism, shapes_extruded.polygon, shapes_extruded.profile,
-        shapes_extruded.sweep, shapes_extruded.block, lettering.text,
+        shapes.sheet, shapes.crown, shapes.prism, shapes.polygon, shapes.profile,
+        shapes.sweep, shapes.block, lettering.text,
     )
 }  # fmt: skip
 PLACEMENT_KEYS = frozenset({"shape", "role", "at", "rotate", "tag", "design", "array", "ring", "mirror"})

@@ -162,9 +162,10 @@ def kit_page() -> str:
     ]
     found = sorted(kit().values(), key=lambda one: (one.function.__module__, one.name))
     for module, builders in groupby(found, lambda one: one.function.__module__.rpartition(".")[2]):
-        picture = f"gallery/kit-{module.replace('_', '-')}.jpg"
+        pictures = sorted((_DOCS / "gallery").glob(f"kit-{module.replace('_', '-')}*.jpg"))
         out += ["", f"## {module.replace('_', ' ').capitalize()}"]
-        out += ["", f"![Its builders with three settings each](../{picture})"] if (_DOCS / picture).is_file() else []
+        for picture in pictures:
+            out += ["", f"![Builders with three settings each](../gallery/{picture.name})"]
         for one in builders:
             kind = {"site": "", "ground": " (ground)", "parts": " (parts)"}[one.kind]
             out += ["", f"### {one.name}{kind}", "", _prose(one.summary)]

@@ -18,7 +18,7 @@ from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
-from aerialdojo_gen.scenes.grammar_scatter import grid, poisson_disc
+from aerialdojo_gen.scenes.grammar import grid, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.recipe import load_imported

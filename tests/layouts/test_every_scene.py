@@ -160,7 +160,7 @@ def test_the_land_goes_on_to_the_horizon(scene: Scene) -> None:
 
 def test_its_props_stand_on_something(scene: Scene) -> None:
     reach_m = REACH_M.get(type_of(scene.name), 0.9)
-    # On steep slopes some lean out: test_layouts_mountain looks at every one.
+    # On steep slopes some lean out: test_layouts_nature looks at every one.
     hung = HUNG | {"boulder"} if type_of(scene.name) in ("N_Forest", "N_Mountain") else HUNG
     assert floating(scene, hung, reach_m, BEARERS) == []
 

@@ -1,4 +1,4 @@
-"""Earthquakes and explosions: broken structure holds together, and each scene stands up to a look from close by."""
+"""Earthquakes, explosions and floods: broken structure holds together, and everything is on something or afloat."""
 
 from functools import partial
 
@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 import shapely
 from shapely.geometry import Polygon
-from support.layout_checks import blank_site, clashes, floating
+from support.layout_checks import blank_site, clashes, each_scene, floating, props_of
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.landforms import level_area
-from aerialdojo_gen.scenes.kit.relief import strew_things
-from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile
+from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile, strew_things
 from aerialdojo_gen.scenes.kit.ruins import Shored, broken_arcade, damaged_building, put_up, raking_shores
-from aerialdojo_gen.scenes.kit.wreckage import Bite, broken_edge, torn_floor, torn_wall
-from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
+from aerialdojo_gen.scenes.kit.wreckage import Bite, Style, Wreck, broken_edge, torn_floor, torn_wall
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
@@ -33,15 +31,13 @@ def test_bites_start_at_their_foot_and_widen():
 def test_walls_lose_what_a_bite_takes_and_no_more():
     rng = np.random.default_rng(1)
     face = rectangle(0.0, 0.0, 20.0, 9.0)
-    whole = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (), rng, thickness_m=0.3)
-    torn = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (BITE,), rng, thickness_m=0.3)
-    assert whole is not None
-    assert torn is not None
+    (whole,) = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (), rng, thickness_m=0.3)
+    (torn,) = torn_wall((-10.0, -4.0), (10.0, -4.0), face, (BITE,), rng, thickness_m=0.3)
     assert whole.volume_m3 == pytest.approx(20.0 * 9.0 * 0.3)
     assert 0.3 * whole.volume_m3 < torn.volume_m3 < 0.85 * whole.volume_m3
     upper = torn.vertices[torn.vertices[:, 2] > 6.0]
     assert np.abs(upper[:, 0]).min() > 1.0
-    assert torn_wall((0.0, 0.0), (1.0, 0.0), rectangle(0, 1, 1, 3), (Bite(0.5, 0.0, 9.0, 9.0),), rng) is None
+    assert torn_wall((0.0, 0.0), (1.0, 0.0), rectangle(0, 1, 1, 3), (Bite(0.5, 0.0, 9.0, 9.0),), rng) == []
 
 
 def test_floors_end_where_bars_stick_out():
@@ -140,3 +136,35 @@ def test_heaps_rise_inside_their_area_only():
     ground = heap(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
     assert float(ground.z(0.0, 0.0)) > 1.0
     assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)
+
+
+SCENES = ["D_Flood_0", "D_Flood_1"]
+of_each_scene = each_scene(SCENES)
+
+
+@of_each_scene
+def test_the_water_stands_up_to_the_windows(scene_of, name):
+    houses = [i for i in scene_of(name).instances if i.category in ("house", "flat_house")]
+    assert len(houses) >= 3
+    for house in houses:
+        glass = np.concatenate([p.vertices[:, 2] for p in house.parts if p.material == "window"])
+        assert house.bounds[0, 2] < -1.0
+        assert -0.3 < glass.min() < 0.3
+
+
+@of_each_scene
+def test_what_is_half_under_shows_more_than_half(scene_of, name):
+    for prop in props_of(scene_of(name)):
+        if prop.attributes.get("place", "").startswith("half under"):
+            low, high = prop.bounds[:, 2]
+            assert low < -0.5
+            assert low + high > 0.0
+
+
+@of_each_scene
+def test_the_dyke_has_a_gap_at_water_level(scene_of, name):
+    ground = next(i for i in scene_of(name).instances if i.category == "ground")
+    crest = ground.vertices[ground.vertices[:, 2] > 2.5]
+    gap_x = np.sort(crest[:, 0])
+    assert np.diff(gap_x).max() > 5.0
+    assert ground.bounds[0, 2] == pytest.approx(0.0, abs=0.05)

@@ -21,12 +21,12 @@ from aerialdojo_gen.pipeline.stages.work import build_scenes
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.scenes.grammar_scatter import along, grid, poisson_disc, smooth_path
-from aerialdojo_gen.scenes.grammar_streets import crossing, parking_row, streets
+from aerialdojo_gen.scenes.grammar import along, grid, poisson_disc, smooth_path
 from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
+from aerialdojo_gen.scenes.kit.streets import crossings, parking_row, streets
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.shapes_extruded import triangulate, triangulate_all
+from aerialdojo_gen.scenes.shapes import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
 
@@ -168,9 +168,9 @@ def site() -> Site:
 def test_ground_covers_the_site_once_and_ground_z_tells_its_height():
     place = site()
     place.set_ground(mound(rolling_terrain((60, 40), 2.0, 5, 3.0, 25.0), (10, 5), 8, 4), "meadow")
-    streets(place, [[(-30, -5), (0, 3), (30, -5)], [(0, -20), (4, 20)]])
+    streets(place, paths=[[(-30, -5), (0, 3), (30, -5)], [(0, -20), (4, 20)]])
     place.paint(disc(-15, 10, 4), "paving", 0.3)
-    crossing(place, 10, 0, 80, 6)
+    crossings(place, at=[(10, 0, 80, 6)])
     scene = place.scene()
     ground = scene["ground"]
     corners = ground.vertices[ground.faces]

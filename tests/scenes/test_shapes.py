@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 
-from aerialdojo_gen.scenes import lettering, shapes, shapes_extruded
+from aerialdojo_gen.scenes import lettering, shapes
 from aerialdojo_gen.scenes.expressions import evaluate, evaluate_arrays, names_in
 from aerialdojo_gen.scenes.materials import TEXTURES, make_texture
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, to_part, translated
@@ -52,7 +52,7 @@ def test_solids_are_closed_and_have_their_size_and_volume(x, y, z, n, fx, fy):
     solid(capsule)
     assert (capsule.vertices[:, 2].min(), capsule.vertices[:, 2].max()) == pytest.approx((-x, y + x))
     for section, share in (("gable", 0.5), ("wedge", 0.5), ("trapezoid", 0.75)):
-        prism = shapes_extruded.prism(size=(x, y, z), section=section)
+        prism = shapes.prism(size=(x, y, z), section=section)
         solid(prism)
         assert_extent(prism, (-x / 2, -y / 2, 0), (x / 2, y / 2, z))
         assert prism.volume_m3 == pytest.approx(share * x * y * z)
@@ -77,14 +77,14 @@ def test_ellipsoids_and_crowns_lie_within_their_radii(radii, level, half, noise,
 
 
 def test_extruded_solids_by_hand():
-    straight = shapes_extruded.polygon(points=[[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]], height=1)
+    straight = shapes.polygon(points=[[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]], height=1)
     assert len(solid(straight).faces) == 12, "corners on a straight side leave no crack"
-    profile = shapes_extruded.profile(points=[[0, 0], [3, 0], [3, 1]], width=2)
+    profile = shapes.profile(points=[[0, 0], [3, 0], [3, 1]], width=2)
     solid(profile)
     assert_extent(profile, (0, -1, 0), (3, 1, 1))
-    upright = shapes_extruded.sweep(path=[[0, 0, 1], [4, 0, 1], [4, 4, 1]], section=[0.2, 1.0])
+    upright = shapes.sweep(path=[[0, 0, 1], [4, 0, 1], [4, 4, 1]], section=[0.2, 1.0])
     assert_extent(upright, (0, -0.1, 0.5), (4.1, 4, 1.5))
-    ring = shapes_extruded.sweep(path=[[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], section=[0.2, 0.2], closed=True)
+    ring = shapes.sweep(path=[[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], section=[0.2, 0.2], closed=True)
     assert solid(ring).euler_number == 0
     assert ring.volume_m3 == pytest.approx(16 * 0.04)
 
@@ -93,7 +93,7 @@ def test_extruded_solids_by_hand():
 def test_polygon_with_hole_has_its_volume_whatever_its_sense(n, r, h, turned, holed):
     outline = np.array(Point(0, 0).buffer(r, quad_segs=n).exterior.coords)[:-1]
     hole = outline * 0.4
-    body = shapes_extruded.polygon(
+    body = shapes.polygon(
         points=outline[:: -1 if turned else 1].tolist(), height=h, holes=[hole.tolist()] if holed else []
     )
     solid(body)
@@ -114,7 +114,7 @@ def test_sweep_is_closed_and_contains_its_path(legs, round_):
         heading += math.radians(turn)
         points.append(points[-1] + length * np.array([math.cos(heading), math.sin(heading), climb]))
     kind = {"radius": 0.05} if round_ else {"section": (0.1, 0.1)}
-    body = shapes_extruded.sweep(path=[p.tolist() for p in points], **kind)
+    body = shapes.sweep(path=[p.tolist() for p in points], **kind)
     solid(body)
     length = sum(np.linalg.norm(b - a) for a, b in pairwise(points))
     area = 6 / 2 * 0.05**2 * math.sin(math.pi / 3) if round_ else 0.01
@@ -207,7 +207,7 @@ def test_texture_keeps_its_scale_on_every_face(a, b, c, tile):
 
 
 def test_wall_texture_runs_up_and_around_the_corner():
-    body = shapes_extruded.polygon(points=[[0, 0], [4, 0], [4, 3], [0, 3]], height=2)
+    body = shapes.polygon(points=[[0, 0], [4, 0], [4, 3], [0, 3]], height=2)
     part = to_part(body, "brick", 1.0)
     walls = part.uv[part.faces[4:]].reshape(-1, 2)
     assert np.allclose([walls[:, 0].min(), walls[:, 0].max()], [0, 14])

@@ -1,4 +1,4 @@
-"""The catalogue that ships: every shape of every category, built once, and what holds of each.
+"""The catalogue that ships, every shape built once, and the sources of the 42 scenes.
 
 Things are as large as the real ones (`scene_assets/sizes.toml`), their designs differ, round parts stay round, and
 held-out designs stand where they should.
@@ -6,7 +6,9 @@ held-out designs stand where they should.
 
 from __future__ import annotations
 
-from collections import defaultdict
+import json
+import tomllib
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +17,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.catalogue_faults import catalogue_faults
+from support.layout_checks import ASSETS
 
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.base.paper_figures import inventory
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.designs import of_side, parse_designs
 from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.mesh import areas
@@ -26,7 +30,6 @@ from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.build import build_plan, build_tables
 from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
 
-ASSETS = Path(__file__).resolve().parents[2] / "scene_assets"
 SLACK = 1.05
 # Made to a standard, joined to what stands beside them, or varied by their own builder.
 FEW_DESIGNS = 30
@@ -50,11 +53,6 @@ class Body:
 
 
 Bodies = Mapping[str, Mapping[tuple[str, str], Body]]
-
-
-@pytest.fixture(scope="module")
-def catalogue() -> Catalogue:
-    return load_catalogue(ASSETS)
 
 
 @pytest.fixture(scope="module")
@@ -329,3 +327,42 @@ def test_a_side_without_designs_takes_the_first(catalogue):
 def test_what_is_wrong_with_a_design_is_named(raw, named):
     with pytest.raises(AssetError, match=named):
         parse_designs(raw, {"height": (1, 2)}, {"door"}, "props.toml: [booth]")
+
+
+@pytest.fixture(scope="module")
+def annotations():
+    return {
+        path.stem: json.loads(path.read_text(encoding="utf-8"))
+        for path in (ASSETS.parent / "annotations").glob("*.json")
+    }
+
+
+def test_every_scene_of_the_paper_has_a_recipe_and_annotations(annotations):
+    recipes = {path.stem for path in (ASSETS / "scenes").glob("*.toml")}
+    assert recipes == set(inventory()) == set(annotations)
+
+
+def test_landmarks_and_objects_are_as_many_as_the_papers(annotations):
+    found = {name: (len(body["landmarks"]), len(body["objects"])) for name, body in annotations.items()}
+    assert found == {name: (row.landmarks, row.objects) for name, row in inventory().items()}
+    assert tuple(map(sum, zip(*found.values(), strict=True))) == (109, 2099)
+
+
+def test_there_are_254_categories_and_each_is_looked_for(annotations, catalogue):
+    used = Counter(entry["category"] for body in annotations.values() for entry in body["objects"])
+    assert len(catalogue.targets) == 254
+    assert set(used) == set(catalogue.targets)
+
+
+def test_categories_are_told_apart_by_name(catalogue):
+    names = Counter(catalogue[category].name for category in catalogue.targets)
+    assert [name for name, n in names.items() if n > 1] == []
+
+
+def test_the_two_instances_of_a_type_differ_in_more_than_the_seed():
+    folder = ASSETS / "scenes"
+    for name in inventory():
+        if name.endswith("_0"):
+            one, two = (tomllib.loads((folder / f"{stem}.toml").read_text()) for stem in (name, f"{name[:-1]}1"))
+            for keys in (("size_m",), ("palette", "sky"), ("parameters", "site")):
+                assert [one.get(key) for key in keys] != [two.get(key) for key in keys], name

@@ -29,9 +29,8 @@ from aerialdojo_gen.cli.common import open_pipeline
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions
-from aerialdojo_gen.scenes.build import build_scene
+from aerialdojo_gen.scenes.build import build_scene, cut_out
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.studio.annotate.server import make_app
 from aerialdojo_gen.studio.annotate.session import open_session

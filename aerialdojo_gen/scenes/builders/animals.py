@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike
 
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import limb, vec
-from aerialdojo_gen.scenes.mesh import Mesh, posed, rotated, rotation, stretched, translated
+from aerialdojo_gen.scenes.mesh import Parts, posed, rotated, rotation, stretched, translated
 from aerialdojo_gen.scenes.shapes import cone, sphere
-
-Parts = list[tuple[str, Mesh]]
 
 
 @builder

@@ -7,16 +7,15 @@ below it so that no slope shows a gap.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from aerialdojo_gen.geometry.portable import norm, power
 from aerialdojo_gen.scenes.builders import builder
 from aerialdojo_gen.scenes.builders.growth import clump, limb, split_by_slope, vec, whorl
-from aerialdojo_gen.scenes.mesh import Floats, Mesh
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts
 
-Parts = list[tuple[str, Mesh]]
 _ROOT_M = 0.5
 
 
@@ -91,9 +90,8 @@ def pine(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         end = start + vec(out_m * np.cos(angle), out_m * np.sin(angle), height * 0.06)
         r = spread * rng.uniform(0.42, 0.55)
         out.append(("upper_bark", _branch(rng, start, end, girth * 0.3)))
-        out.append(
-            ("needles", clump(rng, end + vec(0.0, 0.0, 0.25), (r, r * rng.uniform(0.8, 1.1), r * 0.42), 0.32, 0.45))
-        )
+        radii = (r, r * rng.uniform(0.8, 1.1), r * 0.42)
+        out.append(("needles", clump(rng, end + vec(0.0, 0.0, 0.25), radii, 0.32, 0.45)))
     return out
 
 
@@ -142,13 +140,9 @@ def oak(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         out.append(("bark", _branch(rng, top - vec(0.0, 0.0, 0.25), end, girth * 0.5, sag=-0.3)))
         r = spread * rng.uniform(0.42, 0.52)
         out.append(("leaves", clump(rng, end, (r, r, r * 0.75), 0.27, 0.6)))
-    out.append(("bark", _branch(rng, top, top + vec(0.0, 0.0, height * 0.42), girth * 0.5)))
-    out.append(
-        (
-            "leaves",
-            clump(rng, top + vec(0.0, 0.0, height * 0.42), (spread * 0.6, spread * 0.6, spread * 0.5), 0.27, 0.6),
-        )
-    )
+    end = top + vec(0.0, 0.0, height * 0.42)
+    out.append(("bark", _branch(rng, top, end, girth * 0.5)))
+    out.append(("leaves", clump(rng, end, (spread * 0.6, spread * 0.6, spread * 0.5), 0.27, 0.6)))
     return out
 
 
@@ -166,16 +160,8 @@ def dead_tree(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
         way = np.array([np.cos(angle), np.sin(angle), rng.uniform(0.25, 0.9)])
         elbow = start + way * length * 0.55
         radius = girth * (0.42 - 0.25 * t)
-        out.append(
-            (
-                "bark",
-                limb(
-                    [start, elbow, (elbow + way * length * 0.5)],
-                    [radius, radius * 0.7, 0.0],
-                    5,
-                ),
-            )
-        )
+        bough = [start, elbow, elbow + way * length * 0.5]
+        out.append(("bark", limb(bough, [radius, radius * 0.7, 0.0], 5)))
         for side in (-0.8, 0.7):
             c, s = np.cos(angle + side), np.sin(angle + side)
             end = elbow + np.array([c, s, rng.uniform(0.2, 0.8)]) * length * 0.45
@@ -208,16 +194,13 @@ def young_spruce(rng: np.random.Generator, params: Mapping[str, float]) -> Parts
     return out
 
 
-def _log_line(length: float, rng: np.random.Generator) -> Sequence[Sequence[float]]:
-    bend = rng.uniform(-0.04, 0.04) * length
-    return [(0.0, -length / 2, 0.0), (bend, -length / 6, 0.0), (bend, length / 6, 0.0), (0.0, length / 2, 0.0)]
-
-
 @builder
 def fallen_log(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Fallen trunk along y with torn root plate, stubs of branches and cut face."""
     length, girth = params["length"], params["girth"]
-    line = np.array(_log_line(length, rng)) + vec(0.0, 0.0, girth * 0.8)
+    bend = rng.uniform(-0.04, 0.04) * length
+    middle = [(0.0, -length / 2, 0.0), (bend, -length / 6, 0.0), (bend, length / 6, 0.0), (0.0, length / 2, 0.0)]
+    line = np.array(middle) + vec(0.0, 0.0, girth * 0.8)
     radii = np.linspace(girth, girth * 0.72, len(line))
     out: Parts = [("bark", limb(line, radii.tolist(), 9))]
     y = length / 2
@@ -245,35 +228,15 @@ def fallen_log(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
 def stump(rng: np.random.Generator, params: Mapping[str, float]) -> Parts:
     """Sawn stump with spreading roots and a pale cut face."""
     height, girth = params["height"], params["girth"]
-    out: Parts = [
-        (
-            "bark",
-            limb(
-                [(0, 0, -0.4), (0, 0, 0.0), (0, 0, 0.22), (0, 0, height)],
-                [girth * 1.3, girth * 1.25, girth, girth * 0.95],
-                10,
-            ),
-        )
-    ]
+    line = [(0, 0, -0.4), (0, 0, 0.0), (0, 0, 0.22), (0, 0, height)]
+    out: Parts = [("bark", limb(line, [girth * 1.3, girth * 1.25, girth, girth * 0.95], 10))]
     out.append(("cut", limb([(0, 0, height - 0.01), (0, 0, height + 0.02)], [girth * 0.84] * 2, 10)))
     for k in range(5):
         angle = k * 2 * np.pi / 5 + rng.uniform(-0.3, 0.3)
         way = np.array([np.cos(angle), np.sin(angle), 0.0])
         far = way * girth * rng.uniform(1.8, 2.4)
-        out.append(
-            (
-                "bark",
-                limb(
-                    [
-                        (way * girth * 0.6 + vec(0, 0, 0.22)),
-                        (far * 0.8 + vec(0, 0, 0.02)),
-                        (far + vec(0, 0, -0.3)),
-                    ],
-                    [girth * 0.34, girth * 0.24, 0.0],
-                    5,
-                ),
-            )
-        )
+        root = [way * girth * 0.6 + vec(0, 0, 0.22), far * 0.8 + vec(0, 0, 0.02), far + vec(0, 0, -0.3)]
+        out.append(("bark", limb(root, [girth * 0.34, girth * 0.24, 0.0], 5)))
     return out
 
 

@@ -12,6 +12,7 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.portable import norm, power
 from aerialdojo_gen.scenes.horizon.border import OUTWARDS, Stretch, is_water
 from aerialdojo_gen.scenes.horizon.kinds import Kind
+from aerialdojo_gen.scenes.terrain import smooth
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -53,16 +54,11 @@ class Noise:
         u, v = x / wave_m + 17.3 * shift, y / wave_m - 11.9 * shift
         j, i = np.floor(u).astype(np.int64), np.floor(v).astype(np.int64)
         a, b = u - j, v - i
-        a, b = a * a * (3.0 - 2.0 * a), b * b * (3.0 - 2.0 * b)
+        a, b = smooth(a), smooth(b)
         at = self._table
         low = at[i % 64, j % 64] * (1.0 - a) + at[i % 64, (j + 1) % 64] * a
         high = at[(i + 1) % 64, j % 64] * (1.0 - a) + at[(i + 1) % 64, (j + 1) % 64] * a
         return np.asarray(low * (1.0 - b) + high * b)
-
-
-def _smooth(t: Floats) -> Floats:
-    t = np.clip(t, 0.0, 1.0)
-    return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +140,7 @@ def _positions(strips: _Strips, noise: Noise) -> Floats:
     x, y = strips.way[:, :, None, 0], strips.way[:, :, None, 1]
     wind = noise(100.0 * (x * x - y * y) + RINGS_M, 200.0 * x * y + 0.0 * RINGS_M, 160.0, 3.0)
     return np.asarray(
-        straight + across * (np.minimum(0.3 * RINGS_M, 50.0) * _smooth(RINGS_M / 60.0) * wind)[..., None]
+        straight + across * (np.minimum(0.3 * RINGS_M, 50.0) * smooth(RINGS_M / 60.0) * wind)[..., None]
     )
 
 
@@ -173,16 +169,16 @@ def _heights(strips: _Strips, grid: Floats, kind: Kind, noise: Noise) -> Floats:
     if kind.steep:
         ridge = 1.0 - np.abs(noise(x, y, 540.0)) * 1.5 + 0.25 * noise(x, y, 170.0, 1.0)
         hills = power(np.maximum(ridge, 0.1), 1.4)
-    relief = kind.near_m * (noise(x, y, 90.0, 2.0) + 0.4 * noise(x, y, 35.0, 4.0)) * _smooth(d / 90.0)
-    relief = relief + kind.hills_m * np.maximum(hills, 0.0) * _smooth((d - _HILLS_M) / 900.0)
-    land = z0 + (level + relief - z0) * _smooth(d / _BLEND_M)
+    relief = kind.near_m * (noise(x, y, 90.0, 2.0) + 0.4 * noise(x, y, 35.0, 4.0)) * smooth(d / 90.0)
+    relief = relief + kind.hills_m * np.maximum(hills, 0.0) * smooth((d - _HILLS_M) / 900.0)
+    land = z0 + (level + relief - z0) * smooth(d / _BLEND_M)
     if strips.water.any():
         water = float(np.median(strips.foot[strips.water][..., 2]))
         shore = _shore_distance(strips, grid)
-        low = water + 0.25 + (np.maximum(land, water + 0.25) - water - 0.25) * _smooth(shore / (_SHORE_M + 0.15 * d))
-        land = land + (low - land) * _smooth(d / _BLEND_M)
+        low = water + 0.25 + (np.maximum(land, water + 0.25) - water - 0.25) * smooth(shore / (_SHORE_M + 0.15 * d))
+        land = land + (low - land) * smooth(d / _BLEND_M)
         islands = (
-            np.maximum(noise(x, y, 700.0, 6.0) - 0.25, 0.0) * 1.6 * kind.hills_m * _smooth((d - _ISLANDS_M) / 500.0)
+            np.maximum(noise(x, y, 700.0, 6.0) - 0.25, 0.0) * 1.6 * kind.hills_m * smooth((d - _ISLANDS_M) / 500.0)
         )
         return np.asarray(np.where(strips.water[:, None, None], z0 + islands, land))
     return np.asarray(land)

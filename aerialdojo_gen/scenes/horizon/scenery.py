@@ -125,7 +125,7 @@ def _house(style: str, size: float, rng: np.random.Generator) -> list[tuple[str,
     )
     out = [(walls, _walls(w, d, high, rise)), (roof, _gable(w, d, high, rise))]
     if style == "sheds" and rng.uniform() < 0.2:
-        out.append(("#8f5a48", _post(1.4, rng.uniform(22, 34), 6)))
+        out.append(("#8f5a48", _turned([(1.4, -_ROOT_M), (1.4 * 0.7, rng.uniform(22, 34))], 6, None)))
     return out
 
 
@@ -153,10 +153,6 @@ def _gable(w: float, d: float, high: float, rise: float) -> Mesh:
     x, y, drop = w / 2 + over, d / 2 + over, high - over * 2 * rise / d
     v = [(-x, -y, drop), (x, -y, drop), (x, y, drop), (-x, y, drop), (-x, 0, high + rise), (x, 0, high + rise)]
     return mesh(v, [(0, 1, 5), (0, 5, 4), (2, 3, 4), (2, 4, 5)])
-
-
-def _post(radius: float, high: float, sides: int) -> Mesh:
-    return _turned([(radius, -_ROOT_M), (radius * 0.7, high)], sides, None)
 
 
 @lru_cache(maxsize=64)

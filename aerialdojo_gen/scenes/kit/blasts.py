@@ -13,17 +13,16 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 from aerialdojo_gen.geometry.portable import dot, norm
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.rubble import Breadth
 from aerialdojo_gen.scenes.kit.ruins import Extent
 from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
-from aerialdojo_gen.scenes.kit.wreckage import Bite, Parts, bars, tilted_plate, torn_wall
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.kit.wreckage import Bite, bars, tilted_plate, torn_wall
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -65,7 +64,7 @@ def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: 
     if sheets:
         parts.append((hall.cladding, merge(sheets)))
     x, y = hall.length_m / 2, hall.depth_m / 2
-    parts.append(("concrete", merge([block(-x, s * y - 0.15, x, s * y + 0.15, -0.8, 0.5) for s in (1,)])))
+    parts.append(("concrete", block(-x, y - 0.15, x, y + 0.15, -0.8, 0.5)))
     if hall.gallery_m:
         parts += _gallery(hall)
     site.add(node, "wrecked_hall", Frame(*at, yaw_deg).parts(parts, base))
@@ -147,9 +146,8 @@ def burst_tank(
         face = Polygon(
             [(0, 0.3), (length, 0.3), (length, top + fray[0]), (length / 2, top + fray[1]), (0, top + fray[2])]
         )
-        body = torn_wall(p0, p1, face, (), rng, (), 0.08)
-        if body is not None:
-            parts.append((shell if near < 0.6 else "rust", body))
+        material = shell if near < 0.6 else "rust"
+        parts += [(material, body) for body in torn_wall(p0, p1, face, (), rng, (), 0.08)]
         if near > 0.45 and k % 2 == 0:
             plate = translated(
                 box(size=[height_m * 0.45, length * 1.3, 0.07], taper=(0.6, 1.0)), (height_m * 0.2, 0, 0)
@@ -195,9 +193,7 @@ def broken_bridge(
                 steel.append(sweep(path=[(float(s), v * 1.25, foot), (float(s), v, z_m - 0.2)], section=(0.2, 0.2)))
             steel.append(block(float(s) - 0.08, -w, float(s) + 0.08, w, z_m - 0.42, z_m - 0.2))
             site.occupy(frame.area(Point(float(s), 0.0).buffer(1.6)), -100.0, z_m - 0.5)
-        toward = 1.0 if s0 == 0.0 else -1.0
-        torn = s1 if s0 == 0.0 else s0
-        start = s0 if s0 == 0.0 else s1
+        start, torn, toward = (s0, s1, 1.0) if s0 == 0.0 else (s1, s0, -1.0)
         lines = ((-w - 0.5, 0.22, "paint:#d8b23a"), (-w - 1.05, 0.15, "paint:#b9bec4"),
                  (w + 0.45, 0.18, "paint:#3f7d4e"))  # fmt: skip
         for k, (v, radius, colour) in enumerate(lines if pipes else ()):
@@ -284,9 +280,7 @@ def torn_yard_wall(
         top = max(site.ground_z(*a), site.ground_z(*b)) + height_m
         face = Polygon([(0, low - 0.6), (length, low - 0.6), (length, top), (0, top)])
         tear = replace(hole, z0_m=low + hole.z0_m, z1_m=low + hole.z1_m)
-        body = torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)
-        if body is not None:
-            parts.append((brick, body))
+        parts += [(brick, body) for body in torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)]
     site.add("yard_wall", "yard_wall", parts)
     for a, b in runs:
         corners = [(a[0] - 0.4, a[1] - 0.4), (b[0] + 0.4, a[1] - 0.4), (b[0] + 0.4, b[1] + 0.4),
@@ -301,9 +295,8 @@ def step_walls(site: Site, *, y: Number, spans: list[tuple[Number, Number]]) -> 
     for x0, x1 in spans:
         low, high = site.ground_z((x0 + x1) / 2, y - 1.5), site.ground_z((x0 + x1) / 2, y + 1.5)
         face = Polygon([(0, low - 0.5), (x1 - x0, low - 0.5), (x1 - x0, high + 0.5), (0, high + 0.5)])
-        body = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
-        if body is not None:
-            parts.append(("concrete", body))
+        wall = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
+        parts += [("concrete", body) for body in wall]
         site.occupy(rectangle(x0, y - 1.0, x1, y + 0.4))
     site.add("retaining_wall", "retaining_wall", parts)
 

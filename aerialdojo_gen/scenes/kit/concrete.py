@@ -16,13 +16,13 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
-from aerialdojo_gen.scenes.grammar_frames import Frame
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
 from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, plates, posts, rim
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg, stairs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.kit.structures import Point, block, leg, stairs
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.site import Site
@@ -131,11 +131,10 @@ def stair_flight(
     stringer: Material = "concrete:#c0bcb2",
 ) -> None:  # fmt: skip
     """Put up a flight of stairs between two floors that climbs from `at` along `yaw_deg`, and keep its way free."""
-    (x, y), (z0, z1) = at, z
-    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    z0, z1 = z
     parts = stairs(at, yaw_deg, 1.2, z1 - z0, run_m, z_m=z0, tread="concrete", stringer=stringer)
     site.add(None, "flight_of_stairs", parts)
-    way = LineString([(x - 0.9 * c, y - 0.9 * s), (x + (run_m + 0.9) * c, y + (run_m + 0.9) * s)])
+    way = LineString(Frame(*at, yaw_deg).path([(-0.9, 0.0), (run_m + 0.9, 0.0)]))
     site.occupy(way.buffer(0.85, cap_style="flat"), z0, z1 + 1.0)
 
 

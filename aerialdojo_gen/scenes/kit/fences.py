@@ -1,7 +1,8 @@
-"""Fences and railings."""
+"""Fences, hedges, railings and garden walls, and the retaining walls of terraces."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -12,15 +13,15 @@ from shapely.geometry import LineString
 from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
-from aerialdojo_gen.scenes.grammar_fences import fence
-from aerialdojo_gen.scenes.grammar_scatter import along, slab, stretches, wall
+from aerialdojo_gen.scenes.grammar import Frame, Polyline, along, box_between, slab, stretches, wall
+from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, block, railing
-from aerialdojo_gen.scenes.mesh import merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.kit.structures import block, railing
+from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 
@@ -137,8 +138,8 @@ def fence_panels(
     category, _, variant = of.partition(":")
     for line in lines:
         for x, y, yaw_deg in stretches(line, panel_m):
-            panel = Placement(category, x, y, yaw_deg + turn_deg, variant or DRAWN, place=place)
-            site.place(panel, margin_m=margin_m)
+            turned = yaw_deg + turn_deg
+            site.place(Placement(category, x, y, turned, variant or DRAWN, place=place, margin_m=margin_m))
 
 
 @site_builder
@@ -174,3 +175,77 @@ def field_walls(
         body = sweep(path=path, section=(0.55, height_m + 0.5))
         area = LineString(line).buffer(0.35, cap_style="flat")
         site.add(None, "stone_wall", [(material, body)], footprint=area)
+
+
+@site_builder
+def terrace_walls(
+    site: Site, *, steps: list[tuple[Number, Number, Number]], half_m: Number, stair_m: Number, stone: Material,
+    tread: Material, hedge: Material, treads: Annotated[int, Field(ge=2, le=60)] = 10, node: str | None = None,
+) -> None:  # fmt: skip
+    """Put up planted double walls along x at steps (y, lower level, upper level), with stairs in their middle.
+
+    The walls reach from `stair_m` to `half_m` on both sides; the stairs climb north between two cheeks.
+    """
+    parts: Parts = []
+    areas = []
+    for at, low, high in steps:
+        for s in (-1, 1):
+            x0, x1 = sorted((s * stair_m, s * half_m))
+            parts.append((stone, block(x0, at - 0.6, x1, at - 0.25, low - 0.3, high + 0.5)))
+            parts.append((stone, block(x0, at + 0.5, x1, at + 0.75, high - 0.6, high + 0.5)))
+            parts.append(("soil", block(x0, at - 0.25, x1, at + 0.5, low, high + 0.42)))
+            for a in np.arange(x0 + 0.4, x1 - 2.4, 2.9):
+                parts.append((hedge, block(a, at - 0.2, a + 2.3, at + 0.45, high + 0.42, high + 1.05)))
+            areas.append(rectangle(x0, at - 0.6, x1, at + 0.75))
+            a, b = sorted((s * stair_m, s * stair_m - s * 0.4))
+            parts.append((stone, block(a, at - 4.2, b, at + 0.75, low - 0.3, high + 0.5)))
+        rise, run = (high - low) / treads, 3.6 / treads
+        flight = [
+            block(-stair_m + 0.4, at - 3.6 + run * i, stair_m - 0.4, at + 0.9, low - 0.1, low + rise * (i + 1))
+            for i in range(treads)
+        ]
+        parts.append((tread, merge(flight)))
+    site.add(node, "terrace_wall", parts, {"material": "stone"}, footprint=unary_union(areas))
+
+
+def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> Instance:
+    """Put up a picket, board, hedge, wall or railing fence along a path (world metres)."""
+    material, height, thickness = {
+        "picket": ("#f2efe6", 1.0, 0.05),
+        "board": ("boards:#8d6f4c", 1.8, 0.08),
+        "hedge": ("hedge", 1.3, 0.7),
+        "wall": ("brick:#96604c", 1.2, 0.24),
+        "railing": ("iron", 1.2, 0.04),
+    }[kind]
+    body = colour or material
+    z = min(site.ground_z(x, y) for x, y in path)
+    parts: Parts = []
+    if kind in ("picket", "railing"):
+        step, width = (0.28, 0.14) if kind == "picket" else (0.2, 0.035)
+        for level in (0.3, 0.78) if kind == "picket" else (0.15, height - 0.05):
+            parts.append((body, sweep(path=[(x, y, z + level) for x, y in path], section=(0.05, 0.08))))
+        for a, b in pairwise(path):
+            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+            yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+            count = max(round(length / step), 1)
+            bars = [
+                translated(box(size=(width, thickness, height), taper=(0.6, 1.0)), ((k + 0.5) * length / count, 0, 0))
+                for k in range(count)
+            ]
+            parts += Frame(a[0], a[1], yaw).parts([(body, merge(bars))], z + 0.03)
+    else:
+        line = [(x, y, z + height / 2) for x, y in path]
+        parts.append((body, sweep(path=line, section=(thickness, height))))
+        if kind != "hedge":
+            cap = "concrete" if kind == "wall" else body
+            lid = [(x, y, z + height + 0.03) for x, y in path]
+            parts.append((cap, sweep(path=lid, section=(thickness + 0.1, 0.08))))
+        if kind == "board":
+            line_m = LineString(path)
+            posts = [
+                line_m.interpolate(s) for s in np.linspace(0.0, line_m.length, max(int(line_m.length / 2.4), 1) + 1)
+            ]
+            parts.append(("wood", merge([box_between(p.x - 0.07, p.y - 0.07, p.x + 0.07, p.y + 0.07, z, z + 1.95)
+                                         for p in posts])))  # fmt: skip
+    area = LineString(path).buffer(thickness / 2 + 0.02, cap_style="flat", join_style="mitre")
+    return site.add(None, f"{kind}_fence" if kind != "hedge" else "garden_hedge", parts, footprint=area)

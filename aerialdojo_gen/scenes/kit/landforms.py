@@ -1,4 +1,4 @@
-"""Shapes of the ground, each on the terrain of the one before, and heights of the ground for what stands on it."""
+"""Shapes of the ground, natural and dug, each on the terrain of the one before, and heights for what stands on it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number, Point3
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain, mound, rolling_terrain, smooth
+from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, mound, rolling_terrain, smooth
 
 # Smoothing a way takes the square of its length.
 _LONGEST_M = 3000.0
@@ -218,3 +218,47 @@ def between(t: Floats, start: float, end: float) -> Floats:
     if start == end:
         raise ValueError(f"a slope must not begin where it ends, {start:g}")
     return smooth((t - start) / (end - start))
+
+
+_Steps = Annotated[list[tuple[Number, Number]], Field(min_length=2, max_length=100)]
+
+
+@ground_builder
+def level_grid(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
+    """Make level ground at z = 0 that is fine enough to be dug in, in place of what was there."""
+    return level_terrain(site.head.size_m, cell_m)
+
+
+@ground_builder
+def ground_profile(_site: Site, terrain: Terrain, *, points: _Steps, axis: Literal["x", "y"] = "x") -> Terrain:
+    """Raise the ground by a profile along an axis: (distance along it, height), linear in between."""
+    along, heights = np.array(points, dtype=np.float64).T
+    return terrain.raised(np.interp(grid(terrain)["xy".index(axis)], along, heights))
+
+
+@ground_builder
+def terraces(_site: Site, terrain: Terrain, *, area: Area, steps: _Steps) -> Terrain:
+    """Raise or sink an area by how far inside its outline: (inside, height), linear in between; a pit or a heap."""
+    d, h = np.array(steps, dtype=np.float64).T
+    return terrain.raised(np.interp(terrain.inside(area), d, h))
+
+
+@ground_builder
+def earth_ramp(
+    _site: Site, terrain: Terrain, *, start: Point3, end: Point3, width_m: Number,
+    blend_m: Annotated[Number, Field(gt=0)] = 2.0,
+) -> Terrain:  # fmt: skip
+    """Lay a straight ramp into the ground from one point to another, with slopes beside it."""
+    line = LineString([start[:2], end[:2]])
+    away = terrain.distance(line.buffer(width_m / 2, cap_style="flat"))
+    t = line.project(shapely.points(terrain.corners()[:, :2])).reshape(away.shape) / line.length
+    return terrain.blended(start[2] + (end[2] - start[2]) * t, np.clip(1.0 - away / blend_m, 0.0, 1.0))
+
+
+@ground_builder
+def rough_area(site: Site, terrain: Terrain, *, area: Area, height_m: Number, stream: str = "ruts") -> Terrain:
+    """Make an area uneven by up to `height_m`, as tracked machines leave it."""
+    xy = terrain.corners()[:, :2]
+    inside = shapely.contains_xy(area, *xy.T).reshape(terrain.heights_m.shape)
+    bumps = site.rng_for(stream).uniform(-1.0, 1.0, size=terrain.heights_m.shape) * height_m
+    return terrain.raised(np.where(inside, bumps, 0.0))

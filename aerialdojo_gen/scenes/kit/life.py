@@ -10,10 +10,9 @@ import shapely
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import unknown
-from aerialdojo_gen.scenes.grammar_scatter import Pose, poisson_disc
+from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.resting import perch_on_wires, seat_people
-from aerialdojo_gen.scenes.kit.traffic import set_out_traffic
+from aerialdojo_gen.scenes.kit.resting import perch_on_wires, seat_people, set_out_traffic
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
@@ -123,8 +122,8 @@ def _people(
             if k and not _walkable(site, pose.x, pose.y, ground, _NEXT_M):
                 continue
             yaw = pose.yaw_deg + float(rng.uniform(-14.0, 14.0))
-            person = Placement("person", pose.x, pose.y, yaw, chosen, params={"posture": posture})
-            placed += site.place(person, "skip", settle_m=0.2) is not None
+            person = Placement("person", pose.x, pose.y, yaw, chosen, params={"posture": posture}, settle_m=0.2)
+            placed += site.place(person, "skip") is not None
 
 
 def _on_decks(site: Site, number: int, dressed: Sequence[str], decks: Sequence[str], rng: np.random.Generator) -> int:
@@ -183,7 +182,7 @@ def _herd(
         if _walkable(site, x, y, ground, _ROOM_M):
             variants = site.catalogue[category].variants
             chosen = variants[int(rng.integers(len(variants)))].name
-            placed += site.place(Placement(category, x, y, yaw, chosen or None), "skip", settle_m=0.3) is not None
+            placed += site.place(Placement(category, x, y, yaw, chosen or None, settle_m=0.3), "skip") is not None
 
 
 def _perch(site: Site, category: str, number: int, rng: np.random.Generator) -> None:

@@ -13,10 +13,10 @@ from aerialdojo_gen.geometry.portable import Floats, unit
 from aerialdojo_gen.scenes.site import Site
 
 
-def downhill_deg(site: Site, x: float, y: float, reach_m: float = 1.5) -> float:
+def downhill_deg(site: Site, x: float, y: float) -> float:
     """Give the direction in which the ground falls, degrees counter-clockwise from +x."""
-    east = site.ground_z(x + reach_m, y) - site.ground_z(x - reach_m, y)
-    north = site.ground_z(x, y + reach_m) - site.ground_z(x, y - reach_m)
+    east = site.ground_z(x + 1.5, y) - site.ground_z(x - 1.5, y)
+    north = site.ground_z(x, y + 1.5) - site.ground_z(x, y - 1.5)
     return math.degrees(math.atan2(-north, -east))
 
 

@@ -12,13 +12,13 @@ from pydantic import Field
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes import grammar_streets
-from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
-from aerialdojo_gen.scenes.grammar_scatter import Pose, slab
+from aerialdojo_gen.scenes.grammar import Pose, slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, deck, letters, parapet, ramp, stairs
-from aerialdojo_gen.scenes.mesh import Mesh, merge
+from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
+from aerialdojo_gen.scenes.kit.streets import parking_row
+from aerialdojo_gen.scenes.kit.structures import Point, block, columns, deck, letters, parapet, ramp, stairs
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import At, Box, Material, Number
 from aerialdojo_gen.scenes.site import Site
@@ -52,7 +52,7 @@ def parking_rows(
     bays: list[Pose] = []
     for x, y, yaw_deg, count in rows:
         floor = on if marks else 0.0
-        bays += grammar_streets.parking_row(site, x, y, yaw_deg, count, bay_m=bay_m, z=floor, material=material)
+        bays += parking_row(site, x, y, yaw_deg, count, bay_m=bay_m, z=floor, material=material)
     park_cars(site, bays, occupancy, phrase, z=on, kinds=vehicles, differ=differ)
 
 

@@ -14,15 +14,13 @@ from pydantic import Field
 from shapely.geometry import LineString
 
 from aerialdojo_gen.scenes import shapes
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import slab
+from aerialdojo_gen.scenes.grammar import Frame, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, columns, leg, rail_legs
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.kit.structures import Point, block, columns, leg, rail_legs
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3
-from aerialdojo_gen.scenes.shapes import box, crown, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 

@@ -16,16 +16,14 @@ from pydantic import Field
 from shapely.geometry import LineString
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import along, slab
+from aerialdojo_gen.scenes.grammar import Frame, along, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Parts, Point, block, leg
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.kit.structures import Point, block, leg
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
-from aerialdojo_gen.scenes.shapes import cylinder
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
 BED_M = 0.35

@@ -1,6 +1,6 @@
 """Buildings after a disaster: torn open, pancaked, leaning, or stripped to their frame.
 
-Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.wrecks`.
+Everything is made in the building's own frame; see `aerialdojo_gen.scenes.kit.wreckage`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import shapely
 from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 
-from aerialdojo_gen.scenes.grammar_buildings import wall_with_openings
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import disc, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
+from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
 from aerialdojo_gen.scenes.kit.structures import block, columns
 from aerialdojo_gen.scenes.kit.wreckage import (
     XY,
     Bite,
-    Parts,
+    Style,
+    Wreck,
     bars,
     broken_edge,
     hanging_slab,
@@ -32,12 +32,10 @@ from aerialdojo_gen.scenes.kit.wreckage import (
     torn_floor,
     torn_wall,
 )
-from aerialdojo_gen.scenes.kit.wrecks import Style, Wreck
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
-from aerialdojo_gen.scenes.shapes import box
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 Extent = Annotated[Number, Field(ge=3, le=200)]
@@ -151,20 +149,15 @@ def _shell(wreck: Wreck, rng: np.random.Generator) -> Parts:
     top = wreck.height_m + (0.0 if wreck.ridge_m else _PARAPET_M)
     for side, (a, b) in enumerate(_edges(wreck)):
         length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        outline = [(0.0, -_FOOT_M), (length, -_FOOT_M), (length, top), (0.0, top)]
-        if side % 2 == 0:
-            # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
-            half = style.wall_m / 2
-            outline = [(-half, -_FOOT_M), (length + half, -_FOOT_M), (length + half, top), (-half, top)]
-        else:
-            half = style.wall_m / 2
-            outline = [(half, -_FOOT_M), (length - half, -_FOOT_M), (length - half, top), (half, top)]
-            if wreck.ridge_m:
-                outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
+        half = style.wall_m / 2
+        # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
+        out = half if side % 2 == 0 else -half
+        outline = [(-out, -_FOOT_M), (length + out, -_FOOT_M), (length + out, top), (-out, top)]
+        if side % 2 and wreck.ridge_m:
+            outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
         openings = _openings(wreck, length, side)
-        body = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
-        if body is not None:
-            parts.append((style.wall, body))
+        wall = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
+        parts += [(style.wall, body) for body in wall]
         parts += _windows(wreck, a, b, openings, rng)
     return parts
 
@@ -257,9 +250,8 @@ def _partitions(wreck: Wreck, rng: np.random.Generator) -> Parts:
             x = -wreck.length_m / 2 + k * wreck.length_m / count
             face = Polygon([(0, z0), (2 * y, z0), (2 * y, z1), (0, z1)])
             u = y * (0.6 + 0.8 * ((storey + k) % 2))
-            body = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
-            if body is not None:
-                parts.append((style.inner[(storey + k) % len(style.inner)], body))
+            wall = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
+            parts += [(style.inner[(storey + k) % len(style.inner)], body) for body in wall]
     return parts
 
 
@@ -285,9 +277,8 @@ def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
     covers, rafters = [], []
     for side in (-1, 1):
         half = rectangle(-x, min(0.0, side * (y + over)), x, max(0.0, side * (y + over)))
-        for piece in (p for p in getattr(remains(half, wreck.height_m + rise / 2, wreck.bites), "geoms", None)
-                      or [remains(half, wreck.height_m + rise / 2, wreck.bites)]):  # fmt: skip
-            if isinstance(piece, Polygon) and piece.area > 1.0:
+        for piece in polygons_of(remains(half, wreck.height_m + rise / 2, wreck.bites)):
+            if piece.area > 1.0:
                 flat = extrude(piece, 0.14)
                 v = flat.vertices.copy()
                 v[:, 2] += wreck.height_m + rise - np.abs(v[:, 1]) * pitch

@@ -13,10 +13,9 @@ from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from aerialdojo_gen.scenes.grammar_frames import Parts
-from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import Surface, ground_meshes, polygons_of
-from aerialdojo_gen.scenes.mesh import Mesh, flipped, merge, mesh, translated
+from aerialdojo_gen.scenes.grammar import slab
+from aerialdojo_gen.scenes.ground import Surface, ground_meshes, outer_walls, polygons_of
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, flipped, merge, translated
 from aerialdojo_gen.scenes.plans.values import Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -157,18 +156,12 @@ def _parapets(site: Site, deck: Deck, axis: LineString) -> BaseGeometry:
 
 def _walls(plan: BaseGeometry, top: Terrain, bottom: Terrain, sink_m: float) -> Mesh:
     """Make the walls of a body around a plan, from the road down to a surface sunk by `sink_m`."""
-    out = []
-    for k, ring in enumerate((plan.exterior, *plan.interiors)):
-        xy = np.array(shapely.segmentize(ring, _CELL_M / 2).coords)[:, :2]
+
+    def heights(xy: Floats) -> tuple[Floats, Floats]:
         high = top.z(*xy.T)
-        low = np.minimum(bottom.z(*xy.T) + sink_m, high - 0.01)
-        n = len(xy)
-        a = np.arange(n - 1)
-        faces = np.concatenate([np.column_stack([a, a + 1, a + 1 + n]), np.column_stack([a, a + 1 + n, a + n])])
-        if ring.is_ccw != (k == 0):
-            faces = faces[:, ::-1]
-        out.append(mesh(np.concatenate([np.column_stack([xy, low]), np.column_stack([xy, high])]), faces))
-    return merge(out)
+        return np.minimum(bottom.z(*xy.T) + sink_m, high - 0.01), high
+
+    return merge(outer_walls(plan, _CELL_M / 2, heights))
 
 
 def _piers(site: Site, deck: Deck, axis: LineString, below: BaseGeometry) -> list[Mesh]:

@@ -1,4 +1,4 @@
-"""Structure that urban layouts share: decks on columns, railings, stairs, canopies, portals, lettering on walls.
+"""Structure that urban layouts share: decks on columns, railings, stairs, canopies, lettering on walls, slabs.
 
 Every function returns meshes in world coordinates with their materials, to be given to `Site.add`.
 """
@@ -15,18 +15,15 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import edge_strip, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.lettering import text
-from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, cylinder
-from aerialdojo_gen.scenes.shapes_extruded import profile
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number
+from aerialdojo_gen.scenes.shapes import box, cylinder, profile
 from aerialdojo_gen.scenes.site import Site
 
-Parts = list[tuple[str, Mesh]]
 Point = tuple[float, float]
 _Spacing = Annotated[Number, Field(ge=0.5)]
 
@@ -206,3 +203,9 @@ def spaced(a: Point, b: Point, spacing_m: float) -> list[Point]:
 def _in_rows(rows: Sequence[Sequence[Point]], spacing_m: float) -> list[Point]:
     """List points along every leg of lines, about `spacing_m` apart."""
     return [point for row in rows for a, b in pairwise(row) for point in spaced(a, b, spacing_m)]
+
+
+@part_builder
+def area_slab(area: Areas, z: tuple[Number, Number], role: Material) -> Parts:
+    """Extrude an area, or several, between two heights: a deck, a hull, walls around a yard, panes of a front."""
+    return [(role, slab(piece, *z)) for one in area for piece in polygons_of(one)]

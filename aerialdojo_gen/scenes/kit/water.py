@@ -15,18 +15,17 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_frames import Frame
-from aerialdojo_gen.scenes.grammar_houses import HouseStyle, house, window_parts
-from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.grammar import Frame, poisson_disc
 from aerialdojo_gen.scenes.ground import edge_strip, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
+from aerialdojo_gen.scenes.kit.houses import HouseStyle, house, window_parts
 from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.kit.steelwork import plates
-from aerialdojo_gen.scenes.kit.structures import Parts, block, letters
-from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
+from aerialdojo_gen.scenes.kit.structures import block, letters
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
-from aerialdojo_gen.scenes.shapes_extruded import sweep
+from aerialdojo_gen.scenes.shapes import sweep
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, rolling_terrain
 

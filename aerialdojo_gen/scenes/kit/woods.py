@@ -1,4 +1,4 @@
-"""Woods: trees by habitat and neighbourhood, and what grows and lies under them."""
+"""What grows where there is room: woods by habitat and neighbourhood, and what grows and lies under them."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Annotated
 import numpy as np
 import shapely
 from pydantic import Field
+from shapely import contains_xy
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar_scatter import poisson_disc
+from aerialdojo_gen.scenes.grammar import poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.natural_ground import downhill_deg
 from aerialdojo_gen.scenes.mesh import Mesh, merge, translated
@@ -19,6 +20,57 @@ from aerialdojo_gen.scenes.plans.fields import ScalarField
 from aerialdojo_gen.scenes.plans.values import Area, Material, Number
 from aerialdojo_gen.scenes.shapes import crown, cylinder
 from aerialdojo_gen.scenes.site import Site
+
+
+@dataclass(frozen=True)
+class Zone:
+    """What grows in an area, category after category; anywhere where it has none."""
+
+    of: list[str]
+    area: Area | None = None
+    steepest_m: Number = 100.0  # Greatest rise of the ground over 2 m
+
+
+@site_builder
+def keep_free(site: Site, *, areas: list[Area], z: tuple[Number, Number] = (-100.0, 1000.0)) -> None:
+    """Take areas, between two heights, so that nothing that looks for room stands there later."""
+    for area in areas:
+        site.occupy(area, *z)
+
+
+@site_builder
+def strew_trees(
+    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)],
+    spacing_m: Annotated[Number, Field(ge=0.5)],
+    stream: str = "trees", limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000,
+) -> None:  # fmt: skip
+    """Strew trees over an area, of categories in turn; a spot without room stays empty."""
+    for k, spot in enumerate(poisson_disc(area, spacing_m, site.rng_for(stream), limit=limit)):
+        site.place(Placement(of[k % len(of)], *spot, DRAWN), "skip")
+
+
+@site_builder
+def growth(
+    site: Site, *, area: Area, zones: list[Zone], spacing_m: Number, room_m: Number, limit: int,
+    settle_m: Number = 0.5, stream: str = "growth", by_pose: bool = False,
+) -> None:  # fmt: skip
+    """Strew plants over an area where there is room about them; each is of the first zone that it lies in.
+
+    The limit and the categories of a zone count those that stand; `by_pose`, those without room too.
+    """
+    count = 0
+    for k, pose in enumerate(poisson_disc(area, spacing_m, site.rng_for(stream))):
+        x, y, _ = pose
+        count = k if by_pose else count
+        zone = next((one for one in zones if one.area is None or contains_xy(one.area, x, y)), None)
+        if count >= limit or zone is None:
+            continue
+        z = site.foot_z(x, y, settle_m)
+        steep = abs(site.ground_z(x + 1.0, y) - site.ground_z(x - 1.0, y))
+        if steep <= zone.steepest_m and site.is_free(x, y, room_m, z=z):
+            plant = Placement(zone.of[count % len(zone.of)], *pose, DRAWN, z)
+            count += site.place(plant, "skip") is not None
+
 
 # Where not even a stem has room, nothing need be grown to find that out.
 _STEM_M = 0.3
@@ -56,9 +108,9 @@ def woods(
     They stand `spacing_m` apart where the density is 1, and further where it is less.
     """
     named = [one.of.partition(":") for one in species]
-    habitats = [one.habitat.on(site) for one in species]
+    habitats = [one.habitat(site) for one in species]
     rng = site.rng_for("woods", named[0][0], spacing_m)
-    for x, y, yaw in poisson_disc(area, spacing_m, rng, density.on(site) if density else None):
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density(site) if density else None):
         if not site.is_free(x, y, _STEM_M):
             continue
         suits = np.array([habitat(x, y) for habitat in habitats])
@@ -66,7 +118,7 @@ def woods(
         if rng.random() > species[pick].share:
             continue
         category, _, variant = named[pick]
-        site.place(Placement(category, x, y, yaw, variant or DRAWN, place=place), "skip", settle_m=0.3)
+        site.place(Placement(category, x, y, yaw, variant or DRAWN, place=place, settle_m=0.3), "skip")
 
 
 @site_builder
@@ -81,7 +133,7 @@ def strew(
     rng = site.rng_for("strew", category)
     words = ({"place": place} if place else {}) | (attributes or {})
     count = 0
-    for x, y, yaw in poisson_disc(area, spacing_m, rng, density.on(site) if density else None, limit * 3):
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density(site) if density else None, limit * 3):
         if count >= limit:
             break
         if not site.is_free(x, y, _STEM_M):
@@ -89,9 +141,9 @@ def strew(
         turn = downhill_deg(site, x, y) if category == "fallen_log" else yaw
         thing = Placement(
             category, x, y, turn, variant or DRAWN, scale=scale, roles=roles, params=params, attributes=words,
-            solid=solid,
+            solid=solid, settle_m=0.5,
         )  # fmt: skip
-        count += site.place(thing, "skip", settle_m=0.5) is not None
+        count += site.place(thing, "skip") is not None
 
 
 @site_builder
@@ -114,7 +166,7 @@ def broadleaves(
     stems: list[Mesh] = []
     crowns: list[Mesh] = []
     plans: list[BaseGeometry] = []
-    for x, y, yaw in poisson_disc(area, spacing_m, rng, density.on(site) if density else None, 3 * limit):
+    for x, y, yaw in poisson_disc(area, spacing_m, rng, density(site) if density else None, 3 * limit):
         high = float(rng.uniform(*height_m))
         if len(stems) >= limit or not site.is_free(x, y, 0.18 * high):
             continue

@@ -1,30 +1,31 @@
-"""Broken structure: what a collapse tears out of walls and floors, bared reinforcement, hanging slabs, loose chunks.
+"""Broken structure: what a damaged building is, what a collapse tears out of it, bared bars, hanging slabs, chunks.
 
-Buildings are made in a frame of their own, z = 0 at their ground floor; see `ruins`.
+Buildings are made in a frame of their own: the origin in the middle of the plan, x along its length, its front along
+-y (south where its yaw is 0), z = 0 at the ground floor; see `ruins`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 import shapely
+from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.grammar_buildings import opened
-from aerialdojo_gen.scenes.grammar_scatter import slab
-from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.kit.buildings import opened
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Number
-from aerialdojo_gen.scenes.shapes import box, crown
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep, upright
+from aerialdojo_gen.scenes.plans.values import Material, Number
+from aerialdojo_gen.scenes.shapes import box, crown, extrude, sweep, upright
 
-Parts = list[tuple[str, Mesh]]
 XY = tuple[float, float]
 
 _CORNERS = 26
@@ -94,11 +95,11 @@ def _wave(seed: int) -> Floats:
 def torn_wall(
     a: XY, b: XY, face: BaseGeometry, bites: Sequence[Bite], rng: np.random.Generator,
     openings: Sequence[tuple[float, float, float, float]] = (), thickness_m: float = 0.28,
-) -> Mesh | None:  # fmt: skip
-    """Make what is left of an upright wall.
+) -> list[Mesh]:  # fmt: skip
+    """Make what is left of an upright wall: one mesh, or none where nothing stands.
 
     `a` and `b` are the ends of its middle line, `face` is the whole wall as (along, up) in metres, openings are
-    (from, to, sill, head). None where nothing stands.
+    (from, to, sill, head).
     """
     top = face.bounds[3]
     face = opened(face, openings)
@@ -107,9 +108,8 @@ def torn_wall(
     yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
     # Tears and openings that all but touch leave slivers that cannot be triangulated.
     pieces = [p for p in polygons_of(shapely.set_precision(face, _GRID_M)) if p.area >= _CRUMB_M2]
-    if not pieces:
-        return None
-    return posed(upright(pieces, thickness_m), rotation(0.0, 0.0, yaw), (*a, 0.0))
+    turn = rotation(0.0, 0.0, yaw)
+    return [posed(upright(pieces, thickness_m), turn, (*a, 0.0))] if pieces else []
 
 
 def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh | None:
@@ -126,7 +126,7 @@ def remains(plan: Polygon, z_m: float, bites: Sequence[Bite]) -> BaseGeometry:
     return left
 
 
-def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite], spacing_m: float = 0.8) -> list[tuple[XY, float]]:
+def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite]) -> list[tuple[XY, float]]:
     """List points of a floor's broken edge, and the direction (degrees) that looks out into the gap from there."""
     left = remains(plan, z_m, bites)
     inner = plan.buffer(-0.3)
@@ -135,7 +135,7 @@ def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite], spacing_m: flo
         for piece in polygons_of(left):
             edge = piece.exterior.intersection(bite.area(z_m).boundary.buffer(0.02)).intersection(inner)
             for line in getattr(edge, "geoms", [edge]):
-                for s in np.arange(spacing_m / 2, line.length, spacing_m):
+                for s in np.arange(0.4, line.length, 0.8):
                     p = line.interpolate(s)
                     yaw = math.degrees(math.atan2(bite.y - p.y, bite.x - p.x))
                     out.append(((float(p.x), float(p.y)), yaw))
@@ -155,9 +155,9 @@ def bars(at: XY, z_m: float, yaw_deg: float, rng: np.random.Generator, reach_m: 
     return sweep(path=path, radius=0.025, sides=3)
 
 
-def hanging_slab(at: XY, top_m: float, yaw_deg: float, rng: np.random.Generator, length_m: float = 2.4) -> Mesh:
+def hanging_slab(at: XY, top_m: float, yaw_deg: float, rng: np.random.Generator) -> Mesh:
     """Make a piece of floor that hangs from a broken edge by its bars, steeply down."""
-    width, length = float(rng.uniform(1.2, 2.6)), length_m * float(rng.uniform(0.7, 1.1))
+    width, length = float(rng.uniform(1.2, 2.6)), 2.4 * float(rng.uniform(0.7, 1.1))
     ragged = Polygon(
         [(0, -width / 2), (length * 0.9, -width / 2 + 0.1), (length, -width * 0.1), (length * 0.8, width * 0.2),
          (length * 0.92, width / 2), (0, width / 2)]
@@ -197,3 +197,56 @@ def chunk(kind: str, size_m: float, rng: np.random.Generator) -> Mesh:
     body = box(size=sizes[kind], taper=(float(rng.uniform(0.8, 1.0)), 1.0))
     tilt = (float(rng.uniform(-28, 28)), float(rng.uniform(-24, 24)), float(rng.uniform(0, 360)))
     return posed(body, rotation(*tilt), (0, 0, -0.03))
+
+
+@dataclass(frozen=True)
+class Style:
+    """What a building looks like."""
+
+    wall: Material = "plaster:#cfc3ab"
+    band: Material = "concrete"  # Of sills and balconies
+    floor: Material = "concrete"  # Of the floors' edges and undersides
+    inner: Annotated[tuple[Material, ...], Field(min_length=4)] = (
+        "plaster:#b9c7b0", "plaster:#c9b0a0", "plaster:#a9b6c4", "plaster:#d3c79a",
+    )  # fmt: skip
+    roof: Material = "gravel:#8f8a82"
+    storey_m: Annotated[Number, Field(ge=2, le=20)] = 3.1
+    bay_m: Annotated[Number, Field(ge=1, le=50)] = 3.4
+    window_m: tuple[Number, Number, Number] = (1.5, 0.9, 2.3)  # Width, sill and head
+    wall_m: Annotated[Number, Field(ge=0.05, le=2)] = 0.28
+    columns: bool = True  # Whether a frame of columns carries the floors
+    shops: bool = False  # Wide shop windows in the ground storey of the front
+    panes: Number = 0.55  # Shares of the windows that kept their panes, and that have a plume of soot above
+    soot: Number = 0.0
+
+
+@dataclass(frozen=True)
+class Wreck:
+    """A damaged building."""
+
+    frame: Frame
+    length_m: float
+    depth_m: float
+    storeys: int
+    style: Style = field(default_factory=Style)
+    bites: tuple[Bite, ...] = ()  # In its own frame
+    lean_deg: float = 0.0  # How far the whole of it leans to its front
+    ridge_m: float = 0.0  # Height of a pitched roof's ridge over the eaves; 0 makes a flat roof
+    rooms_m: float = 6.8  # Distance of the partitions across it
+    balconies: bool = False  # Whether the front has them
+
+    @property
+    def plan(self) -> Polygon:
+        """Its outline in its own frame, metres."""
+        x, y = self.length_m / 2, self.depth_m / 2
+        return rectangle(-x, -y, x, y)
+
+    @property
+    def height_m(self) -> float:
+        """Height of the eaves, metres."""
+        return self.storeys * self.style.storey_m
+
+    def bears(self, x: float, y: float, storey: int, radius_m: float = 0.6) -> bool:
+        """Whether a floor (`storeys`: the roof) carries a disc about a point of its own frame."""
+        floor = remains(self.plan, storey * self.style.storey_m, self.bites)
+        return bool(floor.buffer(-radius_m).contains(Point(x, y)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,18 +18,52 @@ from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
+from aerialdojo_gen.scenes.expressions import evaluate
+from aerialdojo_gen.scenes.grammar import Frame, Pose, along, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.kit import kit
+from aerialdojo_gen.scenes.materials import refuse_unknown
+from aerialdojo_gen.scenes.mesh import Parts
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.scenes.placement import Placement, Room
-from aerialdojo_gen.scenes.plans.model import Ground, Paint, Place, PlanHead, Structure, Thing
-from aerialdojo_gen.scenes.plans.placing import poses_of, prop_height
+from aerialdojo_gen.scenes.placement import Placement
+from aerialdojo_gen.scenes.plans.model import Ground, Paint, Pattern, Place, PlanHead, Structure, Thing
 from aerialdojo_gen.scenes.plans.values import PlanNames
 from aerialdojo_gen.scenes.recipe import validated
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
+
+
+def prop_height(site: Site, category: str, variant: str | None, x: float, y: float) -> float:
+    """Height of a thing that stands at z = 0, metres, in the variant that it would have."""
+    chosen = variant if variant is not None else site.next_variant(category)
+    return float(
+        site.catalogue.instantiate(category, "trial", site.rng_for("trial"), (x, y, 0.0), 0.0, chosen).bounds[1, 2]
+    )
+
+
+def poses_of(site: Site, pattern: Pattern) -> Iterator[Pose]:
+    """Yield the poses of a pattern."""
+    if pattern.along is not None:
+        yield from along(
+            pattern.along, pattern.spacing_m, pattern.offset_m, pattern.start_m, pattern.end_m, pattern.turn_deg
+        )
+    elif pattern.grid is not None:
+        for x in pattern.grid[0]:
+            for y in pattern.grid[1]:
+                yaw = pattern.yaw
+                yield Pose(x, y, evaluate(yaw, {"x": x, "y": y}) if isinstance(yaw, str) else float(yaw))
+    elif pattern.ring is not None:
+        x, y, radius_m, count, start_deg = pattern.ring
+        for k in range(count):
+            a = math.radians(start_deg + 360.0 / count * k)
+            yield Pose(x + radius_m * math.cos(a), y + radius_m * math.sin(a), math.degrees(a) + pattern.turn_deg)
+    elif pattern.scatter is not None:
+        stream = site.rng_for(*(pattern.stream or "scatter").split("/"))
+        yield from poisson_disc(pattern.scatter, pattern.spacing_m, stream, limit=pattern.limit)
+    else:
+        yield from (Pose(*pose) for pose in pattern.poses)
+
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -211,8 +246,7 @@ class _Building:
             made: Parts = self._call("parts", part, where)
             return made
         shape, role = part.get("shape"), part.get("role")
-        if not isinstance(shape, str) or shape not in SHAPES:
-            raise AssetError(f"{where}: unknown shape {shape!r}{nearest(str(shape), SHAPES)}")
+        refuse_unknown([shape], SHAPES, where, "shape")
         try:
             material = self._names.material(role)
             return [(material, part_mesh(part, self._names.heights, {}))]
@@ -250,8 +284,7 @@ class _Building:
     def _pose(self, thing: Thing, entry: Place, where: str) -> tuple[str, str | None, tuple[float, float, float]]:
         """Category, variant and world pose of a thing."""
         category, _, variant = thing.what.partition(":")
-        if category not in self._site.catalogue:
-            raise AssetError(f"{where}: unknown category {category!r}{nearest(category, self._site.catalogue)}")
+        refuse_unknown([category], self._site.catalogue, where, "category")
         frame = Frame(*entry.frame)
         pose = frame.pose(*thing.at, thing.yaw_deg) if any(entry.frame) else (*thing.at, thing.yaw_deg)
         return category, variant or None, pose
@@ -271,13 +304,12 @@ class _Building:
         given = {key: getattr(thing, key) for key in ("design", "scale", "roles", "params", "attributes")}
         given = {key: value for key, value in given.items() if value}
         one = Placement(
-            category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid, **given
-        )
-        room: Room = {"clear_m": entry.clear_m, "margin_m": entry.margin_m, "room_m": entry.room_m}
-        if settles:
-            room["settle_m"] = entry.settle_m
+            category, x, y, yaw_deg, variant, z, thing.phrase or entry.phrase, thing.node, solid=thing.solid,
+            settle_m=entry.settle_m if settles else None, clear_m=entry.clear_m, margin_m=entry.margin_m,
+            room_m=entry.room_m, **given,
+        )  # fmt: skip
         try:
-            placed = self._site.place(one, entry.fit, **room) is not None
+            placed = self._site.place(one, entry.fit) is not None
         except AssetError as error:
             raise AssetError(f"{where}: {error}") from error
         if placed and entry.spots:

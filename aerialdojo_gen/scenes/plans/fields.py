@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -21,32 +20,19 @@ from aerialdojo_gen.scenes.plans.values import PlanNames, names_of, refuse_unkno
 from aerialdojo_gen.scenes.site import Site
 
 PointFunction = Callable[[float, float], float]
+Field = Callable[[Site], PointFunction]
+"""A number at every point of a site: gives the function of x and y, metres."""
 
 
-@dataclass(frozen=True)
-class Field:
-    """A number at every point of a site."""
-
-    on: Callable[[Site], PointFunction]  # Gives the function of x and y, metres
-
-
-def patches(seed: int, wavelength_m: float, sharpness: float = 2.5) -> PointFunction:
-    """Make a field of patches, about 1 on average, that rises to exp(sharpness) in the middle of some."""
-    noise = OpenSimplex(seed=seed)
-    return lambda x, y: math.exp(sharpness * noise.noise2(x / wavelength_m, y / wavelength_m))
-
-
-def near(area: BaseGeometry, reach_m: float) -> PointFunction:
-    """Make a field that is 1 on an area and falls to 0 at `reach_m` from it."""
-    shapely.prepare(area)
-    return lambda x, y: max(0.0, 1.0 - float(shapely.distance(area, shapely.Point(x, y))) / reach_m)
-
-
-def gentle(site: Site, x: float, y: float, fall: float = 0.64) -> float:
+def _gentle(site: Site, x: float, y: float, fall: float) -> float:
     """Say 1 where a stone stays lying, 0 where the ground falls by more than `fall` metres a metre."""
     east = site.ground_z(x + 0.7, y) - site.ground_z(x - 0.7, y)
     north = site.ground_z(x, y + 0.7) - site.ground_z(x, y - 0.7)
     return float(np.hypot(east, north) < 1.4 * fall)
+
+
+def _above(site: Site, x: float, y: float, z_m: float) -> float:
+    return float(site.ground_z(x, y) > z_m)
 
 
 def resolve_field(names: PlanNames, value: Any, known: Mapping[str, Any]) -> Field:
@@ -55,7 +41,7 @@ def resolve_field(names: PlanNames, value: Any, known: Mapping[str, Any]) -> Fie
         return _expression(names, value, known)
     if not isinstance(value, dict):
         number = names.number(value)
-        return Field(lambda _site: lambda _x, _y: number)
+        return lambda _site: lambda _x, _y: number
     refuse_unknown(value, (*_KINDS, "reach_m"))
     kinds = [key for key in _KINDS if key in value]
     if len(kinds) != 1:
@@ -82,61 +68,58 @@ def _expression(names: PlanNames, text: str, known: Mapping[str, Any]) -> Field:
     def on(site: Site) -> PointFunction:
         parts: dict[str, PointFunction] = {"x": lambda x, _y: x, "y": lambda _x, y: y, "z": site.ground_z}
         parts = {name: one for name, one in parts.items() if name in used}
-        parts |= {name: field.on(site) for name, field in fields.items()}
+        parts |= {name: field(site) for name, field in fields.items()}
         return lambda x, y: evaluate(text, heights | {name: one(x, y) for name, one in parts.items()})
 
-    return Field(on)
+    return on
 
 
 def _patches(names: PlanNames, value: Mapping[str, Any]) -> Field:
+    """Patches, about 1 on average, that rise to exp(sharpness) in the middle of some."""
     given = value["patches"]
     if not isinstance(given, list) or len(given) != 3:
         raise ValueError(f"patches is [seed, wavelength_m, sharpness], got {given!r}")
     seed, wavelength_m, sharpness = (names.number(one) for one in given)
     if wavelength_m <= 0.0 or abs(sharpness) > 20.0:
         raise ValueError(f"patches have a wavelength above 0 and a sharpness up to 20, got {given!r}")
-    made = patches(int(seed), wavelength_m, sharpness)
-    return Field(lambda _site: made)
-
-
-def _near(names: PlanNames, value: Mapping[str, Any]) -> Field:
-    return _within_reach(names, names.area(value["near"]), value)
-
-
-def _beside(names: PlanNames, value: Mapping[str, Any]) -> Field:
-    lines = value["beside"] if isinstance(value["beside"], list) else [value["beside"]]
-    return _within_reach(names, shapely.union_all([LineString(names.line(line)) for line in lines]), value)
+    noise = OpenSimplex(seed=int(seed))
+    return lambda _site: lambda x, y: math.exp(sharpness * noise.noise2(x / wavelength_m, y / wavelength_m))
 
 
 def _within_reach(names: PlanNames, area: BaseGeometry, value: Mapping[str, Any]) -> Field:
     reach_m = names.number(value.get("reach_m"))
     if reach_m <= 0.0:
         raise ValueError(f"reach_m must be above 0, got {reach_m:g}")
-    made = near(area, reach_m)
-    return Field(lambda _site: made)
+    shapely.prepare(area)
+    return lambda _site: lambda x, y: max(0.0, 1.0 - float(shapely.distance(area, shapely.Point(x, y))) / reach_m)
+
+
+def _of_line(names: PlanNames, value: Any) -> BaseGeometry:
+    lines = value if isinstance(value, list) else [value]
+    return shapely.union_all([LineString(names.line(line)) for line in lines])
 
 
 def _inside(names: PlanNames, value: Mapping[str, Any]) -> Field:
     area = names.area(value["inside"])
     shapely.prepare(area)
-    return Field(lambda _site: lambda x, y: float(shapely.contains_xy(area, x, y)))
+    return lambda _site: lambda x, y: float(shapely.contains_xy(area, x, y))
 
 
-def _gentle(names: PlanNames, value: Mapping[str, Any]) -> Field:
-    fall = names.number(value["gentle"])
-    return Field(lambda site: lambda x, y: gentle(site, x, y, fall))
-
-
-def _above(names: PlanNames, value: Mapping[str, Any]) -> Field:
-    z_m = names.number(value["above"])
-    return Field(lambda site: lambda x, y: float(site.ground_z(x, y) > z_m))
+def _of_ground(names: PlanNames, value: Any, function: Callable[[Site, float, float, float], float]) -> Field:
+    limit = names.number(value)
+    return lambda site: lambda x, y: function(site, x, y, limit)
 
 
 # Patches of noise; 1 on an area or a line and 0 at `reach_m` from it; and 1 or 0: inside an area, where the ground
 # falls by less than so much a metre, and where it lies higher than so much.
 _KINDS: dict[str, Callable[[PlanNames, Mapping[str, Any]], Field]] = {
-    "patches": _patches, "near": _near, "beside": _beside, "inside": _inside, "gentle": _gentle, "above": _above,
-}  # fmt: skip
+    "patches": _patches,
+    "near": lambda names, value: _within_reach(names, names.area(value["near"]), value),
+    "beside": lambda names, value: _within_reach(names, _of_line(names, value["beside"]), value),
+    "inside": _inside,
+    "gentle": lambda names, value: _of_ground(names, value["gentle"], _gentle),
+    "above": lambda names, value: _of_ground(names, value["above"], _above),
+}
 
 ScalarField = Annotated[
     Field,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Line, Material, Number
 from aerialdojo_gen.scenes.recipe import SceneHead
@@ -13,7 +13,6 @@ VERSION = 1
 MAX_ENTRIES = 2000
 _Text = Annotated[str, Field(min_length=1, max_length=200)]
 _Table = Annotated[dict[str, Any], Field(default_factory=dict)]
-_STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
 class PlanHead(SceneHead):
@@ -44,19 +43,15 @@ def _tables(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(one, dict) for one in value)
 
 
-class Ground(BaseModel):
+class Ground(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """The terrain, and what shows where nothing is painted."""
-
-    model_config = _STRICT
 
     material: Material = "grass"
     steps: list[dict[str, Any]] = []  # Ground builders, each on the terrain of the one before
 
 
-class Paint(BaseModel):
+class Paint(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """Paint an area of the ground, or several, over what was painted before."""
-
-    model_config = _STRICT
 
     paint: Areas
     material: Material
@@ -64,10 +59,8 @@ class Paint(BaseModel):
     edge: Material = "concrete"  # Material of that kerb
 
 
-class Structure(BaseModel):
+class Structure(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """A body made of parts, in the grammar of a prop's parts, or by part builders."""
-
-    model_config = _STRICT
 
     parts: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=1000)]
     node: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_]{0,59}$")] | None = None
@@ -86,13 +79,11 @@ class Structure(BaseModel):
         return self
 
 
-class Thing(BaseModel):
+class Thing(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """A prop of the catalogue, in the long form; the short one is ``["category:variant", x, y, yaw, z]``.
 
     In the short form its own phrase stands behind a bar: ``"bench:blue | beside the pond"``.
     """
-
-    model_config = _STRICT
 
     what: _Text
     at: At
@@ -111,10 +102,8 @@ class Thing(BaseModel):
     solid: bool = True  # Whether it takes the ground it stands on
 
 
-class Pattern(BaseModel):
+class Pattern(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """Poses that are computed; the categories are dealt over them in turn."""
-
-    model_config = _STRICT
 
     of: Annotated[list[_Text], Field(min_length=1)]
     along: Line | None = None  # A line, with a thing every `spacing_m`
@@ -140,10 +129,8 @@ class Pattern(BaseModel):
         return self
 
 
-class Place(BaseModel):
+class Place(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """Place things of the catalogue."""
-
-    model_config = _STRICT
 
     place: Annotated[list[Any], Field(max_length=2000)] = []  # Things, short or long
     pattern: Pattern | None = None

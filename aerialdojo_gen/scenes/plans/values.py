@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -21,11 +22,11 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import Floats, evaluate, evaluate_arrays
-from aerialdojo_gen.scenes.grammar_frames import Frame, Parts
-from aerialdojo_gen.scenes.grammar_scatter import eased_path, smooth_path
+from aerialdojo_gen.scenes.grammar import Frame, eased_path, smooth_path
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, ribbon
 from aerialdojo_gen.scenes.kit.natural_ground import blob, ragged_outline
 from aerialdojo_gen.scenes.materials import MaterialLibrary
+from aerialdojo_gen.scenes.mesh import Parts
 
 Point = tuple[float, float]
 ArrayFunction = Callable[[Mapping[str, Floats]], Floats]
@@ -235,30 +236,10 @@ def _polygon(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     return area
 
 
-def _union(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    return shapely.union_all([names.area(one) for one in value["union"]])
-
-
-def _named(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    """Give another area, of which the other keys make a new one."""
-    return names.area(value["area"])
-
-
-def _plus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
-    for other in others if isinstance(others, list) and not _is_box(others) else [others]:
-        area = area.union(names.area(other))
-    return area
-
-
-def _minus(names: PlanNames, area: BaseGeometry, others: Any) -> BaseGeometry:
-    for other in others if isinstance(others, list) and not _is_box(others) else [others]:
-        area = area.difference(names.area(other))
-    return area
-
-
-def _within(names: PlanNames, area: BaseGeometry, other: Any) -> BaseGeometry:
-    """Keep what lies in another area."""
-    return area.intersection(names.area(other))
+def _others(value: Any) -> list[Any]:
+    """List areas that are given one by one or as one, which may be a rectangle."""
+    is_box = isinstance(value, list) and len(value) == 4 and all(isinstance(one, int | float) for one in value)
+    return value if isinstance(value, list) and not is_box else [value]
 
 
 def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
@@ -267,11 +248,6 @@ def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
         return area.buffer(names.number(by_m))
     by, steps = names.point(by_m)
     return area.buffer(by, quad_segs=min(max(int(steps), 1), 64))
-
-
-def _framed(names: PlanNames, area: BaseGeometry, pose: Any) -> BaseGeometry:
-    """Take an area for one in the frame ``[x, y, yaw]``."""
-    return names.frame(pose).area(area)
 
 
 def _ragged(names: PlanNames, area: BaseGeometry, given: Any) -> BaseGeometry:
@@ -285,27 +261,21 @@ def _ragged(names: PlanNames, area: BaseGeometry, given: Any) -> BaseGeometry:
     return ragged_outline(ring, int(seed), amplitude_m, step_m)
 
 
-def _offset(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
-    """Grow an area with sharp corners, or shrink it."""
-    return area.buffer(names.number(by_m), join_style="mitre")
-
-
-def _is_box(value: Sequence[Any]) -> bool:
-    return len(value) == 4 and all(isinstance(one, int | float) for one in value)
-
-
-_AREAS = {
-    "area": _named, "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon,
-    "outline": _outline, "around": _around, "union": _union,
+_AREAS: dict[str, Callable[[PlanNames, Mapping[str, Any]], BaseGeometry]] = {
+    "area": lambda names, value: names.area(value["area"]),  # Of which the other keys make a new one
+    "box": _box, "disc": _disc, "blob": _blob, "ribbon": _ribbon, "polygon": _polygon, "outline": _outline,
+    "around": _around,
+    "union": lambda names, value: shapely.union_all([names.area(one) for one in value["union"]]),
 }  # fmt: skip
-_CHANGES = {
-    "frame": _framed,
+_CHANGES: dict[str, Callable[[PlanNames, BaseGeometry, Any], BaseGeometry]] = {
+    "frame": lambda names, area, pose: names.frame(pose).area(area),  # It was one in the frame ``[x, y, yaw]``
     "ragged": _ragged,
-    "plus": _plus,
-    "minus": _minus,
+    "plus": lambda names, area, others: reduce(lambda a, b: a.union(names.area(b)), _others(others), area),
+    "minus": lambda names, area, others: reduce(lambda a, b: a.difference(names.area(b)), _others(others), area),
     "grow_m": _grown,
-    "offset_m": _offset,
-    "within": _within,
+    # With sharp corners.
+    "offset_m": lambda names, area, by_m: area.buffer(names.number(by_m), join_style="mitre"),
+    "within": lambda names, area, other: area.intersection(names.area(other)),
 }
 
 

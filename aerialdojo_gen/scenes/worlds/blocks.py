@@ -1,4 +1,4 @@
-"""Stages of built-up ground: blocks with lanes between them, houses on them, what stands and hangs at their walls."""
+"""Stages of built-up ground: blocks with lanes between them, layouts of towns, houses, what hangs at their walls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.streets import Box, grid
+from aerialdojo_gen.scenes.worlds.streets import Box, grid, side_of
 
 Point = tuple[float, float]
 SIDES = (0.0, 90.0, 180.0, 270.0)
@@ -37,27 +37,19 @@ def split(draft: Draft, box: Box, lane_m: Point, size_m: Point, *key: object) ->
     return blocks, lanes
 
 
-def side_of(box: Box, yaw: float, out_m: float = 0.0) -> tuple[Point, Point, float]:
-    """Middle of a rectangle's side that looks along a direction of the four, the unit vector along it, its length."""
-    x, y = box.middle
-    out = {0: (box.x1 + out_m, y), 90: (x, box.y1 + out_m), 180: (box.x0 - out_m, y), 270: (x, box.y0 - out_m)}
-    upright = round(yaw) % 180 == 0
-    return out[round(yaw) % 360], ((0.0, 1.0) if upright else (1.0, 0.0)), box.depth if upright else box.width
-
-
-def inner_sides(draft: Draft, box: Box, margin_m: float = 2.5) -> list[float]:
+def inner_sides(draft: Draft, box: Box) -> list[float]:
     """Sides of a rectangle that do not lie at the site's edge."""
-    w, d = draft.width_m / 2 - margin_m, draft.depth_m / 2 - margin_m
+    w, d = draft.width_m / 2 - 2.5, draft.depth_m / 2 - 2.5
     clear = {0.0: box.x1 < w, 90.0: box.y1 < d, 180.0: box.x0 > -w, 270.0: box.y0 > -d}
     return [yaw for yaw in SIDES if clear[yaw]]
 
 
-def town_house(draft: Draft, box: Box, name: str, storeys: int, category: str = "town_house") -> None:
+def town_house(draft: Draft, box: Box, name: str, storeys: int) -> None:
     """Put up a house on a block, with things on its roof where that is flat."""
     flat = draft.chance(0.65, name, "flat")
     arguments = {
         "outline": box.rounded(), "wall": draft.material("wall", name), "storeys": storeys, "storey_m": 3.0,
-        "roof": draft.material("flat_roof" if flat else "roof", name), "on": 0, "category": category,
+        "roof": draft.material("flat_roof" if flat else "roof", name), "on": 0, "category": "town_house",
         "as": f"{name}_top", "overhang_m": 0.25,
     }  # fmt: skip
     if not flat:
@@ -108,8 +100,7 @@ def dressed(draft: Draft, box: Box, name: str, storeys: int, sides: Sequence[flo
 def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float = 5.6) -> None:
     """Hang washing and lights across lanes, from house to house."""
     walls = shapely.union_all([house.shape() for house in houses])
-    washing: list[list[float]] = []
-    lights: list[list[float]] = []
+    ropes: dict[str, list[list[float]]] = {"washing_lines": [], "light_strings": []}
     for lane in lanes:
         upright = lane.depth > lane.width
         for k in range(int(max(lane.width, lane.depth) // 9.0)):
@@ -121,27 +112,26 @@ def strung(draft: Draft, lanes: Sequence[Box], houses: Sequence[Box], z_m: float
             if not all(walls.buffer(0.05).contains(shapely.Point(*end)) for end in (ends[:2], ends[2:])):
                 continue
             rope = [*(round(e, 2) for e in ends), round(z_m - draft.number(0.0, 0.9, "across", "z", *ends), 2)]
-            (washing if draft.chance(0.5, "washing", *ends) else lights).append(rope)
-    if washing:
-        draft.make("washing_lines", across=washing)
-    if lights:
-        draft.make("light_strings", across=lights)
+            ropes["washing_lines" if draft.chance(0.5, "washing", *ends) else "light_strings"].append(rope)
+    for builder, across in ropes.items():
+        if across:
+            draft.make(builder, across=across)
 
 
-def square(draft: Draft, box: Box, kind: str = "square", step_m: float = 3.5) -> Point:
+def square(draft: Draft, box: Box) -> Point:
     """Pave a square, and offer slots on it, its middle left free; gives the middle."""
     draft.paint(box.rounded(), draft.material("square", box.x0, box.y0), rise_m=0.12)
     x, y = box.middle
-    for u, v in grid(box.grown(-1.4), step_m):
+    for u, v in grid(box.grown(-1.4), 3.5):
         if math.hypot(u - x, v - y) > 4.4:
             yaw = round(math.degrees(math.atan2(y - v, x - u)) / 90.0) * 90.0
-            draft.slot(kind, u, v, yaw, (3.3, 3.3))
+            draft.slot("square", u, v, yaw, (3.3, 3.3))
     return round(x, 2), round(y, 2)
 
 
-def lane_streets(draft: Draft, lanes: Sequence[Box], lane_m: float = 2.8, pavement_m: float = 1.6) -> None:
+def lane_streets(draft: Draft, lanes: Sequence[Box]) -> None:
     """Pave the lanes between blocks as streets; offer slots on them (``road``) and at their kerbs (``kerb``)."""
-    paths, w, d = [], draft.width_m / 2, draft.depth_m / 2
+    paths, w, d, lane_m, pavement_m = [], draft.width_m / 2, draft.depth_m / 2, 2.8, 1.6
     for lane in lanes:
         x, y = lane.middle
         more = lane_m + pavement_m
@@ -167,3 +157,67 @@ def lane_streets(draft: Draft, lanes: Sequence[Box], lane_m: float = 2.8, paveme
                 if k % 2 == (side > 0):
                     draft.slot("road", *((x + road, at) if upright else (at, y + road)), yaw, (9.5, 2.9))
                 draft.slot("kerb", *((x + kerb, at) if upright else (at, y + kerb)), yaw + 90.0, (1.6, 4.6))
+
+
+Layout = tuple[list[Box], list[Box], list[Box]]  # Lots, streets and open ground
+
+
+def left_open(draft: Draft, blocks: list[Box], number: int) -> tuple[list[Box], list[Box]]:
+    """Leave so many blocks open, those nearest to the middle of the site."""
+    near = sorted(blocks, key=lambda b: abs(b.middle[0]) + abs(b.middle[1]) + draft.number(0, 12, "open", *b))
+    return near[number:], near[:number]
+
+
+def town(draft: Draft, w: float, d: float) -> Layout:
+    """Blocks of uneven sizes between streets, some open."""
+    blocks, lanes = split(draft, Box(-w, -d, w, d), (8.8, 8.8), (16.0, 30.0))
+    lots, open_ = left_open(draft, blocks, 2)
+    return lots, lanes, open_
+
+
+def about_square(draft: Draft, w: float, d: float) -> Layout:
+    """A square in the middle, streets into it, blocks about it."""
+    half_x, half_y, lane = draft.number(15, 19, "x"), draft.number(12, 15, "y"), 8.8
+    x0, y0, x1, y1 = -half_x, -half_y, half_x, half_y
+    lanes = [Box(-w, y1, x1 + lane, y1 + lane), Box(x1, -d, x1 + lane, y1), Box(x0 - lane, y0 - lane, x1, y0),
+             Box(x0 - lane, y0, x0, d)]  # fmt: skip
+    areas = [Box(-w, y1 + lane, x0 - lane, d), Box(x0, y1 + lane, w, d), Box(x1 + lane, -d, w, y1 + lane),
+             Box(-w, -d, x1, y0 - lane), Box(-w, y0 - lane, x0 - lane, y1)]  # fmt: skip
+    lots: list[Box] = []
+    for k, area in enumerate(areas):
+        if min(area.width, area.depth) > 9.0:
+            more, _ = split(draft, area, (3.0, 4.5), (13.0, 30.0), k)
+            lots += more
+    return lots, lanes, [Box(x0, y0, x1, y1)]
+
+
+def avenue(draft: Draft, w: float, d: float) -> Layout:
+    """A street from end to end, blocks in rows at both sides, a park at one end."""
+    y, lane = draft.number(-0.25, 0.25, "y") * d, 8.8
+    at = draft.number(0.4, 0.55, "park") * w
+    lanes = [Box(-w, y - lane / 2, w, y + lane / 2)]
+    lots: list[Box] = []
+    for k, (y0, y1) in enumerate(((-d, y - lane / 2), (y + lane / 2, d))):
+        row, ways = split(draft, Box(-w, y0, at if k == 0 else w, y1), (8.8, 8.8), (18.0, 34.0), k)
+        lots += row
+        lanes += ways
+    park = Box(at, -d, w, y - lane / 2)
+    lots, more = left_open(draft, lots, 1)
+    return lots, lanes, [park, *more]
+
+
+def estate(draft: Draft, w: float, d: float) -> Layout:
+    """Long blocks of flats in parallel, greens between them, off one street."""
+    lane, street = 8.8, draft.number(-0.9, -0.75, "street") * d + 4.4
+    lanes = [Box(-w, street - lane / 2, w, street + lane / 2)]
+    y, lots, open_, k = street + lane / 2, [], [], 0
+    while y + 13.0 < d:
+        lots.append(Box(-w + draft.number(2, 8, "in", k), y + 0.5, draft.number(-2, 6, "end", k), y + 13.0))
+        lots.append(
+            Box(lots[-1].x1 + draft.number(5, 9, "gap", k), y + 0.5, w - draft.number(2, 8, "out", k), y + 13.0)
+        )
+        gap = draft.number(10, 14, "green", k)
+        if y + 13.0 + gap < d:
+            open_.append(Box(-w + 2.0, y + 13.5, w - 2.0, y + 13.0 + gap))
+        y, k = y + 13.0 + gap, k + 1
+    return lots, lanes, open_

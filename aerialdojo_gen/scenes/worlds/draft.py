@@ -19,8 +19,7 @@ from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
 from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
-from aerialdojo_gen.scenes.worlds.paints import repainted
-from aerialdojo_gen.scenes.worlds.sizes import extents_m
+from aerialdojo_gen.scenes.worlds.paints import extents_m, repainted
 from aerialdojo_gen.scenes.worlds.world import World
 
 STAGE = "vary"
@@ -42,7 +41,7 @@ class Slot:
     yaw_deg: float  # Where the front of what stands there looks
     room_m: tuple[float, float]  # Room along the front's direction, and across it
     on: float | str | None  # Height, or its name; the ground where None
-    settle_m: float | None  # On a slope: see `Site.place`
+    settle_m: float | None  # On a slope: see `Placement`
 
 
 class Draft:

@@ -1,4 +1,4 @@
-"""Colours for things of which a category has too few: paint charts by the word that a person would use."""
+"""What worlds ask of the catalogue: colours for things that have too few, and the ground that things take."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.catalogue import Catalogue
+from aerialdojo_gen.scenes.placement import footprint
 
 # What `scenes.colours.colour_name` calls these, and a test holds it, is the key or one of its shades.
 PAINTS = {
@@ -49,3 +51,17 @@ def repainted(
     shade = PAINTS[colour][int(rng.integers(len(PAINTS[colour])))]
     body = {"what": f"{category}:{plain[int(rng.integers(len(plain)))]}", "at": [x, y], "yaw_deg": yaw}
     return {**body, "roles": {role: shade}, "attributes": {"colour": colour}}
+
+
+@cache
+def extents_m(catalogue: Catalogue, what: str) -> tuple[float, float]:
+    """Largest extents on the ground of a category's variants, along their front's direction and across it, metres."""
+    category, _, variant = what.partition(":")
+    names = [variant] if variant else [one.name for one in catalogue[category].variants]
+    sizes = []
+    for name in names:
+        thing = catalogue.instantiate(category, "size", generator(0, "sizes", category, name), variant=name or None)
+        x0, y0, x1, y1 = footprint(thing, 0.0).bounds
+        sizes.append((2 * max(-x0, x1), 2 * max(-y0, y1)))
+    along, across = np.array(sizes).max(axis=0)
+    return float(along), float(across)

@@ -1,24 +1,33 @@
-"""Stages of coasts: islands in the sea, landings, piers with berths, huts over the water, what is afloat."""
+"""Stages of coasts: islands, landings, piers, huts over the water, villages with paths and beaches, boats."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.wilds import smoothed, step
+from aerialdojo_gen.scenes.worlds.wilds import (
+    about,
+    anywhere,
+    beside,
+    clearing,
+    paths,
+    smoothed,
+    step,
+    strewn,
+    winding,
+)
 
 Point = tuple[float, float]
 
 
 def ahead(at: Point, yaw_deg: float, by_m: float, left_m: float = 0.0) -> Point:
     """Point ahead of a pose by a distance, and to its left by another."""
-    c, s = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
-    return round(at[0] + c * by_m - s * left_m, 2), round(at[1] + s * by_m + c * left_m, 2)
+    return beside((*at, yaw_deg), by_m, left_m)
 
 
 def towards(at: Point, to: Point) -> float:
@@ -92,16 +101,16 @@ def is_open(draft: Draft, land: BaseGeometry, area: BaseGeometry, margin_m: floa
     return draft.is_free(area) and land.distance(area) > margin_m
 
 
-def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m: float, z: str = "jetty") -> bool:
+def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m: float) -> bool:
     """Build a jetty out from a point of the shore, where the water is free; offer slots on it, and berths."""
-    draft.floors[z] = draft.floors.get(z, 1.4)
+    draft.floors.setdefault("jetty", 1.4)
     width, foot = 2.6, ahead(at, yaw_deg, -2.2)
     body = shapely.LineString([ahead(at, yaw_deg, 2.5), ahead(at, yaw_deg, length_m + 7)])
     if not is_open(draft, land, body.buffer(5.5, cap_style="flat"), 0.3):
         return False
     draft.make(
-        "pier", at=list(foot), yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z=z, bay_m=3.8,
-        floor=draft.material("boards"), category="jetty",
+        "pier", at=list(foot), yaw_deg=round(yaw_deg, 1), length_m=length_m + 2.2, width_m=width, z="jetty",
+        bay_m=3.8, floor=draft.material("boards"), category="jetty",
     )  # fmt: skip
     # The berths have ground of their own, which nothing that drifts may take.
     for side in (1.0, -1.0):
@@ -113,7 +122,7 @@ def jetty(draft: Draft, land: BaseGeometry, at: Point, yaw_deg: float, length_m:
     for k in range(int(length_m // 4.6)):
         side = -0.75 if k % 2 else 0.75
         x, y = ahead(at, yaw_deg, 3.4 + 4.6 * k, side)
-        draft.slot("jetty", x, y, yaw_deg + (90.0 if side < 0 else -90.0), (2.0, 2.9), on=z)
+        draft.slot("jetty", x, y, yaw_deg + (90.0 if side < 0 else -90.0), (2.0, 2.9), on="jetty")
     draft.take(shapely.LineString([foot, ahead(at, yaw_deg, length_m + 7)]).buffer(6.5, cap_style="flat"))
     return True
 
@@ -151,30 +160,160 @@ def walls(draft: Draft, number: int, *key: object) -> list[str]:
     return [draft.material("wall", *key, k) for k in range(number)]
 
 
-def afloat(draft: Draft, land: BaseGeometry, number: int, reach_m: float = 200.0) -> None:
+def afloat(draft: Draft, land: BaseGeometry, number: int) -> None:
     """Offer slots (``sea``) on open water, far from one another."""
     rng, w, d = draft.rng("afloat"), draft.width_m / 2 - 9.0, draft.depth_m / 2 - 9.0
     chosen: list[shapely.Point] = []
     for _ in range(number * 14):
         spot = shapely.Point(float(rng.uniform(-w, w)), float(rng.uniform(-d, d)))
         yaw = float(rng.uniform(0, 360))
-        if len(chosen) == number or land.distance(spot) > reach_m or any(spot.distance(c) < 15.0 for c in chosen):
+        if len(chosen) == number or land.distance(spot) > 200.0 or any(spot.distance(c) < 15.0 for c in chosen):
             continue
         if is_open(draft, land, spot.buffer(7.2), 1.6):
             chosen.append(spot)
             draft.slot("sea", spot.x, spot.y, yaw, (14.2, 6.0), on="sea")
 
 
-def beach_slots(
-    draft: Draft, land: BaseGeometry, step_m: float = 6.5, inland_m: float = 4.8, off: BaseGeometry | None = None
-) -> None:
+def beach_slots(draft: Draft, land: BaseGeometry, off: BaseGeometry) -> None:
     """Offer slots (``beach``) along the shore, fronts to the sea, where the ground is free, off an area."""
-    inner = land.buffer(-inland_m)
+    inner, step_m = land.buffer(-4.8), 6.5
     for part in getattr(inner, "geoms", [inner]):
         ring = part.exterior
         for k in range(int(ring.length // step_m)):
             p = ring.interpolate((k + draft.number(0.2, 0.8, "beach", k, round(part.area))) * step_m)
             q = ring.interpolate(ring.project(p) + 0.5)
             yaw = towards((p.x, p.y), (q.x, q.y)) + (-90.0 if ring.is_ccw else 90.0)
-            if draft.is_free(p.buffer(2.2)) and (off is None or not off.intersects(p)):
+            if draft.is_free(p.buffer(2.2)) and not off.intersects(p):
                 draft.slot("beach", p.x, p.y, yaw, (5.4, 4.0))
+
+
+class Isle(NamedTuple):
+    """What a topology gives to the stages after it."""
+
+    land: BaseGeometry
+    village: Point
+    bay_deg: float  # Where the village looks to the sea
+    heads: list[Point]  # Level places for landmarks, and what belongs to lookouts
+    shut: BaseGeometry = shapely.Point()  # Too steep for houses and woods
+    cliffs: BaseGeometry = shapely.Point()  # Where the shore is no beach
+
+
+def build_village(draft: Draft, isle: Isle) -> None:
+    """Found a village with landings, lookouts, paths between them, beaches, boats and woods."""
+    w, d = draft.width_m / 2, draft.depth_m / 2
+    draft.take(isle.shut)
+    clearing(draft, "square", isle.village, 8.0)
+    for k, head in enumerate(isle.heads):
+        clearing(draft, f"head_{k}", head, 6.5)
+    draft.section("Landings")
+    _landings(draft, isle)
+    _ways(draft, isle)
+    draft.section("The village")
+    _houses(draft, isle)
+    about(draft, "village", isle.village, (3.2, 6.6), 9, (4.9, 3.8))
+    draft.take(shapely.Point(isle.village).buffer(9.0))
+    afloat(draft, isle.land, 9)
+    beach_slots(draft, isle.land, off=isle.cliffs)
+    sea = shapely.box(-w, -d, w, d).difference(isle.land.buffer(-3.5))
+    draft.take(sea)
+    step(draft, "level_under_things")
+    draft.section("Landmarks")
+    spots = [(*head, float(round(towards(head, isle.village)))) for head in isle.heads]
+    inner = isle.land.buffer(-7.0)
+    spots += [p for p in anywhere(draft, 200) if inner.contains(shapely.Point(p[0], p[1]))]
+    if draft.chance(0.6, "lighthouse"):
+        draft.landmark(spots[: len(isle.heads)], of=["lighthouse"])
+    draft.landmark(spots)
+    for head in isle.heads:
+        about(draft, "lookout", head, (5.2, 7.4), 5, (3.4, 3.4))
+    draft.level_things = False  # The land is gentle enough for small things
+    strewn(draft, "inland", 30, (3.6, 3.6))
+    draft.fill_slots()
+    _growth(draft)
+
+
+def _landings(draft: Draft, isle: Isle) -> None:
+    built, huts = 0, draft.material("homes") == "huts"
+    for off in (0.0, 22.0, -22.0, 40.0, -40.0, 60.0, -60.0, 85.0, -85.0):
+        yaw = isle.bay_deg + off
+        shore = landing(isle.land, isle.village, yaw)
+        if built == 1 and huts and huts_over_water(draft, isle.land, shore, yaw, draft.whole(2, 3, "rows")):
+            built += 1
+        elif built < 2:
+            built += jetty(draft, isle.land, shore, yaw, draft.number(12, 18, "jetty", off))
+    if not built:
+        raise NoRoomError("no room for a jetty")
+
+
+def _ways(draft: Draft, isle: Isle) -> None:
+    """Paths from the village to the lookouts and to the shore, so far as they lie on land."""
+    lines = {}
+    shore = landing(isle.land, isle.village, isle.bay_deg)
+    lines["to_shore"] = winding(draft, "to_shore", (ahead(isle.village, isle.bay_deg, 6.5), shore), 0.4, 1)
+    for k, head in enumerate(isle.heads):
+        yaw = towards(isle.village, head)
+        ends = (ahead(isle.village, yaw, 6.5), ahead(head, yaw, -6.6))
+        line = winding(draft, f"way_{k}", ends, 5.0, 3)
+        if isle.land.buffer(-2.0).contains(line) and not isle.shut.intersects(line):
+            lines[f"way_{k}"] = line
+        else:
+            del draft.lines[f"way_{k}"]
+    paths(draft, lines)
+
+
+def _houses(draft: Draft, isle: Isle) -> None:
+    """Houses about the square, fronts to it, each on a level pad with a yard."""
+    inner = isle.land.buffer(-6.5)
+    found: list[tuple[float, float, float]] = []
+    wanted = round(draft.knob("houses"))
+    rng = draft.rng("houses")
+    for _ in range(160):
+        angle, away = float(rng.uniform(0, 360)), float(rng.uniform(13.5, 27.0))
+        x, y = ahead(isle.village, angle, away)
+        spot = shapely.Point(x, y)
+        if len(found) < wanted and inner.contains(spot) and draft.is_free(spot.buffer(5.2)):
+            turn = round(angle + 180.0 + float(rng.uniform(-25, 25)), 1) % 360.0
+            found.append((x, y, turn))
+            draft.take(spot.buffer(5.6))
+    if len(found) < 2:
+        raise NoRoomError("no room for the village")
+    for x, y, yaw in found:
+        step(draft, "level_area", area=[{"disc": [x, y, 4.2]}], blend_m=3.5)
+        draft.paint({"blob": [x, y, 6.0, draft.whole(0, 999, "yard", x), 0.2]}, draft.material("glade", x))
+        for side in (-1, 1):
+            draft.slot("yard", *ahead((x, y), yaw, draft.number(1, 4, "yard", x, side), side * 6.2), yaw, (3.0, 3.0))
+    poses = [list(p) for p in found]
+    if draft.material("homes") == "huts":
+        draft.make("stilt_huts", at=poses, walls=walls(draft, len(poses), "home"))
+        return
+    draft.make(
+        "house_row", at=[p[:2] for p in poses], yaws_deg=[p[2] for p in poses], walls=walls(draft, 6, "home"),
+        style={"width_m": draft.number(6.0, 6.9, "house_w"), "depth_m": 5.6, "storeys": 1, "storey_m": 2.7,
+               "roof_m": draft.number(2.0, 2.8, "house_roof")},
+        roofs=[draft.material("roof", k) for k in range(2)], doors=["#2f5f6e", "#6e2f2a", "#e9dcb0"],
+        storeys=[draft.whole(1, 2, "storeys", k) for k in range(3)], chimneys=[True, False],
+    )  # fmt: skip
+
+
+def _growth(draft: Draft) -> None:
+    """Boulders at the shore, and what grows inland."""
+    draft.section("Rocks, and what grows")
+    draft.make(
+        "strew_rocks", area={"outline": "land", "width_m": 4.0}, spacing_m=draft.number(3.2, 6.0, "rocks"),
+        radius_m=[0.5, 1.4], material=draft.material("boulder"), limit=60,
+    )  # fmt: skip
+    draft.areas["inner"] = {"area": "land", "grow_m": -5.0}
+    trees, low = draft.material("trees").split("+"), draft.material("low").split("+")
+    most = round(draft.knob("trees") / len(trees) / 2)
+    kinds = [
+        {"of": tree, "spacing_m": 3.8, "limit": most, "scale": draft.number(low_, high, "scale", tree, low_)}
+        for tree in trees
+        for low_, high in ((0.9, 1.1), (1.2, 1.5))
+    ]
+    kinds += [{"of": one, "spacing_m": 2.6, "limit": 15, "scale": draft.number(1, 1.5, "low", one)} for one in low]
+    draft.make("undergrowth", area="inner", kinds=kinds)
+
+
+def inside(land: BaseGeometry, at: Point, yaw_deg: float, from_shore_m: float) -> Point:
+    """Point that lies so far behind the shore, from a point on land in a direction."""
+    return ahead(landing(land, at, yaw_deg), yaw_deg, -from_shore_m)

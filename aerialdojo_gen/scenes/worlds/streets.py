@@ -50,17 +50,17 @@ class Box(NamedTuple):
         return [round(v, 2) for v in self]
 
 
-def street_along(draft: Draft, path: Sequence[Point], *, lanes: int = 2) -> float:
+def street_along(draft: Draft, path: Sequence[Point]) -> float:
     """Pave a street along a path, offer slots on it and at its kerbs; gives half its width with pavements, metres."""
-    draft.make("streets", paths=[[list(p) for p in path]], lanes=lanes, pavement_m=PAVEMENT_M)
-    half = lanes * LANE_M / 2 + PAVEMENT_M
+    draft.make("streets", paths=[[list(p) for p in path]], lanes=2, pavement_m=PAVEMENT_M)
+    half = LANE_M + PAVEMENT_M
     line = shapely.LineString(path)
     draft.take(line.buffer(half, cap_style="flat"))
-    along_street(draft, line, half, lanes)
+    along_street(draft, line, half)
     return half
 
 
-def along_street(draft: Draft, line: shapely.LineString, half_m: float, lanes: int) -> None:
+def along_street(draft: Draft, line: shapely.LineString, half_m: float) -> None:
     """Offer slots on a street's lanes (``road``) and on its pavements (``kerb``)."""
     step, at = 7.5, 4.0
     while at < line.length - 4.0:
@@ -97,12 +97,17 @@ def block_building(draft: Draft, box: Box, name: str, *, storeys: int, street_de
             draft.slot("roof", x, y, street_deg, (3.2, 3.2), on=f"{name}_top")
 
 
+def side_of(box: Box, yaw: float, out_m: float = 0.0) -> tuple[Point, Point, float]:
+    """Middle of a rectangle's side that looks along a direction of the four, the unit vector along it, its length."""
+    x, y = box.middle
+    out = {0: (box.x1 + out_m, y), 90: (x, box.y1 + out_m), 180: (box.x0 - out_m, y), 270: (x, box.y0 - out_m)}
+    upright = round(yaw) % 180 == 0
+    return out[round(yaw) % 360], ((0.0, 1.0) if upright else (1.0, 0.0)), box.depth if upright else box.width
+
+
 def front_slots(draft: Draft, box: Box, street_deg: float, step_m: float = 3.4) -> None:
     """Offer slots (``front``) along the side of a box that looks along a direction of the four."""
-    x, y = box.middle
-    sides = {0: ((box.x1 + 1.3, y), (0, 1), box.depth), 90: ((x, box.y1 + 1.3), (1, 0), box.width),
-             180: ((box.x0 - 1.3, y), (0, 1), box.depth), 270: ((x, box.y0 - 1.3), (1, 0), box.width)}  # fmt: skip
-    (cx, cy), (ux, uy), length = sides[int(street_deg) % 360]
+    (cx, cy), (ux, uy), length = side_of(box, street_deg, 1.3)
     n = int((length - 1.0) // step_m)
     for k in range(n):
         v = (k - (n - 1) / 2) * step_m

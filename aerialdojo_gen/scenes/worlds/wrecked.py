@@ -10,9 +10,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import Pose, beside
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import step
+from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, step
 
 Point = tuple[float, float]
 STOREY_M = 3.1
@@ -44,7 +43,10 @@ def wreck(
     if lean_deg:
         return
     for k, bite in enumerate(bites):
-        _rubble(draft, pose, bite, f"{name}_{k}")
+        # What fell out of the hole.
+        at = beside(pose, bite["x"], bite["y"] + (1.8 if bite["y"] > 0 else -1.8))
+        radius = 2.4 + 0.5 * bite["foot_m"] + 0.25 * bite["head_m"]
+        heap(draft, f"heap_{name}_{k}", at, radius, draft.number(1.0, 2.4, f"{name}_{k}"))
     if bites:
         _rooms(draft, pose, (long, deep), name, storeys, bites)
     if not pitched:
@@ -76,13 +78,6 @@ def _bite(
         "x": round(u, 2), "y": round(side * deep * 0.5, 2), "foot_m": min(foot, head), "head_m": round(head, 1),
         "z0_m": z0, "z1_m": round(max(STOREY_M * storeys, z0 + 2.0), 1), "seed": draft.whole(0, 99, name, "bite", k),
     }  # fmt: skip
-
-
-def _rubble(draft: Draft, pose: Pose, bite: dict[str, float], name: str) -> None:
-    """Heap up what fell out of a hole."""
-    out = 1.8 if bite["y"] > 0 else -1.8
-    at = beside(pose, bite["x"], bite["y"] + out)
-    heap(draft, f"heap_{name}", at, 2.4 + 0.5 * bite["foot_m"] + 0.25 * bite["head_m"], draft.number(1.0, 2.4, name))
 
 
 def heap(draft: Draft, name: str, at: Point, radius_m: float, height_m: float) -> None:
@@ -133,7 +128,7 @@ def pancaked(draft: Draft, box: Box, name: str, floors: int) -> None:
     draft.take(box.shape())
 
 
-def littered(draft: Draft, scattered_m: float = 4.2) -> None:
+def littered(draft: Draft) -> None:
     """Paint the heaps, and strew loose pieces about them and over the site."""
     heaps = [name for name in draft.areas if name.startswith("heap_")]
     w, d = draft.width_m / 2 - 2.0, draft.depth_m / 2 - 2.0
@@ -141,7 +136,7 @@ def littered(draft: Draft, scattered_m: float = 4.2) -> None:
         draft.make(
             "strew_about_heaps", heaps=heaps, spacing_m=1.5, margin_m=2.0, brick=draft.material("wall", "bricks")
         )
-    draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=scattered_m, stream="everywhere", size_m=[0.35, 0.8])
+    draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=4.2, stream="everywhere", size_m=[0.35, 0.8])
 
 
 def paint_heaps(draft: Draft) -> None:
@@ -171,13 +166,13 @@ def open_landmarks(draft: Draft, open_: Sequence[Box], shut: BaseGeometry) -> No
     draft.landmark([(*p, draft.pick(yaws, "landmark", *p)) for p in draft.shuffled(free, "landmarks")])
 
 
-def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point, *, spread: float = 0.6) -> None:
+def things(draft: Draft, kind: str, box: Box, step_m: float, room_m: Point) -> None:
     """Offer slots over a box, unevenly."""
     from_, n_x, n_y = (box.x0, box.y0), max(int(box.width // step_m), 1), max(int(box.depth // step_m), 1)
     for i in range(n_x):
         for j in range(n_y):
             rng: Any = draft.rng("things", kind, i, j, *box)
-            u, v = (float(rng.uniform(-spread, spread)) for _ in range(2))
+            u, v = (float(rng.uniform(-0.6, 0.6)) for _ in range(2))
             x = from_[0] + (i + 0.5) * box.width / n_x + u
             y = from_[1] + (j + 0.5) * box.depth / n_y + v
             draft.slot(kind, x, y, float(rng.uniform(0, 360)), room_m, settle_m=0.5)

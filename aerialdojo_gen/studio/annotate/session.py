@@ -19,8 +19,8 @@ from aerialdojo_gen.base.errors import AerialDojoError, UsageError
 from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.build import cut_out
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.cuts import cut_out
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.recipe import Cut
 from aerialdojo_gen.studio.annotate import boxes

@@ -6,12 +6,10 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import lane_streets
+from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, lane_streets, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import point
 from aerialdojo_gen.scenes.worlds.streets import Box
-from aerialdojo_gen.scenes.worlds.towns import Layout, avenue, estate, square, town
-from aerialdojo_gen.scenes.worlds.wilds import rolling, smoothed, step
+from aerialdojo_gen.scenes.worlds.wilds import point, rolling, smoothed, step
 from aerialdojo_gen.scenes.worlds.wrecked import (
     heap,
     littered,
@@ -108,5 +106,5 @@ def _ruin(draft: Draft, lot: Box, k: int, fault: shapely.LineString) -> None:
 
 
 _TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
-    "town": town, "square": square, "avenue": avenue, "scarp": town, "estate": estate,
+    "town": town, "square": about_square, "avenue": avenue, "scarp": town, "estate": estate,
 }  # fmt: skip

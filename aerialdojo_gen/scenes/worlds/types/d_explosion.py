@@ -7,12 +7,10 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import lane_streets, split
+from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, lane_streets, split, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import beside, point
 from aerialdojo_gen.scenes.worlds.streets import Box
-from aerialdojo_gen.scenes.worlds.towns import Layout, avenue, estate, square, town
-from aerialdojo_gen.scenes.worlds.wilds import rolling, step
+from aerialdojo_gen.scenes.worlds.wilds import beside, point, rolling, step
 from aerialdojo_gen.scenes.worlds.wrecked import heap, littered, open_landmarks, paint_heaps, things, wreck
 
 Point = tuple[float, float]
@@ -143,5 +141,5 @@ def _yard(draft: Draft, w: float, d: float) -> Layout:
 
 
 _TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
-    "street": avenue, "square": square, "blocks": town, "yard": _yard, "flats": estate,
+    "street": avenue, "square": about_square, "blocks": town, "yard": _yard, "flats": estate,
 }  # fmt: skip

@@ -10,10 +10,9 @@ import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import split
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.places import Pose, beside, point
 from aerialdojo_gen.scenes.worlds.street_maps import pose_on
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import about, smoothed, step
+from aerialdojo_gen.scenes.worlds.wilds import Pose, about, beside, point, smoothed, step
 
 Point = tuple[float, float]
 _TRIMS = ["#f2efe6", "#5a3f2c", "#2f5a46"]

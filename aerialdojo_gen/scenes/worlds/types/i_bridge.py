@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import landmarks, lay_out, point
-from aerialdojo_gen.scenes.worlds.wilds import paths, rolling, step, strewn, winding, wood
+from aerialdojo_gen.scenes.worlds.wilds import landmarks, lay_out, paths, point, rolling, step, strewn, winding, wood
 
 _ROAD_M, _HALF_M = 3.4, 5.0  # Half widths of the roadway and of the deck
 

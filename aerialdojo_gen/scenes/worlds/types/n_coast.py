@@ -10,10 +10,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import point
-from aerialdojo_gen.scenes.worlds.seaside import Isle, build_village
-from aerialdojo_gen.scenes.worlds.shores import ahead, islands, landing
-from aerialdojo_gen.scenes.worlds.wilds import smoothed, winding
+from aerialdojo_gen.scenes.worlds.shores import Isle, ahead, build_village, islands, landing
+from aerialdojo_gen.scenes.worlds.wilds import point, smoothed, winding
 
 Point = tuple[float, float]
 

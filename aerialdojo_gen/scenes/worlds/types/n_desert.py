@@ -9,8 +9,9 @@ from typing import Any
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.places import (
+from aerialdojo_gen.scenes.worlds.wilds import (
     Rock,
+    about,
     beside,
     houses_about,
     landmarks,
@@ -18,10 +19,13 @@ from aerialdojo_gen.scenes.worlds.places import (
     point,
     rocks,
     rocks_about,
+    rolling,
     spot_for,
+    step,
+    strewn,
     track,
+    winding,
 )
-from aerialdojo_gen.scenes.worlds.wilds import about, rolling, step, strewn, winding
 
 Point = tuple[float, float]
 

@@ -8,8 +8,7 @@ from collections.abc import Callable
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.seaside import Isle, build_village, inside
-from aerialdojo_gen.scenes.worlds.shores import ahead, coast, islands, landing, towards
+from aerialdojo_gen.scenes.worlds.shores import Isle, ahead, build_village, coast, inside, islands, landing, towards
 from aerialdojo_gen.scenes.worlds.wilds import about, anywhere, smoothed, step, winding
 
 Point = tuple[float, float]

@@ -10,8 +10,20 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.scenes.worlds.draft import Draft
-from aerialdojo_gen.scenes.worlds.places import beside, landmarks, lay_out, point
-from aerialdojo_gen.scenes.worlds.wilds import about, bridged, brook, paths, step, strewn, water, winding
+from aerialdojo_gen.scenes.worlds.wilds import (
+    about,
+    beside,
+    bridged,
+    brook,
+    landmarks,
+    lay_out,
+    paths,
+    point,
+    step,
+    strewn,
+    water,
+    winding,
+)
 
 Point = tuple[float, float]
 _SUMMITS = ["summit_cross", "mountain_chapel", "fire_tower", "radio_mast", "obelisk"]

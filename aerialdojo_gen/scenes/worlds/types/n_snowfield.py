@@ -8,7 +8,8 @@ from collections.abc import Callable
 import shapely
 
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.places import (
+from aerialdojo_gen.scenes.worlds.street_maps import pose_on
+from aerialdojo_gen.scenes.worlds.wilds import (
     Rock,
     beside,
     houses_about,
@@ -17,11 +18,13 @@ from aerialdojo_gen.scenes.worlds.places import (
     point,
     rocks,
     rocks_about,
+    rolling,
     spot_for,
+    step,
+    strewn,
     track,
+    winding,
 )
-from aerialdojo_gen.scenes.worlds.street_maps import pose_on
-from aerialdojo_gen.scenes.worlds.wilds import rolling, step, strewn, winding
 
 Point = tuple[float, float]
 

@@ -10,10 +10,9 @@ import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import SIDES, lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.places import Pose, beside, point
 from aerialdojo_gen.scenes.worlds.street_maps import pose_on
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import strewn
+from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, point, strewn
 
 Point = tuple[float, float]
 _STOREY_M, _PITCH_M = 3.2, 6.4  # Of flats and of their balconies

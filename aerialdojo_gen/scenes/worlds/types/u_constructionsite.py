@@ -8,9 +8,8 @@ import shapely
 
 from aerialdojo_gen.scenes.worlds.blocks import SIDES
 from aerialdojo_gen.scenes.worlds.draft import Draft, NoRoomError
-from aerialdojo_gen.scenes.worlds.places import point, spot_for
 from aerialdojo_gen.scenes.worlds.streets import Box, grid, street_along
-from aerialdojo_gen.scenes.worlds.wilds import step
+from aerialdojo_gen.scenes.worlds.wilds import point, spot_for, step
 
 Point = tuple[float, float]
 _STOREY_M = 3.5

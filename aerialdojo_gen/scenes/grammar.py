@@ -1,21 +1,23 @@
-"""Grammar of layouts: points and poses along lines, in rows, and strewn over areas."""
+"""Grammar of layouts: points and poses along lines, in rows, strewn over areas; frames on the ground; slabs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.affinity import rotate, translate
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.scenes.mesh import Mesh
-from aerialdojo_gen.scenes.shapes_extruded import extrude, sweep
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, rotated, rotation, translated
+from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
 Polyline = Sequence[Sequence[float]]
@@ -94,12 +96,10 @@ def stretches(path: Polyline, spacing_m: float) -> list[Pose]:
     return out
 
 
-def wall(
-    site: Site, path: Polyline, height_m: float, thickness_m: float, closed: bool = False, z: float = 0.0
-) -> Mesh:
+def wall(site: Site, path: Polyline, height_m: float, thickness_m: float, z: float = 0.0) -> Mesh:
     """Make a wall along a path on the ground at its points (plus `z`), to be given to `Site.add`."""
     line = [(x, y, site.ground_z(x, y) + z + height_m / 2) for x, y in path]
-    return sweep(path=line, section=(thickness_m, height_m), closed=closed)
+    return sweep(path=line, section=(thickness_m, height_m))
 
 
 def slab(area: BaseGeometry, z0_m: float, z1_m: float) -> Mesh:
@@ -149,18 +149,9 @@ class _Taken(NamedTuple):
 
 
 @njit(cache=True)
-def _room(
-    x: float,
-    y: float,
-    own: float,
-    widest: float,
-    radius_m: float,
-    corner: NDArray[np.int64],
-    cells: NDArray[np.int64],
-    discs: NDArray[np.float64],
-    after: NDArray[np.int64],
-) -> bool:
+def _room(x: float, y: float, own: float, widest: float, taken: _Taken) -> bool:
     """Whether a disc of radius `own` keeps its distance from those there are, of `widest` radius at most."""
+    radius_m, corner, cells, discs, after = taken
     reach = int(np.ceil(max(widest, own) / radius_m))
     i, j = int(x // radius_m) - corner[0], int(y // radius_m) - corner[1]
     for a in range(max(i - reach, 0), min(i + reach + 1, cells.shape[0])):
@@ -175,19 +166,10 @@ def _room(
 
 
 @njit(cache=True)
-def _next_free(
-    darts: NDArray[np.float64],
-    k: int,
-    widest: float,
-    radius_m: float,
-    corner: NDArray[np.int64],
-    cells: NDArray[np.int64],
-    discs: NDArray[np.float64],
-    after: NDArray[np.int64],
-) -> int:
+def _next_free(darts: NDArray[np.float64], k: int, widest: float, taken: _Taken) -> int:
     """Index of the next dart, from `k` on, where a disc of the least radius has room; their number where none is."""
     while k < len(darts):
-        if _room(darts[k, 0], darts[k, 1], radius_m, widest, radius_m, corner, cells, discs, after):
+        if _room(darts[k, 0], darts[k, 1], taken.radius_m, widest, taken):
             break
         k += 1
     return k
@@ -220,7 +202,7 @@ def poisson_disc(
     n, widest, k = 0, radius_m, -1
     while True:
         # Densities take longer to ask than neighbours, and no density makes a disc smaller than this.
-        k = _next_free(darts, k + 1, widest, *taken)
+        k = _next_free(darts, k + 1, widest, taken)
         if k == len(darts):
             break
         x, y = darts[k].tolist()
@@ -228,7 +210,7 @@ def poisson_disc(
         if share <= 0.01:
             continue
         own = radius_m / math.sqrt(min(share, 1.0))
-        if own > radius_m and not _room(x, y, own, widest, *taken):
+        if own > radius_m and not _room(x, y, own, widest, taken):
             continue
         widest = max(widest, own)
         taken.add(n, x, y, own)
@@ -237,3 +219,39 @@ def poisson_disc(
         if n >= limit:
             break
     return poses
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame on the ground: origin in metres, direction of its u axis in degrees counter-clockwise from +x."""
+
+    x: float
+    y: float
+    yaw_deg: float = 0.0
+
+    def at(self, u: float, v: float) -> tuple[float, float]:
+        """World coordinates of a point, metres."""
+        c, s = float(np.cos(np.radians(self.yaw_deg))), float(np.sin(np.radians(self.yaw_deg)))
+        return self.x + c * u - s * v, self.y + s * u + c * v
+
+    def pose(self, u: float, v: float, yaw_deg: float = 0.0) -> Pose:
+        """World pose of a point that looks along `yaw_deg` from the u axis."""
+        return Pose(*self.at(u, v), self.yaw_deg + yaw_deg)
+
+    def path(self, points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+        """World coordinates of a polyline."""
+        return [self.at(u, v) for u, v in points]
+
+    def area(self, area: BaseGeometry) -> BaseGeometry:
+        """World coordinates of an area."""
+        return translate(rotate(area, self.yaw_deg, origin=(0, 0)), self.x, self.y)
+
+    def parts(self, parts: Parts, z_m: float = 0.0) -> Parts:
+        """World coordinates of meshes whose z starts at `z_m`."""
+        turn = rotation(0.0, 0.0, self.yaw_deg)
+        return [(material, translated(rotated(m, turn), (self.x, self.y, z_m))) for material, m in parts]
+
+
+def box_between(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
+    """Make an axis-parallel box between two corners, metres."""
+    return translated(box(size=(x1 - x0, y1 - y0, z1 - z0)), ((x0 + x1) / 2, (y0 + y1) / 2, z0))

@@ -1,0 +1,312 @@
+"""Forests, mountains, deserts, snowfields, islands and coasts: each stands up to a look from close by."""
+
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+from support import layout_checks as look
+from support.layout_checks import blank_site, catalogue, distances, each_scene, props_of, touching
+
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.planning.clearance import ClearanceGrid
+from aerialdojo_gen.scenes.expressions import eased
+from aerialdojo_gen.scenes.kit.ground_cover import steep_area
+from aerialdojo_gen.scenes.kit.huts import MudbrickHouse, mudbrick_houses
+from aerialdojo_gen.scenes.kit.landforms import ground_by_formula, inland_m
+from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
+from aerialdojo_gen.scenes.kit.natural_ground import blob, ragged_outline
+from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
+from aerialdojo_gen.scenes.kit.snow import (
+    Rock,
+    banks_beside,
+    dunes,
+    layered_rocks,
+    moguls,
+    profile_slope,
+    stepped_valley,
+)
+from aerialdojo_gen.scenes.kit.structures import flights
+from aerialdojo_gen.scenes.model import Instance, Scene
+from aerialdojo_gen.scenes.terrain import flat_terrain, rolling_terrain
+
+_ELSEWHERE = {"in the wood", "beside a path", "beside the stream"}
+_STRUCTURE = {"ground", "wooden_fence", "reed_clump"}
+_LIFE = {"person", "dog", "crow"}
+
+
+@pytest.fixture(scope="module")
+def forest(scene_of: Callable[[str], Scene]) -> Scene:
+    return scene_of("N_Forest_0")
+
+
+@pytest.fixture(scope="module")
+def things(forest: Scene) -> list[Instance]:
+    return [
+        i
+        for i in forest.instances
+        if i.category not in _STRUCTURE | _LIFE and i.attributes.get("place") not in _ELSEWHERE
+    ]
+
+
+@pytest.fixture(scope="module")
+def ground(forest: Scene) -> trimesh.Trimesh:
+    body = forest["ground"]
+    return trimesh.Trimesh(body.vertices, body.faces, process=False)
+
+
+def _ground_z(ground: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
+    origins = np.column_stack([points[:, :2], np.full(len(points), 50.0)])
+    down = np.tile([0.0, 0.0, -1.0], (len(points), 1))
+    places, rays, _ = ground.ray.intersects_location(origins, down, multiple_hits=False)
+    z = np.full(len(points), -np.inf)
+    z[rays] = places[:, 2]
+    return z
+
+
+def test_what_there_is_to_find_lies_close_together(forest: Scene, things: list[Instance]) -> None:
+    at = np.array([i.centroid[:2] for i in things])
+    apart = np.linalg.norm(at[:, None] - at[None, :], axis=2)[np.triu_indices(len(at), 1)]
+    assert np.linalg.norm(at, axis=1).max() < 27.0
+    assert np.median(apart) < 25.0
+    assert np.ptp([i.centroid[2] for i in things]) > 10.0
+
+
+def test_no_two_things_are_told_apart_by_nothing(things: list[Instance]) -> None:
+    seen = Counter((i.category, i.variant, i.attributes["place"]) for i in things)
+    assert max(seen.values()) == 1
+
+
+def test_things_stand_on_the_ground(things: list[Instance], ground: trimesh.Trimesh) -> None:
+    raised = {"rocking_chair", "cooler_box", "footbridge"}
+    for thing in things:
+        if thing.category in raised:
+            continue
+        v = thing.vertices
+        feet = v[v[:, 2] < v[:, 2].min() + 0.12]
+        gap = feet[:, 2] - _ground_z(ground, feet)
+        assert gap.min() < 0.05, f"{thing.node} floats by {gap.min():.2f} m"
+        assert gap.max() < 0.35, f"{thing.node} stands on {gap.max():.2f} m of air"
+        assert v[:, 2].max() > _ground_z(ground, v)[v[:, 2].argmax()] + 0.3, f"{thing.node} is buried"
+
+
+def test_things_do_not_run_into_one_another(things: list[Instance]) -> None:
+    assert not touching(things)
+
+
+def test_the_raised_things_stand_on_porch_and_deck(forest: Scene) -> None:
+    for node, under, category in (
+        ("rocking_chair_000", "log_cabin_000", "rocking_chair"),
+        ("cooler_box_000", "fire_tower_000", "cooler_box"),
+    ):
+        thing, support = forest[node], forest[under]
+        assert thing.category == category
+        body = trimesh.Trimesh(support.vertices, support.faces, process=False)
+        feet = thing.vertices[thing.vertices[:, 2] < thing.vertices[:, 2].min() + 0.02]
+        down = np.tile([0.0, 0.0, -1.0], (len(feet), 1))
+        places, _, _ = body.ray.intersects_location(feet + np.array([0.0, 0.0, 0.3]), down, multiple_hits=False)
+        assert len(places) == len(feet)
+        assert np.abs(feet[:, 2].min() - places[:, 2]).max() < 0.06
+
+
+def test_every_thing_can_be_flown_around_on_some_side(forest: Scene, things: list[Instance]) -> None:
+    free = ClearanceGrid.build(forest, radius_m=0.25, margin_m=0.05)
+    for thing in things:
+        low, high = thing.bounds
+        middle = (low + high) / 2
+        reach = np.linalg.norm((high - low)[:2]) / 2 + 1.0
+        angles = np.arange(16) * np.pi / 8
+        ring = [
+            (middle[0] + reach * np.cos(a), middle[1] + reach * np.sin(a), z)
+            for a in angles
+            for z in (middle[2], high[2] - 0.1, high[2] + 0.8)
+        ]
+        assert sum(free.reachable(p) for p in ring) >= 3, thing.node
+
+
+def test_the_landmark_rises_over_the_wood_but_not_over_the_ceiling(forest: Scene) -> None:
+    tower = forest["fire_tower_000"]
+    assert tower.bounds[1, 2] - tower.bounds[0, 2] > 14.0
+    assert all(i.bounds[1, 2] < forest.ceiling_m - 1.0 for i in forest.instances)
+
+
+def test_trees_stay_off_the_clearings(forest: Scene) -> None:
+    camp, cabin = (forest[node].centroid for node in ("campfire_000", "log_cabin_000"))
+    for tree in forest.instances:
+        if tree.category.endswith("_tree") and tree.attributes["place"] == "in the wood":
+            v = tree.vertices
+            root = v[v[:, 2] < v[:, 2].min() + 0.1].mean(axis=0)
+            for spot in (camp, cabin):
+                assert np.hypot(*(root - spot)[:2]) > 4.0, tree.node
+
+
+@pytest.mark.parametrize("seed", [0, 1, 7, 123])
+def test_blobs_are_simple_round_areas(seed: int) -> None:
+    area = blob(3.0, -2.0, 5.0, seed)
+    assert area.is_valid
+    assert 0.4 * np.pi * 25 < area.area < 2.2 * np.pi * 25
+    assert area.centroid.distance(blob(3.0, -2.0, 5.0, seed, ragged=0.0).centroid) < 1.5
+
+
+MOUNTAINS = ["N_Mountain_0", "N_Mountain_1", "N_Forest_1"]
+of_each_mountain = each_scene(MOUNTAINS)
+
+
+@of_each_mountain
+def test_boulders_touch_the_ground(scene_of, name):
+    scene = scene_of(name)
+    ground = Scene(name, (scene["ground"],), scene.materials, scene.bounds)
+    for boulder in (i for i in scene.instances if i.category == "boulder"):
+        v = boulder.vertices
+        depth = distances(ground, np.column_stack([v[:, :2], np.full(len(v), 60.0)]), (0.0, 0.0, -1.0))
+        above = v[:, 2] - (60.0 - depth)
+        assert above.min() < 0.0 < above.max(), boulder.node
+
+
+def test_the_summit_is_reached_on_foot_and_crowned(scene_of):
+    scene = scene_of("N_Mountain_0")
+    ground, cross = scene["ground"], scene["summit_cross_000"]
+    assert np.ptp(ground.vertices[:, 2]) > 25.0
+    assert cross.bounds[0, 2] > 0.8 * ground.vertices[:, 2].max()
+    assert "summit_cross" not in catalogue().targets
+
+
+def test_mountains_rise_to_their_crests_and_show_rock_where_they_are_steep():
+    site = blank_site("N_T_0", seed=3)
+    ridge = Ridge([(0.0, 10.0, 20.0)], 25.0, hollow=1.0)
+    flat = flat_terrain((60, 60))
+    plain = massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=0.0, rough_m=0.0)
+    assert float(plain.z(0.0, 10.0)) == pytest.approx(20.0, abs=1.5)
+    assert float(plain.z(-29.0, -29.0)) == pytest.approx(0.0, abs=1e-9)
+    site.set_ground(plain)
+    faces, top = steep_ground(site, slope=1.2), high_ground(site, above_m=17.0, slope=2.0)
+    assert shapely.contains_xy(top, 0.0, 10.0)
+    assert not shapely.contains_xy(top, 0.0, -10.0)
+    assert high_ground(site, above_m=50.0, slope=2.0).is_empty
+    site.set_ground(massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=4.0, rough_m=0.0))
+    assert faces.area < 0.1 * steep_ground(site, slope=1.2).area
+
+
+blank = partial(blank_site, "N_T_0", seed=3)
+DRY = [f"N_{kind}_{k}" for kind in ("Desert", "Snowfield") for k in (0, 1)]
+of_each_dry_scene = each_scene(DRY)
+FLAT = rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0)
+
+
+@of_each_dry_scene
+def test_things_keep_clear_of_rocks_and_houses(scene_of, name):
+    scene = scene_of(name)
+    hulls = [(i, shapely.MultiPoint(i.vertices[:, :2]).convex_hull) for i in scene.instances if i.category == "hut"]
+    for prop in props_of(scene):
+        for i, hull in hulls:
+            if prop.bounds[0, 2] < i.bounds[1, 2] - 0.5 and prop.bounds[1, 2] > i.bounds[0, 2] + 1.0:
+                assert not hull.buffer(-0.3).contains(shapely.Point(prop.centroid[:2])), (prop.node, i.node)
+
+
+def test_dunes_are_steeper_in_the_lee():
+    ground = dunes(blank(80.0), FLAT, cell_m=1.0, height_m=5.0, wavelength_m=24.0, wind_deg=0.0)
+    slope = np.diff(ground.heights_m, axis=1)
+    assert np.ptp(ground.heights_m) > 4.0
+    assert -np.quantile(slope, 0.02) > 1.3 * np.quantile(slope, 0.98)
+    assert (slope > 0).mean() > 0.55
+
+
+def test_a_valley_climbs_from_its_bed():
+    bed, steps = [(-30.0, 0.0), (30.0, 0.0)], [(4.0, 6.0, 2.0), (12.0, 16.0, 3.0)]
+    ground = stepped_valley(blank(), FLAT, cell_m=1.0, bed=bed, steps=steps, roughness_m=0.3)
+    middle, banks, rim = (float(np.mean(ground.z(np.linspace(-25, 25, 50), np.full(50, y)))) for y in (0, 10, 26))
+    assert banks - middle == pytest.approx(2.0, abs=0.5)
+    assert rim - banks == pytest.approx(3.0, abs=0.5)
+
+
+def test_snow_is_banked_beside_the_way_and_bumpy_where_asked():
+    bank = banks_beside(blank(), FLAT, line=[(-30.0, 0.0), (30.0, 0.0)], width_m=6.0, height_m=1.0)
+    assert float(bank.z(0, 4.4)) > 0.8 > 0.2 > float(bank.z(0, 0))
+    bumps = moguls(blank(), FLAT, area=shapely.box(-10, -10, 10, 10), height_m=1.0)
+    assert np.ptp(bumps.z(np.linspace(-6, 6, 60), np.full(60, 1.1))) > 0.5
+    assert float(np.abs(bumps.z(20, 20))) < 1e-9
+    tilted = profile_slope(blank(), FLAT, profile=[(-30.0, 0.0), (0.0, 0.0), (30.0, 9.0)])
+    assert float(tilted.z(0, -20)) == pytest.approx(0.0, abs=0.2)
+    assert 4.0 < float(tilted.z(0, 20)) < 7.0
+
+
+def test_rocks_and_houses_give_the_heights_of_what_carries_things():
+    site = blank()
+    rocks = [Rock(shapely.Point(10.0 * k, 0.0).buffer(4.0), f"rock {k}", 3.0 + k) for k in (0, 1)]
+    tops = layered_rocks(site, rocks=rocks, bands=["rock"], cap="snow")
+    roofs = mudbrick_houses(site, houses=[MudbrickHouse((-15.0, 0.0), "house", 30.0)])
+    assert [float(i.bounds[1, 2]) for i in site.instances[:2]] == pytest.approx(tops, abs=1e-5)
+    parapet = float(site.instances[2].bounds[1, 2])
+    assert parapet - 1.0 < roofs[0] < parapet
+
+
+blank_shore = partial(blank_site, "N_T_0")
+SHORES = [f"N_{kind}_{k}" for kind in ("Island", "Coast") for k in (0, 1)]
+BOATS = ("fishing_boat", "rowing_boat", "sailboat", "motor_yacht", "tugboat", "buoy")
+of_each_shore = look.each_scene(SHORES)
+
+
+@of_each_shore
+def test_boats_lie_on_the_level_sea(scene_of, name):
+    scene = scene_of(name)
+    boats = [i for i in look.props_of(scene) if i.category in BOATS]
+    ground = look.Scene(name, (scene["ground"],), scene.materials, scene.bounds)
+    assert len(boats) >= 4
+    above = [(*boat.bounds.mean(axis=0)[:2], 60.0) for boat in boats]
+    np.testing.assert_allclose(look.distances(ground, above, (0.0, 0.0, -1.0)), 60.0, atol=0.15)
+    assert max(boat.bounds[0, 2] for boat in boats) < 0.1
+
+
+def test_coastlines_are_natural_and_always_the_same():
+    coarse = shapely.box(-20, -20, 20, 20)
+    line = ragged_outline(coarse.exterior, 5, 1.5, 3.0)
+    assert line.equals(ragged_outline(coarse.exterior, 5, 1.5, 3.0))
+    assert not line.equals(ragged_outline(coarse.exterior, 6, 1.5, 3.0))
+    assert line.is_valid
+    assert line.area == pytest.approx(1600, rel=0.15)
+    assert 0.5 < shapely.hausdorff_distance(line.boundary, coarse.boundary) < 6.0
+
+
+def test_inland_is_positive_on_the_land_and_negative_at_sea():
+    land = shapely.box(-10, -10, 10, 10)
+    away = inland_m(land, np.array([0.0, 9.0, 13.0]), np.zeros(3))
+    assert away == pytest.approx([10.0, 1.0, -3.0])
+    assert eased(np.array([-1.0, 0.5, 3.0]), 0.0, 1.0) == pytest.approx([0.0, 0.5, 1.0])
+
+
+def test_steep_ground_is_found():
+    site = blank_shore()
+    terrain = ground_by_formula(
+        site, site.terrain, cell_m=2.0, height=lambda arrays: np.where(arrays["x"] > 0.0, 8.0, 0.0)
+    )
+    steep = steep_area(terrain, 40.0)
+    assert steep.contains(shapely.Point(1.0, 0.0))
+    assert not steep.intersects(shapely.box(6.0, -20.0, 25.0, 20.0))
+
+
+def test_piers_bear_above_and_are_open_below():
+    site = blank_shore()
+    pier(site, at=(-15.0, 0.0), yaw_deg=0.0, length_m=30.0, width_m=5.0, z=4.0, bay_m=5.0, rail="iron")
+    scene = site.scene()
+    down = look.distances(scene, [(x, 0.4, 9.0) for x in (-12.0, 0.3, 14.0)], (0.0, 0.0, -1.0))
+    assert 9.0 - down == pytest.approx([4.0] * 3, abs=0.01)
+    assert look.distances(scene, [(-20.0, 1.2, 1.2)], (1.0, 0.0, 0.0))[0] > 30.0
+
+
+def test_walls_groynes_and_steps_bar_the_way():
+    site = blank_shore()
+    sea_wall(site, box=(-10.0, 4.0, 10.0, 5.5), z=(0.0, 3.0))
+    groynes(site, lines=[[(0.0, -12.0), (0.0, 2.0)]], height_m=1.8)
+    flights(site, feet=[(6.0, -4.0)], yaw_deg=90.0, width_m=2.0, run_m=7.0, on=0.0, to_m=3.0)
+    cast = RayCaster(site.scene())
+    origins = np.array([[-5.0, -3.0, 1.5], [-3.0, -5.0, 1.2], [6.0, -1.0, 8.0]])
+    ways = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    distance, _ = cast.first_hit(origins, ways)
+    assert distance[0] == pytest.approx(7.0, abs=0.6)
+    assert distance[1] == pytest.approx(3.0, abs=0.2)
+    assert 5.5 < distance[2] < 7.5
+    assert not site.is_free(-5.0, 4.8, 0.3)
+    assert not site.is_free(6.0, 0.0, 0.3)
