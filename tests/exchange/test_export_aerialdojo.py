@@ -275,21 +275,18 @@ def test_a_picture_is_on_the_disk_once(layout):
     assert len({p.stat().st_ino for p in pictures}) == len({p.name for p in pictures}) < len(pictures)
 
 
-def test_nothing_is_there_when_a_picture_is_missing(smoke, tmp_path):
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("reference_image", None, r"object \d+ of U_Courtyard_0 has no reference image"),
+        *(("reference_image_id", name, "cannot name a file") for name in ("../../outside", "/etc/x", "a/b", "")),
+    ],
+)
+def test_nothing_is_there_when_a_picture_is_missing_or_leads_out(smoke, tmp_path, column, value, message):
     data = copy_release(smoke, tmp_path / "data", ["U_Courtyard_0"])
     rows = store.read_scene(data, "release/objects", "U_Courtyard_0").to_pylist()
-    replace_rows(data, "release/objects", "U_Courtyard_0", [row | {"reference_image": None} for row in rows])
-    with pytest.raises(StoreError, match=r"object \d+ of U_Courtyard_0 has no reference image"):
-        export_release("aerialdojo", data, tmp_path / "out", picture_px=0)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["data"]
-
-
-@pytest.mark.parametrize("name", ["../../outside", "/etc/x", "a/b", ""])
-def test_a_picture_name_does_not_leave_its_folder(smoke, tmp_path, name):
-    data = copy_release(smoke, tmp_path / "data", ["U_Courtyard_0"])
-    rows = store.read_scene(data, "release/objects", "U_Courtyard_0").to_pylist()
-    replace_rows(data, "release/objects", "U_Courtyard_0", [row | {"reference_image_id": name} for row in rows])
-    with pytest.raises(StoreError, match="cannot name a file"):
+    replace_rows(data, "release/objects", "U_Courtyard_0", [row | {column: value} for row in rows])
+    with pytest.raises(StoreError, match=message):
         export_release("aerialdojo", data, tmp_path / "out", picture_px=0)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["data"]
 

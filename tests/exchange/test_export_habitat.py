@@ -3,9 +3,8 @@
 import gzip
 import json
 import math
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -16,54 +15,22 @@ from support.releases import released
 from aerialdojo_gen.exchange.exporting import export_release
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
-
-@dataclass(kw_only=True)
-class ObjectViewLocation:
-    agent_state: dict[str, list[float]]
-    iou: float | None
-
-
-@dataclass(kw_only=True)
-class ObjectGoal:
-    position: list[float]
-    object_id: int
-    object_name: str
-    object_category: str
-    room_id: int | None
-    view_points: list[Any]
+FIELDS = {
+    "view": "agent_state iou",
+    "goal": "position object_id object_name object_category room_id view_points",
+    "point": "position rotation action",
+    "episode": "episode_id scene_id scene_dataset_config start_position start_rotation info goals shortest_paths "
+    "object_category",
+}
 
 
-@dataclass(kw_only=True)
-class ShortestPathPoint:
-    position: list[float]
-    rotation: list[float]
-    action: int
+def strict(kind: str, value: dict) -> SimpleNamespace:
+    """An object of the format, which has its fields and no others."""
+    assert set(value) == set(FIELDS[kind].split())
+    return SimpleNamespace(**value)
 
 
-@dataclass(kw_only=True)
-class Episode:
-    episode_id: str
-    scene_id: str
-    scene_dataset_config: str
-    start_position: list[float]
-    start_rotation: list[float]
-    info: dict[str, Any]
-    goals: list[Any]
-    shortest_paths: list[list[Any]]
-    object_category: str
-
-    @property
-    def goals_key(self) -> str:
-        return f"{Path(self.scene_id).name}_{self.object_category}"
-
-
-def strict(kind: type, value: dict) -> Any:
-    """An instance of the class, whose fields the value has exactly."""
-    assert set(value) == {f.name for f in fields(kind)}
-    return kind(**value)
-
-
-def load(path: Path) -> tuple[dict[str, list[ObjectGoal]], list[Episode], dict[str, int]]:
+def load(path: Path) -> tuple[dict[str, list[SimpleNamespace]], list[SimpleNamespace], dict[str, int]]:
     """Read a file of the dataset as Habitat's loader does, which asserts the same of the categories."""
     document = json.loads(gzip.decompress(path.read_bytes()))
     task_ids = document.pop("category_to_task_category_id")
@@ -71,15 +38,15 @@ def load(path: Path) -> tuple[dict[str, list[ObjectGoal]], list[Episode], dict[s
     assert sorted(task_ids.values()) == list(range(len(task_ids)))
     goals = {}
     for key, values in document.pop("goals_by_category").items():
-        goals[key] = [strict(ObjectGoal, value) for value in values]
+        goals[key] = [strict("goal", value) for value in values]
         for goal in goals[key]:
-            goal.view_points = [strict(ObjectViewLocation, view) for view in goal.view_points]
+            goal.view_points = [strict("view", view) for view in goal.view_points]
             assert all(set(view.agent_state) == {"position", "rotation"} for view in goal.view_points)
-    episodes = [strict(Episode, value) for value in document.pop("episodes")]
+    episodes = [strict("episode", value) for value in document.pop("episodes")]
     for episode in episodes:
         assert episode.goals == []
-        episode.goals = goals[episode.goals_key]
-        episode.shortest_paths = [[strict(ShortestPathPoint, p) for p in path] for path in episode.shortest_paths]
+        episode.goals = goals[f"{Path(episode.scene_id).name}_{episode.object_category}"]
+        episode.shortest_paths = [[strict("point", p) for p in path] for path in episode.shortest_paths]
     assert document == {}
     return goals, episodes, task_ids
 
