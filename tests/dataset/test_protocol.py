@@ -3,8 +3,8 @@
 import json
 import shutil
 
-import pyarrow as pa
 import pytest
+from support.handmade import write_rows
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.paper_figures import inventory, splits
@@ -12,7 +12,7 @@ from aerialdojo_gen.benchmark.tasks import Selection, select
 from aerialdojo_gen.dataset.protocol import SAMPLE, draw_sample, read_sample, sample_shortfall
 from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.schemas import FAMILIES, TASKS
+from aerialdojo_gen.store.schemas import FAMILIES
 
 
 @pytest.fixture
@@ -24,20 +24,13 @@ def release(smoke, tmp_path):
 
 def write_tasks(data, scene, counts):
     """Write the test tasks of a made-up scene: so many of every setting, with either goal."""
-    rows = []
-    for setting, count in counts.items():
-        for k in range(count):
-            for goal in ("semantic", "image"):
-                row = dict.fromkeys(TASKS.schema.names, 0.0) | dict.fromkeys(("landmark", "direction"), "x")
-                row |= {"task_id": f"{scene}-{setting}{k:03}-{goal[0]}", "nav_id": f"{scene}-{setting}{k:03}"}
-                row |= {"scene": scene, "family": FAMILIES[scene[0]], "scene_type": scene.split("_")[1]}
-                row |= {"partition": store.partition(scene).upper(), "subset": "test", "setting": setting}
-                row |= {"modality": goal, "action_budget": 90, "target_name": "x", "target_split": "test"}
-                row |= {"description": "x", "reference_image_id": None}
-                row |= {name: False for name in row if name.endswith(("_in_train", "_held_out"))}
-                rows.append(row)
-    table = pa.Table.from_pylist(rows, TASKS.schema).sort_by([(key, "ascending") for key in TASKS.order])
-    store.write_shard(data, "tasks/test", scene, 0, table)
+    tasks = [(f"{scene}-{setting}{k:03}", setting) for setting, count in counts.items() for k in range(count)]
+    rows = (
+        {"task_id": f"{nav_id}-{goal[0]}", "nav_id": nav_id, "setting": setting, "modality": goal}
+        | {"family": FAMILIES[scene[0]], "partition": store.partition(scene).upper(), "subset": "test"}
+        for nav_id, setting in tasks for goal in ("semantic", "image")
+    )  # fmt: skip
+    write_rows(data, "tasks/test", rows, scene)
 
 
 def test_a_release_carries_its_sample_and_an_older_one_gives_the_same(smoke, release):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.handmade import write_rows
 
 from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import PoolError
@@ -24,9 +25,7 @@ from aerialdojo_gen.pipeline.stages.work.quota import (
     train_quotas,
 )
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
-from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import from_rows
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
@@ -161,23 +160,12 @@ def test_the_ids_of_pictures_do_not_tell_which_objects_are_held_out():
 
 def judged(data, scene, kept):
     """Write the plans and verdicts of a scene with so many kept candidates of each setting."""
-    plans, verdicts = [], []
-    for setting, n in sorted(kept.items()):
-        low, high = SETTINGS[setting]
-        for k in range(n):
-            key = {"scene": scene, "pair_id": f"{setting}_{k:05}"}
-            plan = dict.fromkeys(schemas.PLANS.schema.names) | {
-                "outcome": "SOLVED",
-                "length_m": low + (high - low) * (k + 0.5) / n,
-                "n_actions": 9,
-                "expansions": 0,
-                "min_clearance_m": 1.0,
-                **{name: [0] for name in ("x_m", "y_m", "z_m", "yaw_rad", "action")},
-            }
-            plans.append(plan | key)
-            verdicts.append(key | {"keep": True, "reason": "kept", "setting": setting, "action_budget": 90})
-    for name, rows in (("plans", plans), ("verdicts", verdicts)):
-        store.write_shard(data, name, scene, 0, from_rows(store.LAYOUT[name].spec, rows))
+    pairs = [(setting, k, n, f"{setting}_{k:05}") for setting, n in kept.items() for k in range(n)]
+    lengths = [SETTINGS[s][0] + (SETTINGS[s][1] - SETTINGS[s][0]) * (k + 0.5) / n for s, k, n, _ in pairs]
+    plans = [{"pair_id": p[-1], "outcome": "SOLVED", "length_m": m} for p, m in zip(pairs, lengths, strict=True)]
+    write_rows(data, "plans", plans, scene)
+    verdicts = [{"pair_id": pair_id, "keep": True, "reason": "kept", "setting": s} for s, _, _, pair_id in pairs]
+    write_rows(data, "verdicts", verdicts, scene)
 
 
 def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):

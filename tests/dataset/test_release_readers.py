@@ -22,7 +22,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.command_line import called
-from support.handmade import UNSPLIT
+from support.handmade import filled
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.dataset.contents import SHARDS, TABLES, check_release, counts, table_and_split
@@ -135,14 +135,9 @@ def test_the_cards_head_names_every_split_and_its_files(smoke, stored):
 
 
 def task(k, setting, modality):
-    told = {"description": "It is red.", "reference_image_id": None, "image_distance_m": None}
-    shown = {"description": None, "reference_image_id": "ref_0", "image_distance_m": 4.5}
-    return {
-        "task_id": f"U_Test_0-{k:04}-{modality[0]}", "nav_id": f"U_Test_0-{k:04}", "scene": "U_Test_0",
-        "family": "Urban", "scene_type": "Test", "partition": "ID", "subset": "train", "setting": setting,
-        "modality": modality, "action_budget": 90, "start_x_m": k * 0.1, "start_y_m": 2.0, "start_z_m": 1.0,
-        "start_yaw_rad": 0.5, "target_name": "van", "landmark": "tower", "direction": "north", **UNSPLIT,
-    } | (told if modality == "semantic" else shown)  # fmt: skip
+    told = {"description": "It is red."} if modality == "semantic" else {"image_distance_m": 4.5}
+    key = {"task_id": f"U_Test_0-{k:04}-{modality[0]}", "nav_id": f"U_Test_0-{k:04}", "scene": "U_Test_0"}
+    return filled(schemas.TASKS, key | told | {"setting": setting, "modality": modality, "start_x_m": k * 0.1})
 
 
 @settings(max_examples=15, deadline=None)

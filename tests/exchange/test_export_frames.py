@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from aerialdojo_gen.exchange.frames import (
     FRAMES,
@@ -22,9 +23,7 @@ yaws = st.floats(-math.pi, math.pi)
 
 
 def rotate(quaternion_xyzw, vector):
-    """Turn a vector by a quaternion, by its definition: q v q*."""
-    q, v = np.asarray(quaternion_xyzw[:3]), np.asarray(vector, float)
-    return v + 2 * np.cross(q, np.cross(q, v) + quaternion_xyzw[3] * v)
+    return Rotation.from_quat(quaternion_xyzw).apply(vector)
 
 
 def forward(yaw):

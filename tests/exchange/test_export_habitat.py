@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 from support.releases import released
 
 from aerialdojo_gen.exchange.exporting import export_release
@@ -76,9 +77,8 @@ def to_world(p):
 
 
 def heading(rotation):
-    """World yaw of a body that looks along -z before it is turned, by the rotation matrix's third column."""
-    x, y, z, w = rotation
-    ahead = to_world([-2 * (x * z + w * y), -2 * (y * z - w * x), -(1 - 2 * (x * x + y * y))])
+    """World yaw of a body that looks along -z before it is turned."""
+    ahead = to_world(Rotation.from_quat(rotation).apply([0, 0, -1]))
     assert ahead[2] == pytest.approx(0)
     return math.atan2(ahead[1], ahead[0])
 

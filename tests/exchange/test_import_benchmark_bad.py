@@ -134,13 +134,6 @@ def test_records_of_the_wrong_kind_are_named(tmp_path, format_name):
         assert line.startswith(f"  file.json: row {row}: the row: expected an object, found")
 
 
-anything = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
-    max_leaves=4,
-)
-
-
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(["uav-on", "cityavos", "aerialvln", "openfly"]), st.data())
 def test_whatever_stands_in_a_field_is_read_or_named(tmp_path, format_name, data):
@@ -152,7 +145,7 @@ def test_whatever_stands_in_a_field_is_read_or_named(tmp_path, format_name, data
         key = data.draw(st.sampled_from(sorted(target)))
     elif isinstance(target[key], list) and data.draw(st.booleans()):
         target, key = target[key], data.draw(st.integers(0, len(target[key]) - 1))
-    target[key] = data.draw(anything)
+    target[key] = data.draw(task_files.ANYTHING)
     rows[0][data.draw(st.text(st.characters(), min_size=1), label="a key")] = 1
     path = task_files.write(tmp_path / "file.json", document, ascii_only=True)
     options = Options(frame=FRAME.get(format_name), skip_bad=True)
@@ -232,34 +225,30 @@ def spoil_trajectory(layout: Path, number: int, change) -> None:
 
 STEP = "trajectory[1]"
 TRAJECTORY_BAD = [
-    (lambda d: put(d, "trajectory.1.action", "hover"), f"{STEP}.action", "unknown action 'hover'"),
-    (lambda d: put(d, "trajectory.1.action", "stop"), f"{STEP}.action", "unknown action 'stop'"),
-    (lambda d: put(d, "trajectory.1.action", ["forward"]), f"{STEP}.action", "unknown action ['forward']"),
-    (lambda d: put(d, "trajectory.0.action", "forward"), "trajectory[0].action", "known here are start"),
-    (lambda d: put(d, "trajectory.1.position_ned_m", [0, 0, NAN]), f"{STEP}.position_ned_m", "no finite number"),
-    (
-        lambda d: put(d, "trajectory.1.position_ned_m", [0] * 4),
-        f"{STEP}.position_ned_m",
-        "expected 3 numbers, found 4",
-    ),
-    (lambda d: put(d, "trajectory.1.quaternion_xyzw", KeyError), f"{STEP}.quaternion_xyzw", "is missing"),
-    (lambda d: put(d, "trajectory.1", 1), STEP, "expected an object, found 1"),
-    (lambda d: put(d, "trajectory", []), "trajectory", "is empty"),
-    (lambda d: put(d, "schema_version", "v7"), "schema_version", "'v7', expected 'hybrid_astar_trajectory_v6'"),
-    (lambda d: put(d, "status", "failed"), "status", "'failed', expected 'planned'"),
-    (lambda d: put(d, "map_name", "N_Island_0"), "map_name", "is not the task's, U_Courtyard_1"),
+    ("trajectory.1.action", "hover", f"{STEP}.action", "unknown action 'hover'"),
+    ("trajectory.1.action", "stop", f"{STEP}.action", "unknown action 'stop'"),
+    ("trajectory.1.action", ["forward"], f"{STEP}.action", "unknown action ['forward']"),
+    ("trajectory.0.action", "forward", "trajectory[0].action", "known here are start"),
+    ("trajectory.1.position_ned_m", [0, 0, NAN], f"{STEP}.position_ned_m", "no finite number"),
+    ("trajectory.1.position_ned_m", [0] * 4, f"{STEP}.position_ned_m", "expected 3 numbers, found 4"),
+    ("trajectory.1.quaternion_xyzw", KeyError, f"{STEP}.quaternion_xyzw", "is missing"),
+    ("trajectory.1", 1, STEP, "expected an object, found 1"),
+    ("trajectory", [], "trajectory", "is empty"),
+    ("schema_version", "v7", "schema_version", "'v7', expected 'hybrid_astar_trajectory_v6'"),
+    ("status", "failed", "status", "'failed', expected 'planned'"),
+    ("map_name", "N_Island_0", "map_name", "is not the task's, U_Courtyard_1"),
 ]
 
 
 def test_bad_trajectories_are_named_for_both_instances(layout, tmp_path):
-    for number, (change, *_) in enumerate(TRAJECTORY_BAD):
-        spoil_trajectory(layout, number, change)
+    for number, (place, value, *_) in enumerate(TRAJECTORY_BAD):
+        spoil_trajectory(layout, number, lambda d, place=place, value=value: put(d, place, value))
     report = import_benchmark("aerialdojo", [layout], tmp_path / "data", Options(skip_bad=True))
     lines = (tmp_path / "data/imported/aerialdojo/bad_records.txt").read_text().splitlines()
     assert report.n_bad == len(lines) == 2 * len(TRAJECTORY_BAD)
     expected = [(kind, number) for kind in ("ImageOGS", "SemanticOGS") for number in range(len(TRAJECTORY_BAD))]
     for line, (kind, number) in zip(lines, expected, strict=True):
-        _, field, why = TRAJECTORY_BAD[number]
+        *_, field, why = TRAJECTORY_BAD[number]
         where = f"{kind}/{PART}/Task.json: row {number}: TrajectoryDATA/{PART}/{number}.json.{field}: "
         assert line.startswith(where)
         assert why in line

@@ -19,14 +19,25 @@ from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 
-def tables(data: Path, name: str) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    return tuple(pd.read_parquet(data / "imported" / name / table) for table in ("tasks", "routes", "objects"))
+def imported(folder: Path, form: str, document: object, options: Options | None = None, name: str = "", **more):
+    """Import a file; gives the report, tasks, routes and objects."""
+    path = task_files.write(folder / "file.json", document)
+    report = import_benchmark(form, [path], folder, options, name=name or form, **more)
+    return report, *(
+        pd.read_parquet(folder / "imported" / (name or form) / table) for table in ("tasks", "routes", "objects")
+    )
+
+
+def off_its_replay(route: pd.Series) -> float:
+    """How far our own replay, in our own frame, of our own actions is from a route's poses at most."""
+    own = np.column_stack([route[name] for name in ("x_m", "y_m", "z_m", "yaw_rad")])
+    poses = replay(own[0], route["action"][:-1])
+    turned = np.exp(1j * poses[:, 3]) - np.exp(1j * own[:, 3])
+    return max(np.abs(poses[:, :3] - own[:, :3]).max(), np.abs(turned).max())
 
 
 def test_uav_on(tmp_path):
-    path = task_files.write(tmp_path / "val.json", task_files.uav_on(3))
-    report = import_benchmark("uav-on", [path], tmp_path)
-    tasks, routes, objects = tables(tmp_path, "uav-on")
+    report, tasks, routes, objects = imported(tmp_path, "uav-on", task_files.uav_on(3))
     # NED (-38.41, 307.40, -10) is 307.40 m east, 38.41 m south, 10 m up.
     assert tasks.loc[0, ["start_x_m", "start_y_m", "start_z_m"]].tolist() == [307.40, -38.41, 10.0]
     # Headings of 0, 45 and 90 degrees: north, north-east, east.
@@ -47,9 +58,8 @@ def test_uav_on(tmp_path):
 
 
 def test_cityavos(tmp_path):
-    path = task_files.write(tmp_path / "missions.json", task_files.cityavos(tmp_path, 3))
-    report = import_benchmark("cityavos", [path], tmp_path, Options(frame="ned"))
-    tasks, routes, objects = tables(tmp_path, "cityavos")
+    missions = task_files.cityavos(tmp_path, 3)
+    report, tasks, routes, objects = imported(tmp_path, "cityavos", missions, Options(frame="ned"))
     assert tasks["modality"].tolist() == ["image", "semantic"] * 3
     assert tasks.loc[0, ["start_x_m", "start_y_m", "start_z_m"]].tolist() == [-4160, 6360, 5]
     semantic = tasks[tasks["modality"] == "semantic"]
@@ -62,20 +72,19 @@ def test_cityavos(tmp_path):
     assert objects["z_m"].tolist() == [5.98] * 3
     assert report.unmapped == {"mission_grade": 3}
     # The other reading of x, which the documents leave open, is the same scene turned.
-    import_benchmark("cityavos", [path], tmp_path, Options(frame="esd"), name="east")
-    other = tables(tmp_path, "east")[1]
+    _, _, other, _ = imported(tmp_path, "cityavos", missions, Options(frame="esd"), "east")
     assert other["euclidean_m"].tolist() == pytest.approx(routes["euclidean_m"].tolist())
     assert other["goal_x_m"].tolist() == [6382.97, 6383.97, 6384.97]
     assert json.loads((tmp_path / "imported/east/import.json").read_text())["frame"] == "esd"
 
 
 def test_cityavos_without_pictures(tmp_path):
-    path = task_files.write(tmp_path / "missions.json", task_files.cityavos(tmp_path / "elsewhere", 3))
-    import_benchmark("cityavos", [path], tmp_path, Options(frame="ned", with_pictures=False))
-    assert tables(tmp_path, "cityavos")[0]["modality"].tolist() == ["semantic"] * 3
+    missions = task_files.cityavos(tmp_path / "elsewhere", 3)
+    _, tasks, *_ = imported(tmp_path, "cityavos", missions, Options(frame="ned", with_pictures=False))
+    assert tasks["modality"].tolist() == ["semantic"] * 3
     options = Options(frame="ned", pictures=tmp_path / "elsewhere")
-    import_benchmark("cityavos", [path], tmp_path, options, force=True)
-    assert len(tables(tmp_path, "cityavos")[0]) == 6
+    _, tasks, *_ = imported(tmp_path, "cityavos", missions, options, force=True)
+    assert len(tasks) == 6
 
 
 @pytest.mark.parametrize(
@@ -90,17 +99,14 @@ def test_cityavos_angles_are_as_one_says(tmp_path, angles, yaws, expected):
     rows = task_files.cityavos(tmp_path, 2)
     for row, yaw in zip(rows, yaws, strict=True):
         row["initial_pos"][5] = yaw
-    path = task_files.write(tmp_path / "m.json", rows)
     options = Options(frame="enu", angles=angles, with_pictures=False)
-    report = import_benchmark("cityavos", [path], tmp_path, options)
-    assert tables(tmp_path, "cityavos")[0]["start_yaw_rad"].tolist() == pytest.approx(expected)
+    report, tasks, *_ = imported(tmp_path, "cityavos", rows, options)
+    assert tasks["start_yaw_rad"].tolist() == pytest.approx(expected)
     assert sum(report.notes.values()) == (1 if angles == "mixed" else 0)
 
 
 def test_aerialvln(tmp_path):
-    path = task_files.write(tmp_path / "val_seen.json", task_files.aerialvln())
-    report = import_benchmark("aerialvln", [path], tmp_path)
-    tasks, routes, objects = tables(tmp_path, "aerialvln")
+    report, tasks, routes, objects = imported(tmp_path, "aerialvln", task_files.aerialvln())
     assert tasks["scene"].tolist() == ["5", "5"]
     assert tasks["description"].tolist() == ["Rise, then fly to the red roof."] * 2
     assert tasks["target_name"].isna().all()
@@ -109,13 +115,8 @@ def test_aerialvln(tmp_path):
              "MoveDown2", "Stop"]  # fmt: skip
     for _, route in routes.iterrows():
         assert [ACTION_NAMES[a] for a in route["action"]] == names
-        # Our own replay, in our own frame, of our own actions meets the poses that the file has in NED.
-        start = [route["x_m"][0], route["y_m"][0], route["z_m"][0], route["yaw_rad"][0]]
-        poses = replay(start, route["action"][:-1])
-        assert np.abs(poses[:, 0] - route["x_m"]).max() < 1e-9
-        assert np.abs(poses[:, 1] - route["y_m"]).max() < 1e-9
-        assert np.abs(poses[:, 2] - route["z_m"]).max() < 1e-9
-        assert np.abs(np.exp(1j * poses[:, 3]) - np.exp(1j * route["yaw_rad"])).max() < 1e-9
+        # The file has its poses in NED.
+        assert off_its_replay(route) < 1e-9
         assert route["n_actions"] == 9
         assert route["replay_error_m"] < 1e-9
     assert len(objects) == 0
@@ -127,8 +128,7 @@ def test_aerialvln_without_paths_still_has_tasks(tmp_path):
     document = task_files.aerialvln()
     for episode in document["episodes"]:
         del episode["reference_path"], episode["actions"]
-    report = import_benchmark("aerialvln", [task_files.write(tmp_path / "a.json", document)], tmp_path)
-    tasks, routes, _ = tables(tmp_path, "aerialvln")
+    report, tasks, routes, _ = imported(tmp_path, "aerialvln", document)
     assert len(tasks) == 2
     assert routes["x_m"].isna().all()
     assert routes["goal_x_m"].notna().all()
@@ -140,8 +140,8 @@ def test_aerialvln_path_with_other_actions_keeps_the_poses(tmp_path):
     document["episodes"][0]["actions"] = [1, 1, 0]
     path = document["episodes"][0]["reference_path"]
     document["episodes"][0]["reference_path"] = [[*point, 0.0, 0.0, 1.5] for point in path]
-    report = import_benchmark("aerialvln", [task_files.write(tmp_path / "a.json", document)], tmp_path)
-    route = tables(tmp_path, "aerialvln")[1].iloc[0]
+    report, _, routes, _ = imported(tmp_path, "aerialvln", document)
+    route = routes.iloc[0]
     assert route["action"] is None
     assert route["source_action"].tolist() == ["forward 5 m", "forward 5 m", "stop"]
     assert len(route["x_m"]) == len(path)
@@ -154,9 +154,7 @@ def test_aerialvln_path_with_other_actions_keeps_the_poses(tmp_path):
 
 
 def test_openfly(tmp_path):
-    path = task_files.write(tmp_path / "train.json", task_files.openfly(drift_m=4.0))
-    report = import_benchmark("openfly", [path], tmp_path, Options(frame="enu"))
-    tasks, routes, _ = tables(tmp_path, "openfly")
+    report, tasks, routes, _ = imported(tmp_path, "openfly", task_files.openfly(drift_m=4.0), Options(frame="enu"))
     assert tasks["scene"].tolist() == ["env_airsim_16"] * 2
     assert tasks.loc[0, ["start_x_m", "start_y_m", "start_z_m", "start_yaw_rad"]].tolist() == [5, 6, 30, 1.57]
     route = routes.iloc[0]
@@ -172,9 +170,8 @@ def test_openfly(tmp_path):
 
 
 def test_openfly_actions_that_are_ours_keep_their_numbers(tmp_path):
-    path = task_files.write(tmp_path / "t.json", task_files.openfly((1, 1, 0)))
-    import_benchmark("openfly", [path], tmp_path, Options(frame="nwu"))
-    route = tables(tmp_path, "openfly")[1].iloc[0]
+    _, _, routes, _ = imported(tmp_path, "openfly", task_files.openfly((1, 1, 0)), Options(frame="nwu"))
+    route = routes.iloc[0]
     assert [ACTION_NAMES[a] for a in route["action"]] == ["MoveForward3", "MoveForward3", "Stop"]
     assert route["replay_error_m"] < 1e-9
     # x points north in nwu: what the file calls (5, 6) is 6 m west and 5 m north.
@@ -184,21 +181,17 @@ def test_openfly_actions_that_are_ours_keep_their_numbers(tmp_path):
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 4))
 def test_any_aerialvln_flight_replays_in_our_frame(tmp_path, actions, n):
-    path = task_files.write(tmp_path / "any.json", task_files.aerialvln((*actions, 0), n))
-    import_benchmark("aerialvln", [path], tmp_path, name="any", force=True)
-    tasks, routes, _ = tables(tmp_path, "any")
+    _, tasks, routes, _ = imported(tmp_path, "aerialvln", task_files.aerialvln((*actions, 0), n), force=True)
     assert len(tasks) == len(routes) == n
     assert routes["replay_error_m"].max() < 1e-9
-    for _, route in routes.iterrows():
-        poses = replay([route[c][0] for c in ("x_m", "y_m", "z_m", "yaw_rad")], route["action"][:-1])
-        assert np.abs(poses[:, :3] - np.column_stack([route["x_m"], route["y_m"], route["z_m"]])).max() < 1e-9
+    assert all(off_its_replay(route) < 1e-9 for _, route in routes.iterrows())
 
 
 def test_files_come_in_together_each_with_its_own_rows(tmp_path):
     one = task_files.write(tmp_path / "f/one.json", task_files.uav_on(2))
     two = task_files.write(tmp_path / "f/sub/two.json", task_files.uav_on(1))
     import_benchmark("uav-on", [two, one, two], tmp_path)
-    tasks = tables(tmp_path, "uav-on")[0]
+    tasks = pd.read_parquet(tmp_path / "imported/uav-on/tasks")
     assert sorted(zip(tasks["source_file"], tasks["source_row"], strict=True)) == [
         ("one.json", 0), ("one.json", 1), ("sub/two.json", 0),
     ]  # fmt: skip
@@ -218,16 +211,14 @@ def test_frames_are_asked_for_where_a_format_does_not_state_its_own(tmp_path):
 
 
 def test_an_import_is_replaced_by_force_alone(tmp_path):
-    path = task_files.write(tmp_path / "u.json", task_files.uav_on(2))
-    import_benchmark("uav-on", [path], tmp_path)
+    imported(tmp_path, "uav-on", task_files.uav_on(2))
     with pytest.raises(UsageError, match="--force replaces it"):
-        import_benchmark("uav-on", [path], tmp_path)
-    task_files.write(path, task_files.uav_on(1))
-    import_benchmark("uav-on", [path], tmp_path, force=True)
-    assert len(tables(tmp_path, "uav-on")[0]) == 1
+        imported(tmp_path, "uav-on", task_files.uav_on(2))
+    _, tasks, *_ = imported(tmp_path, "uav-on", task_files.uav_on(1), force=True)
+    assert len(tasks) == 1
     assert [p.name for p in (tmp_path / "imported").iterdir()] == ["uav-on"]
     with pytest.raises(UsageError, match="cannot name an import"):
-        import_benchmark("uav-on", [path], tmp_path, name="../../outside")
+        imported(tmp_path, "uav-on", task_files.uav_on(1), name="../../outside")
 
 
 def test_the_command_reports(tmp_path):

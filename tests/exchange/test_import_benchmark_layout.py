@@ -81,19 +81,12 @@ def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
         import_benchmark("aerialdojo", [path], tmp_path)
 
 
-anything = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
-    max_leaves=5,
-)
-
-
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_stands_in_a_task_or_its_trajectory_is_read_or_named(tmp_path, data):
     tasks, trajectory = document()
     target = data.draw(st.sampled_from([tasks[0], tasks[0]["start_pose"], trajectory, trajectory["trajectory"][1]]))
-    target[data.draw(st.sampled_from([*sorted(target), "another"]))] = data.draw(anything)
+    target[data.draw(st.sampled_from([*sorted(target), "another"]))] = data.draw(task_files.ANYTHING)
     root = tmp_path / "any"
     put(root, tasks, trajectory)
     report = import_benchmark("aerialdojo", [root], tmp_path, Options(skip_bad=True), force=True)
