@@ -60,13 +60,8 @@ def composition(tasks: pd.DataFrame) -> Figure:
     """Draw task instances by family and by scene type, in shades of their length setting."""
     families = family_order(tasks["family"])
     family_of = dict(zip(tasks["scene_type"], tasks["family"], strict=True))
-    types = [
-        kind
-        for family in families
-        for kind in sorted(
-            (k for k, f in family_of.items() if f == family), key=lambda k: (-(tasks["scene_type"] == k).sum(), k)
-        )
-    ]
+    n = tasks["scene_type"].value_counts()
+    types = sorted(family_of, key=lambda kind: (families.index(family_of[kind]), -n[kind], kind))
     with styled():
         figure = Figure(figsize=(WIDTH_IN, max(2.2, 0.9 + 0.165 * len(types))), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1, 1.25))
