@@ -20,6 +20,7 @@ from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.catalogue import Overrides
 from aerialdojo_gen.scenes.checks import clashes, floating
 from aerialdojo_gen.scenes.kit.life import WALKED, life
+from aerialdojo_gen.scenes.kit.resting import perch_on_wires
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans.build import build_site
 from aerialdojo_gen.scenes.site import Site
@@ -201,3 +202,13 @@ def test_birds_stand_on_wires(catalogue):
         feet = bird.vertices[bird.vertices[:, 2] < bird.bounds[0, 2] + 0.01]
         on += bool((np.abs(tops_under(caster, feet) - feet[:, 2]) < 0.015).any())
     assert on >= 3
+
+
+def test_birds_on_several_faces_of_a_wire_keep_apart(catalogue):
+    site = site_of("U_Alley_1")
+    before = len(site.instances)
+    for k in range(20):
+        perch_on_wires(site, "pigeon", 20, generator(k, "birds"))
+        birds, site.instances[before:] = tuple(site.instances[before:]), []
+        assert len(birds) > 2
+        assert clashes(Scene("birds", birds, {}, np.zeros((2, 3))), catalogue, 0.1) == []

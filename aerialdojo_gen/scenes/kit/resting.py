@@ -31,6 +31,7 @@ _THIN_M, _LONG_M = 0.09, 0.9  # a wire's faces
 _HIGH_M = (2.2, 16.0)
 _TOGETHER = 4
 _PERCHED_M = 0.45
+_BIRD_M = 0.28  # two faces of a wire may both be chosen: birds are so far apart
 
 
 def seat_people(site: Site, number: int, dressed: Sequence[str]) -> int:
@@ -149,41 +150,43 @@ def _box_of(thing: Instance) -> Polygon:
 
 def perch_on_wires(site: Site, category: str, number: int, rng: np.random.Generator) -> int:
     """Place birds in rows on wires, turned across them; returns how many."""
-    placed = 0
+    taken: list[Floats] = []
     for thing in site.instances:
         wires = _wires_of(site, thing) if thing.category in _WIRES else np.zeros((0, 2, 3))
         if not len(wires):
             continue
         caster = TriangleRayCaster(thing.vertices, thing.faces)
         for k in rng.permutation(len(wires))[:3]:
-            (a, b), room = wires[int(k)], min(int(rng.integers(2, _TOGETHER + 1)), number - placed)
+            (a, b), room = wires[int(k)], min(int(rng.integers(2, _TOGETHER + 1)), number - len(taken))
             long = math.hypot(b[0] - a[0], b[1] - a[1])
             first = float(rng.uniform(0.15, 0.5)) * long
             for j in range(room):
                 along = first + j * _PERCHED_M + float(rng.uniform(0.0, 0.15))
                 if along < long - 0.15:
-                    placed += _perched(site, category, a + (b - a) * (along / long), b - a, caster, rng)
-    return placed
+                    _perched(site, category, a + (b - a) * (along / long), b - a, caster, rng, taken)
+    return len(taken)
 
 
 def _perched(
-    site: Site, category: str, at: Floats, way: Floats, caster: TriangleRayCaster, rng: np.random.Generator
-) -> bool:
-    """Place a bird on the ridge of a wire near a point."""
+    site: Site, category: str, at: Floats, way: Floats, caster: TriangleRayCaster, rng: np.random.Generator,
+    taken: list[Floats],
+) -> None:  # fmt: skip
+    """Place a bird on the ridge of a wire near a point, where it has room, and note its place as taken."""
     yaw = math.atan2(way[1], way[0])
     across = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
     from_above = at + np.linspace(-0.05, 0.05, 21)[:, None] * across + np.array([0.0, 0.0, 0.5])
     away, _ = caster.first_hit(from_above, np.tile([0.0, 0.0, -1.0], (len(from_above), 1)))
     top = 0.5 - away
     if not np.isfinite(away).any() or float(top.max()) < -0.1:
-        return False
+        return
     x, y, _ = from_above[top > float(top.max()) - 1e-3].mean(axis=0).tolist()
     z = float(at[2] + top.max())
-    if not site.is_free(x, y, 0.25, z + 0.05, 0.4):
-        return False
+    bird = np.array([x, y, z])
+    if not site.is_free(x, y, 0.25, z + 0.05, 0.4) or any(np.abs(bird - one).max() < _BIRD_M for one in taken):
+        return
     side = 90.0 if rng.random() < 0.7 else -90.0
     site.place(Placement(category, x, y, math.degrees(yaw) + side, z=z, solid=False))
-    return True
+    taken.append(bird)
 
 
 def _wires_of(site: Site, thing: Instance) -> Floats:
