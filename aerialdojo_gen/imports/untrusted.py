@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
+from urllib.parse import unquote_to_bytes
 
 import tomli
 
@@ -126,7 +127,7 @@ def mismatch(path: Path, suffixes: tuple[str, ...]) -> str:
         how = "unpack it with its password" if locked else "unpack it"
         return f"is {'an encrypted' if locked else 'a'} ZIP archive: {how}, and give the mesh in it"
     for start, message in tomli.loads(Path(__file__).with_name("file_types.toml").read_text("utf-8")).items():
-        if head.startswith(start.encode("latin-1")):
+        if head.startswith(unquote_to_bytes(start)):
             return message
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if text.lower().startswith(_PAGES):

@@ -53,7 +53,7 @@ STALE = {
     "planning/hybrid_astar.py": {"plan"},
     "rendering/gl_shaders.py": PICTURES,
     "rendering/codecs.py": {"render"},
-    "scenes/kit/lanes.py": {"build-scenes"},
+    "scenes/kit/rail.py": {"build-scenes"},
     "scenes/glb.py": ALL,
     "geometry/motion.py": {"plan"},
     "store/staging.py": set(),

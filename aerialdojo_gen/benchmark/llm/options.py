@@ -9,7 +9,6 @@ from typing import Any, Literal
 import tomli
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from aerialdojo_gen.base.llm_client.service import check_url
 from aerialdojo_gen.base.names import check_known
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, ActionSet, eight
 
@@ -50,6 +49,9 @@ class Options(BaseModel):
     @classmethod
     def _plain_url(cls, url: str | None) -> str | None:
         if url is not None:
+            # What it needs is an extra, and prompts are shown without it.
+            from aerialdojo_gen.base.llm_client.service import check_url
+
             check_url(url)
         return url
 
