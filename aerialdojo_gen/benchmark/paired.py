@@ -29,8 +29,8 @@ def paired_tables(runs: Sequence[Run], profiles: Sequence[Profile]) -> list[Text
     both = sorted({*tasks[0].to_pylist()} & {*tasks[1].to_pylist()})
     if not both:
         raise UsageError(f"{first.name} and {second.name} have no task in common: fly both on the same ones")
-    wanted = pa.array(both, pa.string())
-    cut = [run.where(pc.index_in(wanted, value_set=ids).to_numpy()) for run, ids in zip(runs, tasks, strict=True)]
+    task_ids = pa.array(both, pa.string())
+    cut = [run.where(pc.index_in(task_ids, value_set=ids).to_numpy()) for run, ids in zip(runs, tasks, strict=True)]
     return [_table(cut[0], cut[1], profile) for profile in profiles]
 
 

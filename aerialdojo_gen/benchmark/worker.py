@@ -312,12 +312,12 @@ class Worker:
         near = view is not None and view.viewpoint_distance_m <= radius_m and view.target_in_sight
         copied = ("task_id", "nav_id", "scene", "family", "scene_type", "partition", "subset", "split", "setting",
                 "modality", "action_budget", "start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")  # fmt: skip
-        told = ("stop_called", "termination", "min_distance_m", "min_horizontal_distance_m", "path_length_m",
+        measured = ("stop_called", "termination", "min_distance_m", "min_horizontal_distance_m", "path_length_m",
                 "n_actions", "n_refused", "n_invalid")  # fmt: skip
         return {
             **self._identity,
             **{name: row[name] for name in copied},
-            **{name: getattr(episode, name) for name in told},
+            **{name: getattr(episode, name) for name in measured},
             "success": episode.success(radius_m),
             "oracle_success": episode.min_distance_m <= radius_m,
             "collision": episode.termination == "collision",

@@ -211,15 +211,14 @@ def unpack_nodes(path: Path) -> list[RawNode]:
             arrays[key][field] = file[name]
     head = json.loads(arrays["head"][""].tobytes())
 
-    def surface(key: str, told: dict[str, Any]) -> RawSurface:
-        more = {"colour": tuple(told["colour"]), "notes": tuple(told["notes"]), "jpeg": arrays[key]["jpeg"].tobytes()}
-        return RawSurface(**told | arrays[key] | more)
+    def surface(key: str, row: dict[str, Any]) -> RawSurface:
+        more = {"colour": tuple(row["colour"]), "notes": tuple(row["notes"]), "jpeg": arrays[key]["jpeg"].tobytes()}
+        return RawSurface(**row | arrays[key] | more)
 
     surfaces = [
-        tuple(surface(f"{n}-{k}", told) for k, told in enumerate(several))
-        for n, several in enumerate(head["surfaces"])
+        tuple(surface(f"{n}-{k}", row) for k, row in enumerate(several)) for n, several in enumerate(head["surfaces"])
     ]
-    return [RawNode(**told, **arrays[str(k)], surfaces=surfaces[n]) for k, (n, told) in enumerate(head["nodes"])]
+    return [RawNode(**row, **arrays[str(k)], surfaces=surfaces[n]) for k, (n, row) in enumerate(head["nodes"])]
 
 
 if __name__ == "__main__":

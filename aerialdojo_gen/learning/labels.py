@@ -68,10 +68,10 @@ class Labels:
 
 def odometry(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Poses in the frame of the first: x ahead, y left, z up in metres, and yaw in radians."""
-    return np.column_stack([seen_from(poses[:1], poses[:, :3]), wrap_angle_rad(poses[:, 3] - poses[0, 3])])
+    return np.column_stack([to_body_frame(poses[:1], poses[:, :3]), wrap_angle_rad(poses[:, 3] - poses[0, 3])])
 
 
-def seen_from(poses: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_body_frame(poses: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Places (n, 3) in the frames of bodies (n, 4) or (1, 4): ahead, left, up, metres."""
     away = places - poses[:, :3]
     c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])

@@ -17,7 +17,7 @@ from aerialdojo_gen.benchmark.tasks import Selection, mesh_of, reference_image
 from aerialdojo_gen.learning.encoding import goal_picture, packed
 from aerialdojo_gen.learning.geodesic import blocked_actions
 from aerialdojo_gen.learning.index import Index, read_index
-from aerialdojo_gen.learning.labels import odometry, seen_from
+from aerialdojo_gen.learning.labels import odometry, to_body_frame
 from aerialdojo_gen.learning.steps import Steps
 from aerialdojo_gen.learning.words import goal_text
 from aerialdojo_gen.planning.flight_space import flight_space
@@ -126,7 +126,7 @@ def blocked_at(part: Part, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def offsets(poses: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float32]:
     """Goals (n, 3) in the frames of bodies (n, 4): ahead, left, up, metres."""
-    return seen_from(poses, goals).astype(np.float32)
+    return to_body_frame(poses, goals).astype(np.float32)
 
 
 def goals_of(part: Part, index: Index) -> dict[str, Any]:

@@ -88,13 +88,12 @@ class _Lines:
 class _Shown:
     """What is shown of progress: a bar of tqdm's on a terminal, else lines."""
 
-    def __init__(self, kind: type[tqdm], total: float, stream: TextIO, nothing: bool, **bar: Any) -> None:
-        self._lines = None if nothing or stream.isatty() else _Lines(self._line, stream)
+    def __init__(
+        self, kind: type[tqdm], text: Callable[[], str], total: float, stream: TextIO, nothing: bool, **bar: Any
+    ) -> None:
+        self._lines = None if nothing or stream.isatty() else _Lines(text, stream)
         disable = nothing or self._lines is not None
         self._tqdm = kind(total=total, file=stream, leave=False, disable=disable, **bar)
-
-    def _line(self) -> str:
-        raise NotImplementedError
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
         """Count `n` more items and their video frames."""
@@ -115,7 +114,7 @@ class Bar(_Shown):
     def __init__(self, label: str, total: int, stream: TextIO, quiet: bool, unit: str = "shards") -> None:
         self._label, self._total, self._unit = shown(label), total, unit
         self._done, self._frames, self._rate, self._frame_rate = 0, 0, Rate(), Rate()
-        super().__init__(_Tqdm, total, stream, quiet or not total, desc=self._label, unit=f" {unit}")
+        super().__init__(_Tqdm, self._line, total, stream, quiet or not total, desc=self._label, unit=f" {unit}")
 
     def advance(self, n: int = 1, frames: int = 0) -> None:
         """Count `n` more items and their video frames."""
@@ -180,7 +179,7 @@ class Overall(_Shown):
         self._get_overview, self._stream = get_overview, stream
         overview = get_overview()
         super().__init__(
-            tqdm, 1.0, stream, quiet or overview.scenes_done == overview.scenes, dynamic_ncols=True,
+            tqdm, self._line, 1.0, stream, quiet or overview.scenes_done == overview.scenes, dynamic_ncols=True,
             bar_format=f"{{percentage:3.0f}}%|{{bar:{_BAR}}}| {{desc}}", mininterval=0.0,
         )  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -81,7 +82,7 @@ def token_count(value: Any) -> int | None:
     return value if isinstance(value, int) and 0 <= value < _MAX_TOKENS and not isinstance(value, bool) else None
 
 
-class LanguageModelAgent(AgentBase):
+class LanguageModelAgent(AgentBase, ABC):
     """Asks a model for every action: all it knows in one message, strictly parsed, with one attempt at repair.
 
     An answer that cannot be read even then raises `InvalidAnswer`: it is counted, it spends one action, and the drone
@@ -134,11 +135,11 @@ class LanguageModelAgent(AgentBase):
         """Return all options as used, defaults too, without secrets."""
         return dict(self._secrets.options(self.options.model_dump(mode="json") | {"answer": self.form}))
 
+    @abstractmethod
     def ask(
         self, system: str, messages: Sequence[Message], retries: int | None = None, schema: Schema | None = None
     ) -> Reply:
         """Send one request; the answer has the JSON schema, that of an action where None."""
-        raise NotImplementedError
 
     def ask_for(self, system: str, text: str, schema: Schema) -> Reply:
         """Ask for something else than an action, in the first form that the service takes."""

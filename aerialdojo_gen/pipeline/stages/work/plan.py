@@ -110,13 +110,13 @@ def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
     A start is the start object's anchor, its yaw turned by 180° (paper: start poses).
     """
     columns = ["object_id", "anchor_id", "x_m", "y_m", "z_m", "yaw_rad", "selected"]
-    anchors, wanted = job.read("anchors").select(columns).to_pydict(), pairs.to_pydict()
+    anchors, pair = job.read("anchors").select(columns).to_pydict(), pairs.to_pydict()
     poses = np.column_stack([anchors[name] for name in columns[2:6]])
     rows = {key: k for k, key in enumerate(zip(anchors["object_id"], anchors["anchor_id"], strict=True))}
     selected = {anchors["object_id"][k]: k for k in np.flatnonzero(anchors["selected"])}
     try:
-        goals = poses[[selected[target] for target in wanted["target_object_id"]]]
-        starts = poses[[rows[key] for key in zip(wanted["start_object_id"], wanted["start_anchor_id"], strict=True)]]
+        goals = poses[[selected[target] for target in pair["target_object_id"]]]
+        starts = poses[[rows[key] for key in zip(pair["start_object_id"], pair["start_anchor_id"], strict=True)]]
     except KeyError as error:
         raise StoreError(
             f"{job.scene}: a candidate needs anchor {error}, which is not in anchors: "
