@@ -235,31 +235,11 @@ def point_distance(
 
 
 @njit(cache=True)
-def nearest_owners(
-    px: float, py: float, pz: float, bound: float, slack: float, tri: NDArray[np.float64],
-    boxes: NDArray[np.float64], owner: NDArray[np.int32],
-) -> NDArray[np.int32]:  # fmt: skip
-    """Owners (k,) of the triangles within `slack` metres of the nearest to p; empty where all are beyond `bound`."""
-    found = np.empty(8, np.int32)
-    n = 0
-    nearest = point_distance(px, py, pz, bound, tri, boxes)
-    if nearest >= bound:
-        return found[:0]
-    reach2 = (nearest + slack) * (nearest + slack)
-    leaves = boxes.shape[0] // 2
-    node = 1
-    while node > 0:
-        if _box_gap2(px, py, pz, px, py, pz, boxes, node) > reach2:
-            node = _next_node(node)
-        elif node < leaves:
-            node *= 2
-        else:
-            first = (node - leaves) * LEAF
-            for k in range(first, min(first + LEAF, tri.shape[0])):
-                if point_triangle_d2(px, py, pz, tri, k) <= reach2 and not (found[:n] == owner[k]).any():
-                    if n == len(found):
-                        found = np.concatenate((found, np.empty(n, np.int32)))
-                    found[n] = owner[k]
-                    n += 1
-            node = _next_node(node)
-    return found[:n]
+def point_distances(
+    points: NDArray[np.float64], bound: float, tri: NDArray[np.float64], boxes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """`point_distance` of points, (n, 3) float64 metres."""
+    out = np.empty(len(points))
+    for n in range(len(points)):
+        out[n] = point_distance(points[n, 0], points[n, 1], points[n, 2], bound, tri, boxes)
+    return out

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.geometry.triangles import split_triangles
-from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, nearest_owners, point_distance
+from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distances
 from aerialdojo_gen.planning.bvh_groups import group_boxes
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, passable_moves, reaches_marked_cell
 from aerialdojo_gen.planning.distance_field import build_distance_field
@@ -23,8 +23,6 @@ from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles are split: their bounding boxes would be mostly empty.
 _LONGEST_EDGE_M = 4.0
-# Above the rounding between distances to a triangle and to its pieces.
-_SAME_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +32,6 @@ class _SolidSpace:
     arrays: GridArrays
     ground: Ground | None
     has_curtain: bool
-    owner: NDArray[np.int32]
 
     @classmethod
     def build(
@@ -44,9 +41,8 @@ class _SolidSpace:
         reach = cap_m + 1.0
         parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
         triangles = np.concatenate(parts) if parts else np.empty((0, 9))
-        owner = np.repeat(np.arange(len(parts), dtype=np.int32), [len(part) for part in parts])
-        triangles, rows = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
-        real, real_boxes, order = build_bvh(triangles)
+        triangles, _ = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
+        real, real_boxes, _ = build_bvh(triangles)
         ground = Ground.of(scene, radius_m) if closed_ground else None
         curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
         solid, boxes = real, real_boxes
@@ -60,7 +56,7 @@ class _SolidSpace:
         arrays = GridArrays(
             field, low.copy(), cell_m, solid, group_boxes(boxes), real, real_boxes, low + radius_m, high - radius_m
         )
-        return cls(arrays, ground, len(curtain) > 0, owner[rows[order]])
+        return cls(arrays, ground, len(curtain) > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +68,6 @@ class ClearanceGrid:
     sky: NDArray[np.bool_]  # (nx, ny, nz) bool; cells from which the body can fly to the ceiling
     radius_m: float  # The body's radius, with the planner's margin
     cap_m: float  # Distances are capped at this
-    owner: NDArray[np.int32]  # (n,) int32; index of the instance of each of ``arrays.real_tri``
     ground: Ground | None = None  # The scene's ground where it is an open sheet
     has_curtain: bool = False  # Whether only the curtain keeps the body from below it
 
@@ -118,28 +113,18 @@ class ClearanceGrid:
     def _with_radius(cls, space: _SolidSpace, radius_m: float, cap_m: float) -> ClearanceGrid:
         moves = passable_moves(space.arrays, radius_m)
         sky = connected_with_ceiling(moves)
-        return cls(space.arrays, moves, sky, radius_m, cap_m, space.owner, space.ground, space.has_curtain)
+        return cls(space.arrays, moves, sky, radius_m, cap_m, space.ground, space.has_curtain)
 
-    def distance_m(self, p: ArrayLike) -> float:
-        """Exact distance, metres, from a point (3,) in the world frame to the nearest surface, up to `cap_m`."""
-        x, y, z = np.asarray(p, np.float64)
-        return float(point_distance(x, y, z, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
-
-    def nearest(self, p: ArrayLike) -> NDArray[np.int32]:
-        """Indices (k,) of the instances nearest to a point (3,); usually one, none where all are beyond `cap_m`."""
-        x, y, z = np.asarray(p, np.float64)
-        a = self.arrays
-        return np.asarray(nearest_owners(x, y, z, self.cap_m, _SAME_M, a.real_tri, a.real_boxes, self.owner))
-
-    def ball_proven_free(self, p: ArrayLike, radius_m: float) -> bool:
-        """Whether the grid alone proves that a ball (centre in world metres) touches nothing; False is undecided."""
-        return self.segment_proven_free(p, p, radius_m)
+    def distance_m(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Exact distances (n,), metres, from points (n, 3) or (3,) to the nearest surface, up to `cap_m`."""
+        p = np.ascontiguousarray(np.asarray(points, np.float64).reshape(-1, 3))
+        return np.asarray(point_distances(p, self.cap_m, self.arrays.real_tri, self.arrays.real_boxes))
 
     def in_collision(self, p: ArrayLike) -> bool:
         """Whether the body at a point (3,) touches a surface, leaves the bounds, or is in a solid or below ground."""
         x, y, z = np.asarray(p, np.float64)
         a = self.arrays
-        if not inside(x, y, z, a.lower, a.upper) or self.distance_m(p) <= self.radius_m:
+        if not inside(x, y, z, a.lower, a.upper) or self.distance_m(p)[0] <= self.radius_m:
             return True
         return not self.reachable(p) and (
             self.below_ground(p) or crossings_above(x, y, z, a.real_tri, a.real_boxes) > 0

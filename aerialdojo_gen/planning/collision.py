@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import fcl
@@ -22,8 +22,8 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 # FCL has no point shape: distances are measured from a tiny ball.
 _POINT_RADIUS_M = 1e-6
-# Distances closer than this are a tie; and a margin above FCL's rounding of boxes.
-_TIE_M, _BOX_MARGIN_M = 1e-9, 1e-6
+# A margin above FCL's rounding of boxes.
+_BOX_MARGIN_M = 1e-6
 
 
 def _bvh(instance: Instance) -> fcl.BVHModel:
@@ -139,17 +139,12 @@ class CollisionWorld:
         capsule.setTranslation(np.array([(ax + bx) / 2, (ay + by) / 2, (az + bz) / 2]))
         return self._collides(capsule, ax, ay, az, bx, by, bz, radius_m)
 
-    def distance_m(self, p: ArrayLike, nearest: Iterable[int] = ()) -> float:
-        """Distance, metres, from a point to the nearest surface; `nearest` limits the instances; inf if empty."""
+    def distance_m(self, p: ArrayLike) -> float:
+        """Distance, metres, from a point to the nearest surface; inf if there is none."""
         if not self._instances:
             return float("inf")
-        sphere = self._sphere(p, _POINT_RADIUS_M)
-        found = sorted(float(fcl.distance(self._object(k), sphere, self._distances)) for k in nearest)
-        # On a tie the last bits depend on which surface is visited first: use the tree's order.
-        if found and (len(found) == 1 or found[1] > found[0] + _TIE_M):
-            return max(found[0], 0.0) + _POINT_RADIUS_M
         data = fcl.DistanceData()
-        self._manager.distance(sphere, data, fcl.defaultDistanceCallback)
+        self._manager.distance(self._sphere(p, _POINT_RADIUS_M), data, fcl.defaultDistanceCallback)
         return max(float(data.result.min_distance), 0.0) + _POINT_RADIUS_M
 
     def route_in_collision(self, points: Sequence[ArrayLike] | NDArray[np.float64], radius_m: float) -> bool:

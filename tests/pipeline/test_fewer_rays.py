@@ -21,6 +21,7 @@ from aerialdojo_gen.pipeline.stages.work.anchor_sample import candidates_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import Candidates
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m, steps_back_m
 from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
+from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.rendering.backend import open_renderer
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
@@ -74,7 +75,7 @@ def step_by_definition(found: Candidates, k: int, most_m: float) -> float:
         at = place + step * back
         points = found.points[in_picture(at[None], np.array([yaw]), found.points, 90.0)[0]]
         seen = world.rays.visible(at, points, found.instance).sum() if len(points) else 0
-        blocked = step > 0 and world.collisions.sphere_in_collision(at, 0.15)
+        blocked = step > 0 and collision_world(world.scene).sphere_in_collision(at, 0.15)
         worth.append(-math.inf if blocked else seen - 2.0 * (len(points) - seen))
     return tries[int(np.argmax(worth))]
 

@@ -19,13 +19,6 @@ def test_distance_agrees_with_trimesh():
     assert np.abs([FCL.distance_m(p) for p in points] - distances(MESH, points)).max() < 1e-5
 
 
-def test_distance_to_one_instance_is_to_its_own_surface():
-    wall = instance("wall", box((2, -5, 0), (2.5, 5, 4)))
-    world = CollisionWorld(scene(wall, instance("near", box((0.5, -1, 0), (0.6, 1, 4)))))
-    assert world.distance_m((0.0, 0.0, 2.0), [0]) == pytest.approx(2.0, abs=1e-5)
-    assert world.distance_m((0.0, 0.0, 2.0)) == pytest.approx(0.5, abs=1e-5)
-
-
 coordinate = st.floats(-17, 17)
 height = st.floats(0.3, 11)
 
@@ -73,28 +66,8 @@ def test_inside_a_solid_the_surface_is_far():
     assert not world.sphere_in_collision((0, 0, 3), 0.25)
 
 
-def test_who_is_known_to_be_nearest_is_asked_alone_and_says_the_same():
-    points = np.random.default_rng(1).uniform([-17, -17, 0.1], [17, 17, 11], (300, 3))
-    asked = CollisionWorld(WORLD)
-    inside = points[((points > WORLD.bounds[0]) & (points < WORLD.bounds[1])).all(axis=1)]
-    nearest = [GRID.nearest(p).tolist() for p in inside]
-    assert all(some or FCL.distance_m(p) >= GRID.cap_m - 1e-5 for p, some in zip(inside, nearest, strict=True))
-    # To the last bit: what the tables say does not hang on who was asked.
-    assert [asked.distance_m(p, some) for p, some in zip(inside, nearest, strict=True)] == [
-        FCL.distance_m(p) for p in inside
-    ]
-
-
-def test_surfaces_that_coincide_are_left_to_the_tree():
-    left, right = instance("left", box((-2, 0, 0), (0, 0.3, 3))), instance("right", box((-1, 0, 0), (2, 0.3, 3)))
-    both, p = CollisionWorld(scene(left, right)), (-0.5, 1.1, 1.3)
-    # The tree itself does not say the same twice there, to the last bit.
-    assert both.distance_m(p, (0, 1)) == pytest.approx(both.distance_m(p), abs=1e-12)
-    assert both.distance_m(p, (0, 1)) == pytest.approx(0.8, abs=1e-5)
-
-
 @settings(max_examples=100, deadline=None)
 @given(st.tuples(coordinate, coordinate, height), st.floats(0.05, 2.0))
 def test_a_ball_that_the_grid_proves_free_touches_nothing(p, radius):
-    if GRID.ball_proven_free(p, radius):
+    if GRID.segment_proven_free(p, p, radius):
         assert not FCL.sphere_in_collision(p, radius)

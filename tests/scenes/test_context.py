@@ -111,7 +111,7 @@ def test_a_scene_and_all_that_is_built_on_it_are_gone_before_the_next_one_is_rea
         planner = _planner(place, PlanConfig(), 0.25)
         assert _planner(place, PlanConfig(), 0.25) is planner
         world = World.of(place, 0.25, 0.05)
-        made = (place, planner, world.collisions, world.rays, scene_solid(place), ray_renderer(place),
+        made = (place, planner, planner.world, world.rays, scene_solid(place), ray_renderer(place),
                 orthographic_pictures(place), scene_renderer(place, "pybullet"))  # fmt: skip
         held += [weakref.ref(part) for part in made]
         del place, planner, world, made
@@ -130,7 +130,7 @@ def test_one_embree_scene_and_one_fcl_world_for_all(meshes):
     # The planner releases what draws, not what casts rays.
     assert world.rays is ray_caster(place)
     assert ray_renderer(place) is not renderer
-    assert world.collisions is planner.world is collision_world(place)
+    assert planner.world is collision_world(place)
     # Two grids of other margins: each asks for its own, and the context keeps the one last made.
     assert (
         world.free

@@ -55,7 +55,7 @@ def judge_anchor(
     inside = bool(((position_m >= low + radius) & (position_m <= high - radius)).all())
     if not inside:
         faults.append("it is outside the flight volume")
-    clearance = float(world.collisions.distance_m(position_m))
+    clearance = float(world.free.distance_m(position_m)[0])
     if clearance < radius + config.margin_m:
         faults.append(f"it is in collision: the nearest surface is {clearance:.2f} m away, the body needs "
                       f"{radius + config.margin_m:.2f} m")  # fmt: skip

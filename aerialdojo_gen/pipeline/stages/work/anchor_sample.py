@@ -186,9 +186,7 @@ def candidates_of(
     places = keep(places, ~np.isnan(places[:, 0]), "no_surface")
     low, high = world.scene.bounds
     places = keep(places, ((places >= low + radius) & (places <= high - radius)).all(axis=1), "out_of_bounds")
-    body = radius + config.margin_m
-    touching = np.array([world.ball_collides(p, body) for p in places], dtype=np.bool_)
-    places = keep(places, ~touching, "in_collision")
+    places = keep(places, world.free.distance_m(places) > radius + config.margin_m, "in_collision")
     places = keep(places, np.array([world.free.reachable(p) for p in places], dtype=np.bool_), "unreachable")
     if not len(places):
         return None, rejected, nearly

@@ -21,7 +21,6 @@ from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.scoring.recognisability import front_score, part_score, recognisability
 from aerialdojo_gen.pipeline.scoring.views import take_view
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
 from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.raycast import ray_renderer
 from aerialdojo_gen.scenes.model import Instance, Scene
@@ -32,11 +31,10 @@ _LEAST_POINTS = 32
 
 @dataclass(frozen=True)
 class World:
-    """A scene with its collision world, clearance grid and ray caster."""
+    """A scene with its clearance grid and ray caster."""
 
     scene: Scene  # The scene
-    collisions: CollisionWorld  # For collision and clearance
-    free: ClearanceGrid  # For what is connected with the open sky
+    free: ClearanceGrid  # For distances to surfaces, and for what is connected with the open sky
     rays: RayCaster  # For what is seen
     index: dict[str, int]  # Index of an instance by its node name
 
@@ -45,20 +43,10 @@ class World:
         """Build them for a body radius and a margin to surfaces."""
         return cls(
             scene,
-            collision_world(scene),
             ClearanceGrid.of(scene, radius_m=radius_m, margin_m=margin_m),
             ray_caster(scene),
             {i.node: k for k, i in enumerate(scene.instances)},
         )
-
-    def clearance_m(self, position_m: Floats) -> float:
-        """Distance from a place in the flight volume, (3,) float64, to the nearest surface, metres, by FCL."""
-        return self.collisions.distance_m(position_m, self.free.nearest(position_m).tolist())
-
-    def ball_collides(self, position_m: Floats, radius_m: float) -> bool:
-        """Whether a ball in the flight volume touches a surface; FCL decides where the grid cannot."""
-        proven = self.free.ball_proven_free(position_m, radius_m)
-        return not proven and self.collisions.sphere_in_collision(position_m, radius_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +74,7 @@ class Candidates:
         """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
         alone = instance_caster(world.scene.instances[instance])
         sight = PointVisibility.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
-        clearance = np.array([world.clearance_m(p) for p in positions_m])
+        clearance = world.free.distance_m(positions_m)
         patches = patches_of(world, instance, points)
         seen = visible_shares(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
         return cls(
@@ -132,7 +120,7 @@ class Candidates:
         places, turned = positions_m[new], yaws[new]
         sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, fov_deg)
         clearance, seen = self.clearance_m[which], self.seen[which]
-        clearance[new] = [world.clearance_m(p) for p in places]
+        clearance[new] = world.free.distance_m(places)
         seen[new] = visible_shares(places, turned, self.patches, world.rays, fov_deg)
         sight = self.sight.with_rows(which, new, sight)
         return replace(self, positions_m=positions_m, yaw_rad=yaws, clearance_m=clearance, sight=sight, seen=seen)

@@ -100,7 +100,7 @@ def steps_back_m(
         framed = in_picture(at, yaws[left], points, fov_deg)
         keen = framed.sum(axis=1) > best[left]
         if share:
-            keen[keen] = [not world.ball_collides(place, _CAMERA_M) for place in at[keen]]
+            keen[keen] = world.free.distance_m(at[keen]) > _CAMERA_M
         left, at, framed = left[keen], at[keen], framed[keen]
         who, what = np.nonzero(framed)
         # What the object itself hides is hidden from every distance: its own surface counts wherever it is met.
