@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.rendering.gl_geometry import Kind, cut, is_foreign, packed
 from aerialdojo_gen.rendering.shading import MUTE
-from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Scene
+from aerialdojo_gen.scenes.model import HORIZON, Instance, Material, Part, Scene
 
 # Fourth byte of the vertex colour of an unlit material.
 _UNLIT = 255
@@ -34,31 +34,31 @@ def backdrop_kinds(scene: Scene) -> list[Kind]:
 def _kinds(
     instances: Iterable[Instance], materials: dict[str, Material], foreign_only: bool, tags: tuple[str, ...]
 ) -> list[Kind]:
-    rows: dict[_Key, list[NDArray[np.void]]] = {}
-    names: dict[_Key, dict[str, int]] = {}
+    drawn: dict[_Key, list[tuple[Part, Material, int]]] = {}
     for k, instance in enumerate(instances):
         for part in instance.parts:
             material = materials[part.material]
-            if foreign_only and not is_foreign(part, material):
-                continue
-            double_sided = material.double_sided or not foreign_only
-            key = (*_size(material), material.mask is not None, double_sided)
-            vertices = packed(part, material, k)
-            vertices["colour"][..., 3] = _UNLIT if material.unlit else 0
-            if material.texture is not None:
-                layer = names.setdefault(key, {})
-                vertices["layer"] = layer.setdefault(material.name, len(layer))
-            rows.setdefault(key, []).append(vertices)
-    return [
-        Kind(
-            cut(rows[key], double_sided=key[3]),
-            (*tags, *(("ATLAS",) if key[0] else ()), *(("MASK",) if key[2] else ())),
-            _layers([materials[name] for name in names[key]], key) if key[0] else None,
-            smooth=True,
-            double_sided=key[3],
-        )
-        for key in sorted(rows)
-    ]
+            if not foreign_only or is_foreign(part, material):
+                double_sided = material.double_sided or not foreign_only
+                key = (*_size(material), material.mask is not None, double_sided)
+                drawn.setdefault(key, []).append((part, material, k))
+    return [_kind(key, drawn[key], tags) for key in sorted(drawn)]
+
+
+def _kind(key: _Key, drawn: list[tuple[Part, Material, int]], tags: tuple[str, ...]) -> Kind:
+    rows, part_of = packed(drawn)
+    layer = {material.name: material for _, material, _ in drawn if material.texture is not None}
+    number = {name: k for k, name in enumerate(layer)}
+    unlit = np.array([_UNLIT if material.unlit else 0 for _, material, _ in drawn])
+    rows["colour"][..., 3] = unlit[part_of, None]
+    rows["layer"] = np.array([number.get(material.name, 0) for _, material, _ in drawn])[part_of, None]
+    return Kind(
+        cut(rows, double_sided=key[3]),
+        (*tags, *(("ATLAS",) if key[0] else ()), *(("MASK",) if key[2] else ())),
+        _layers(list(layer.values()), key) if key[0] else None,
+        smooth=True,
+        double_sided=key[3],
+    )
 
 
 def _size(material: Material) -> tuple[int, int]:

@@ -7,6 +7,7 @@ so that hidden ones fail the depth test early.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.geometry.triangles import morton_codes
 from aerialdojo_gen.rendering.gl_culling import chunks_in_view, triangles_in_view
 from aerialdojo_gen.rendering.gl_tiles import Tiles
@@ -107,37 +109,35 @@ def own_kinds(scene: Scene) -> list[Kind]:
         for names in sizes.values()
         for k, name in enumerate(names)
     }
-    rows: dict[tuple[str, ...], list[NDArray[np.void]]] = {tags: [] for tags in _ORDER}
-    far: list[tuple[NDArray[np.void], tuple[str, ...]]] = []
     beyond = [instance for instance in scene.backdrop if instance.surface == HORIZON]
+    drawn: list[tuple[Part, Material, int]] = []
+    # Kinds of surfaces, and what is smooth together: parts of a thing with one crease.
+    kinds, groups = {tags: k for k, tags in enumerate(_ORDER)}, {(-1, _LAND): 0}
+    kind, group = [], []
     for k, instance in (*enumerate(scene.instances), *((-1, instance) for instance in beyond)):
-        soft: dict[float, list[NDArray[np.void]]] = {}
         for part in instance.parts:
             material = scene.materials[part.material]
             if is_foreign(part, material):
                 continue
-            found = packed(part, material, k)
-            if material.texture is not None:
-                found["texel_m"] = texel_m(material)
-                found["layer"] = layer[part.material]
-            if k < 0:
-                far.append((found, (*_tags(material), "HORIZON")))
-            else:
-                rows.setdefault(_tags(material), []).append(found)
-                # Buildings are flat: shallow roofs have a ridge.
-                crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else None)
-                if crease is not None:
-                    soft.setdefault(crease, []).append(found)
-        for crease, parts in soft.items():
-            smooth(*parts, crease=crease)
-    # Land of several materials is smooth across their seams.
-    if far:
-        smooth(*(found for found, _ in far), crease=_LAND)
-    for found, tags in far:
-        rows.setdefault(tags, []).append(found)
+            # Land of several materials is smooth across their seams. Buildings are flat: shallow roofs have a ridge.
+            crease = _CREASES.get(part.material.split(":")[0], _THINGS if instance.shape else None)
+            crease, tags = (crease, _tags(material)) if k >= 0 else (_LAND, (*_tags(material), "HORIZON"))
+            drawn.append((part, material, k))
+            kind.append(kinds.setdefault(tags, len(kinds)))
+            group.append(-1 if crease is None else groups.setdefault((k, crease), len(groups)))
+    rows, part_of = packed(drawn)
+    textured = [material.texture is not None for _, material, _ in drawn]
+    texels = [texel_m(m) if some else 0.0 for some, (_, m, _) in zip(textured, drawn, strict=True)]
+    rows["texel_m"] = np.array(texels, np.float32)[part_of, None]
+    own_layer = [layer[part.material] if some else 0.0 for some, (part, _, _) in zip(textured, drawn, strict=True)]
+    rows["layer"] = np.array(own_layer, np.float32)[part_of, None]
+    smooth(rows, np.array(group, np.int64)[part_of], np.array([crease for _, crease in groups]))
     layers = {fine: _layers(scene, names) for fine, names in sizes.items()}
-    own = {tags: layers[_FINE in tags] if "TEXTURED" in tags else None for tags in rows}
-    return [Kind(cut(some), tags, own[tags]) for tags, some in rows.items()]
+    kind_of = np.array(kind, np.int64)[part_of]
+    return [
+        Kind(cut(rows[kind_of == k]), tags, layers[_FINE in tags] if "TEXTURED" in tags else None)
+        for tags, k in kinds.items()
+    ]
 
 
 def _tags(material: Material) -> tuple[str, ...]:
@@ -149,32 +149,58 @@ def _tags(material: Material) -> tuple[str, ...]:
     return (*tags, "SHINY") if is_shiny(material) else tags
 
 
-def smooth(*parts: NDArray[np.void], crease: float) -> None:
-    """Give corners the mean normal of the faces about them that turn less than a crease from their own, in place."""
-    whole = np.concatenate(parts)
-    at = np.ascontiguousarray(whole["position"].reshape(-1, 3)).view("V12").ravel()
-    _, point, count = np.unique(at, return_inverse=True, return_counts=True)
-    normal = np.ascontiguousarray(whole["normal"]).reshape(-1, 3)
-    found = _mean_normals(normal, np.argsort(point, kind="stable"), np.cumsum(count), crease)
-    for part, some in zip(parts, np.split(found, np.cumsum([3 * len(p) for p in parts])[:-1]), strict=True):
-        part["normal"] = some.reshape(part["normal"].shape)
+def smooth(rows: NDArray[np.void], group: Indices, creases: Floats) -> None:
+    """Give corners the mean normal of the faces about them that turn less than a crease from their own, in place.
+
+    Rows (n, 3) of `VERTEX` belong to groups (n,), each with its crease; a group ends at its own corners, and rows of
+    -1 stay flat.
+    """
+    points = np.ascontiguousarray(rows["position"]).view(np.uint32).reshape(-1, 3)
+    normals = np.ascontiguousarray(rows["normal"]).reshape(-1, 3)
+    rows["normal"] = _mean_normals(points, normals, np.repeat(group, 3), creases).reshape(-1, 3, 3)
 
 
 @njit(cache=True)
-def _mean_normals(normal: Singles, order: Indices, ends: Indices, crease: float) -> Singles:
-    """Mean normals (n, 3) of corners; ``order`` has those of a point side by side."""
-    found = np.empty_like(normal)
-    start = 0
-    for end in ends:
-        for i in order[start:end]:
+def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, creases: Floats) -> Singles:
+    """Mean normals (n, 3) of corners, by the bits of their points."""
+    found = normal.copy()
+    size = 1024
+    while size < 2 * len(points):
+        size *= 2
+    # A hash table of points; the corners of each in a chain, in their order.
+    first, last = np.full(size, -1, np.int64), np.empty(size, np.int64)
+    following = np.full(len(points), -1, np.int64)
+    for i in range(len(points)):
+        if group[i] < 0:
+            continue
+        key = np.uint64(group[i])
+        for a in range(3):
+            key = (key ^ np.uint64(points[i, a])) * np.uint64(0x9E3779B97F4A7C15)
+            key ^= key >> np.uint64(29)
+        slot = np.int64(key >> np.uint64(1)) & (size - 1)
+        while first[slot] >= 0:
+            k = first[slot]
+            if group[k] == group[i] and (points[k] == points[i]).all():
+                break
+            slot = (slot + 1) & (size - 1)
+        if first[slot] < 0:
+            first[slot] = i
+        else:
+            following[last[slot]] = i
+        last[slot] = i
+    for start in first:
+        i = start
+        while i >= 0:
             x = y = z = np.float32(0.0)
-            for j in order[start:end]:
+            j = start
+            while j >= 0:
                 dot = normal[i, 0] * normal[j, 0] + normal[i, 1] * normal[j, 1] + normal[i, 2] * normal[j, 2]
-                if dot > crease:
+                if dot > creases[group[i]]:
                     x, y, z = x + normal[j, 0], y + normal[j, 1], z + normal[j, 2]
+                j = following[j]
             length = max(np.sqrt(x * x + y * y + z * z), np.float32(1e-9))
             found[i, 0], found[i, 1], found[i, 2] = x / length, y / length, z / length
-        start = end
+            i = following[i]
     return found
 
 
@@ -183,25 +209,38 @@ def is_foreign(part: Part, material: Material) -> bool:
     return material.foreign or part.colours is not None
 
 
-def packed(part: Part, material: Material, instance: int) -> NDArray[np.void]:
-    """Pack the triangles of a part that have an area, (n, 3) of `VERTEX`; texel and layer are left at 0."""
-    corners = part.vertices[part.faces]
+def packed(drawn: Sequence[tuple[Part, Material, int]]) -> tuple[NDArray[np.void], Indices]:
+    """Pack the triangles of parts that have an area, (n, 3) of `VERTEX`, and say which part each is of, (n,).
+
+    Parts come with their material and the number of their instance; texel and layer are left at 0.
+    """
+    if not drawn:
+        return np.zeros((0, 3), dtype=VERTEX), np.zeros(0, np.int64)
+    parts = [part for part, _, _ in drawn]
+    vertices, faces = soup(parts)
+    corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     solid = length > 0.0
-    rows = np.zeros((int(solid.sum()), 3), dtype=VERTEX)
+    faces, part_of = faces[solid], np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[solid]
+    rows = np.zeros((len(faces), 3), dtype=VERTEX)
     rows["position"] = corners[solid]
-    rows["uv"] = part.uv[part.faces[solid]]
+    rows["uv"] = np.concatenate([part.uv for part in parts])[faces]
     rows["normal"] = (normal[solid] / length[solid, None])[:, None]
-    colours = np.array(material.colour) if part.colours is None else part.colours[part.faces[solid]]
-    rows["colour"][..., :3] = colours if material.unlit else muted(colours)
-    rows["instance"] = instance
-    return rows
+    tones = [np.array(m.colour) if m.unlit else muted(np.array(m.colour)) for _, m, _ in drawn]
+    rows["colour"][..., :3] = np.array(tones)[part_of, None]
+    ends, first = np.searchsorted(part_of, np.arange(len(parts) + 1)), 0
+    for k, (part, material, _) in enumerate(drawn):
+        if part.colours is not None:
+            own = part.colours if material.unlit else muted(part.colours)
+            rows["colour"][ends[k] : ends[k + 1], :, :3] = own[faces[ends[k] : ends[k + 1]] - first]
+        first += len(part.vertices)
+    rows["instance"] = np.array([k for _, _, k in drawn], np.float32)[part_of, None]
+    return rows, part_of
 
 
-def cut(parts: list[NDArray[np.void]], double_sided: bool = False) -> Chunks:
+def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
     """Cut packed triangles into chunks; double-sided triangles face every eye."""
-    triangles = np.concatenate([*parts, np.zeros((0, 3), dtype=VERTEX)])
     if not len(triangles):
         none = np.zeros((0, 3))
         return Chunks(
