@@ -196,7 +196,8 @@ def test_routes_are_as_short_as_an_exhaustive_search_finds():
 
 def test_a_tolerance_that_grows_saves_expansions_and_costs_little_length():
     _, triples = planned()
-    steady = PlanConfig(ladder=(SearchAttempt(weight=1.05, budget=20_000, tolerance_growth_m=0.0),))
+    first = PlanConfig().ladder[0]
+    steady = PlanConfig(ladder=(first.model_copy(update={"tolerance_growth_m": 0.0}),))
     goal, starts, routes = triples[0][0], [s for _, s, _ in triples[:25]], [r for _, _, r in triples[:25]]
     proven = Planner(town(), steady, RADIUS).plan_target(goal, starts)
     assert sum(r.expansions for r in routes) < 0.9 * sum(r.expansions for r in proven)

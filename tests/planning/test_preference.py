@@ -104,7 +104,7 @@ def test_walls_are_not_climbed_flush():
     assert near.min() < 0.4
     assert far.min() > 0.6
     assert np.median(far) > 0.8
-    assert sum(r.length_m for r in keeps) <= sum(r.length_m for r in hugs) + len(starts)
+    assert sum(r.length_m for r in keeps) <= sum(r.length_m for r in hugs) + 1.05 * len(starts)
 
 
 @settings(max_examples=60, deadline=None)

@@ -151,7 +151,7 @@ class SearchAttempt(Section):
     heading_sectors: Literal[1, 2, 3, 4, 6, 8, 12, 24] = Field(1, description="headings told apart in a cell")
     extra_radius_m: float = Field(0.0, ge=0, le=10, description="added to the radius while searching")
     tolerance_growth_m: float = Field(
-        0.002,
+        0.004,
         ge=0,
         le=1,
         description="a route is taken though another may be cheaper by 0.15 m, and by this an expansion: at most 1 m",
@@ -214,19 +214,19 @@ class PlanConfig(Section):
         1.0, gt=0, le=10, description="clearance below which a metre costs more than a metre"
     )
     clearance_weight: float = Field(
-        1.2, ge=0, le=10, description="what a metre at a surface costs beside itself, in metres; 0 for no preference"
+        1.4, ge=0, le=10, description="what a metre at a surface costs beside itself, in metres; 0 for no preference"
     )
     max_approach_angle_deg: float = Field(
         60.0, gt=0, le=180, description="largest angle between the Approach and the final heading, where avoidable"
     )
     approach_detour_m: float = Field(
-        3.0, ge=0, le=100, description="what an Approach at a larger angle costs beside its length, in metres"
+        3.3, ge=0, le=100, description="what an Approach at a larger angle costs beside its length, in metres"
     )
     clearance_cap_m: float = Field(5.0, gt=0, le=100, description="clearances are known up to this distance")
     prove_by_grid: bool = Field(True, description="leave FCL unasked about legs that the grid proves free")
     ladder: tuple[SearchAttempt, ...] = Field(
         (
-            SearchAttempt(weight=1.05, budget=20_000),
+            SearchAttempt(weight=1.08, budget=20_000),
             SearchAttempt(weight=1.15, budget=8_000, duplicate_cell_m=0.25, heading_sectors=4, extra_radius_m=0.02),
             SearchAttempt(weight=1.15, budget=25_000, duplicate_cell_m=0.25, heading_sectors=4),
         ),
