@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.errors import RenderError
 
-# Without a filter reference images are a tenth smaller, and a third faster to write and read. Level 6 would take 1.4 %
-# off them, and 1.4 times the time.
+# Without a filter reference images are a tenth smaller, and a third faster to write and read. Level 6 would take 1.4
+# percent off them, and 1.4 times the time.
 REFERENCE_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 5, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)
 TEXTURE_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 3)
 FRAME_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 4)

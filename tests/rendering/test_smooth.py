@@ -36,7 +36,7 @@ def test_groups_are_smooth_by_themselves_and_what_has_none_is_flat() -> None:
     smooth(whole, np.zeros(len(ball), np.int64), np.array([0.7]))
     three = np.concatenate([ball, ball, ball])
     group = np.repeat(np.array([1, -1, 0]), len(ball))
-    smooth(three, group, np.array([0.7, 1.0]))
+    smooth(three, group, np.array([0.7, 0.999]))
     sharp, none, soft = np.split(three["normal"], 3)
     np.testing.assert_array_equal(none, flat)
     np.testing.assert_allclose(sharp, flat, atol=1e-6)
