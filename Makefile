@@ -38,9 +38,10 @@ install = { $(PIP) --quiet --require-hashes -r <(sed -n '/^uv==/,/[^\\]$$/p' con
 	  echo "error: a package could not be installed, see above. For every one there are wheels for Python 3.11, 3.12 and 3.13:" \
 	       "with one of them, make PYTHON=/path/to/python3" >&2; exit 1; }
 	@rm -f .venv.unfinished
-	@echo "compiling the kernels, once (half a minute; two on a busy machine)"
+	@echo "compiling the kernels, once (a minute; three on a busy machine)"
 	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \
-	  $(RUN) plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data "$$dir" --workers 1
+	  small="--pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data $$dir --workers 1" && $(RUN) filter $$small && \
+	  { $(RUN) reference-images $$small || echo "nothing can draw pictures here yet: see the line above" >&2; }
 	@touch $@
 
 .venv/.dev: .venv/.installed
