@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import cv2
 import numpy as np
@@ -247,7 +247,8 @@ def cut(triangles: NDArray[np.void], double_sided: bool = False) -> Chunks:
             triangles.ravel(), np.zeros(1, dtype=np.int64), none, none, np.zeros((0, 4)), _positions(triangles)
         )
     corners = triangles["position"].astype(np.float64)
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    # NumPy takes five times as long along an axis of three.
+    low, high = (reduce(of, np.moveaxis(corners, 1, 0)) for of in (np.minimum, np.maximum))
     extent = (high - low).max(axis=1)
     # Separate large triangles from small ones, or every chunk's box would be as large as its largest triangle.
     size = np.floor(np.log2(np.maximum(extent, 1.0)) / 1.5).astype(np.int64)
