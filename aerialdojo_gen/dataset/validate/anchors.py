@@ -9,7 +9,6 @@ import numpy as np
 from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
@@ -29,7 +28,7 @@ _STANDOFF_M = 1e-3
 def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Ranks of an object's anchors count from 0, the better score first, but for a person's choice."""
     ids, ranks, score = rows.ints("object_id"), rows.ints("anchor_id"), rows.floats("score")
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     for object_id in np.unique(ids):
         own = np.flatnonzero(ids == object_id)
         own = own[np.argsort(ranks[own], kind="stable")]
@@ -69,7 +68,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
     geometric = geometric * clarity_score(unoccluded, framed, 1.0 - unhindered, level)
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
         uncalled = sorted(name for name in own if not asked[name] and not annotated[row])
@@ -89,7 +88,7 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
-    scene, objects = scene_mesh(data).scene, data["objects"]
+    scene, objects = data.mesh, data["objects"]
     item = objects.find("object_id", rows.column("object_id"))
     nodes, off = objects.texts("mesh_node"), rows.floats("off_front_rad")
     reasons, selected = rows.texts("no_front_reason"), rows.floats("selected") == 1.0
@@ -126,7 +125,7 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
-    scene, objects, expected = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
+    scene, objects, expected = data.mesh, data["objects"], data.pipeline.anchor_sample.standoff_m
     item = objects.find("object_id", rows.column("object_id"))
     place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
     centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
@@ -148,8 +147,8 @@ def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
 def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A body can be at a viewpoint, inside the flight volume."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
-    low, high = scene_mesh(data).scene.bounds
+    world, radius = data.world, data.pipeline.embodiment.radius_m
+    low, high = data.mesh.bounds
     for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
         if not (np.isfinite(place).all() and ((place >= low) & (place <= high)).all()):
             yield Finding(row, "a place outside the flight volume", "one inside")
@@ -162,7 +161,7 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
     objects = data["objects"]
     item = objects.find("object_id", rows.column("object_id"))
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     fit = np.flatnonzero(comparable(data, "objects", item) & ~annotated)
     centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
     yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
@@ -174,8 +173,8 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
-    scene = scene_mesh(data).scene
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    scene = data.mesh
+    annotated = rows.texts("selected_by") == "annotation"
     slack = np.where(annotated, SLACK_M + _SAME_M, _STANDOFF_M)
     expected = data.pipeline.anchor_sample.standoff_m
     nodes = data["objects"].texts("mesh_node")
@@ -196,7 +195,7 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("mesh",), after=("anchor_surface",))
 def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is free of collision, and says how far the nearest surface is."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    world, radius = data.world, data.pipeline.embodiment.radius_m
     stored = rows.floats("clearance_m")
     for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
         distance = world.distance_m(place) if np.isfinite(place).all() else np.nan

@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.base.safe_parse import loads_json
@@ -41,7 +43,7 @@ def count_scene(data: SceneData, complete: bool) -> SceneCounts:
         rows = data["routes"]
         folders = [part.split("/")[-2] for part in rows.parts]
         routes.update(zip((folders[k] for k in rows.part_of), map(str, rows.texts("setting")), strict=True))
-        path = float(data.paths.length_m.sum())
+        path = float(np.nansum(data.paths.length_m))
     if "tasks" in data.tables:
         rows = data["tasks"]
         tasks.update(rows.parts[k].split("/")[-2] for k in rows.part_of)

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import MESH_CHECKS, mesh_path, scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError
 
 _SAME = 1e-6
 # glTF's y is up, the world's z is: what a node's own coordinates become, and nothing else.
@@ -67,8 +66,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         yield Finding(
             0, f"node {name}{others} moved by {_describe(world)}", "z up turned into y up, and no other transform"
         )
-    scene = scene_mesh(data).scene
-    expected = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
+    expected = Counter(instance.node for instance in (*data.mesh.instances, *data.mesh.backdrop))
     if shown != expected:
         odd = sorted(((shown - expected) + (expected - shown)).elements())
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")
@@ -78,7 +76,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 @_whole
 def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A material's colour is the same by its name, by its extras, by its factor and by its texture."""
-    by_name = scene_mesh(data).scene.materials
+    by_name = data.mesh.materials
     for entry in _document(data)["materials"]:
         material, surface = by_name[entry["name"]], entry["pbrMetallicRoughness"]
         factor = np.array(surface.get("baseColorFactor", (1, 1, 1, 1)), dtype=np.float64)
@@ -111,7 +109,7 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         if elsewhere:
             yield Finding(0, f"{kind} in {elsewhere[0][:60]!r}", "all of the mesh in one file")
             return
-    instances = {instance.node: instance for instance in scene_mesh(data).scene.instances}
+    instances = {instance.node: instance for instance in data.mesh.instances}
     for node in document["nodes"]:
         if "mesh" not in node or node.get("name") not in instances:
             continue
@@ -130,9 +128,9 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 def _document(data: SceneData) -> dict[str, Any]:
-    """Return the glTF document, read once; `scene_mesh` raises if there is none."""
-    scene_mesh(data)
-    document = data.cached("gltf", lambda: _parse(mesh_path(data).read_bytes()))
+    """Return the glTF document, read once, of a mesh that can be read."""
+    _ = data.mesh
+    document = data.cached("gltf", lambda: _parse(data.mesh_path().read_bytes()))
     if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
     return document

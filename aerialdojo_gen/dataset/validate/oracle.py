@@ -12,9 +12,8 @@ import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M, SUCCESS_RADIUS_M
 from aerialdojo_gen.dataset.episode import MIN_SPL, Reference, fly, spl_fault
-from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import ALWAYS_AFTER, START, Ints, Mask, Rows, SceneData
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -35,15 +34,11 @@ _REPLAY_M = 1e-5
 def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
     paths = data.paths
-    space = FlightSpace(scene_mesh(data).scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
+    space = FlightSpace(data.mesh, data.pipeline.embodiment.radius_m, data.world)
     tasks = _TaskData(data, routes)
-    for k in np.flatnonzero(~_left_out(data, _ROUTE_FAULTS)[paths.rows]).tolist():
-        row = int(paths.rows[k])
-        if tasks.task_of_route[row] < 0:
-            continue
-        reference = tasks.reference(row, paths.action[paths.of(k)].tolist())
-        lack = spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
-        if lack:
+    for row in np.flatnonzero(tasks.fit & ~_left_out(data, _ROUTE_FAULTS)).tolist():
+        reference = tasks.reference(row, paths.action[paths.of(row)].tolist())
+        if lack := spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M):
             yield Finding(row, lack, _EXPECTED)
 
 
@@ -54,42 +49,35 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
 )
 def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
-    if "agent_action" not in routes.table.column_names:
-        raise UncheckedError("the routes have no agent_action, which an older version did not write")
-    scene, paths = scene_mesh(data).scene, data.paths
-    space = FlightSpace(scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
+    scene, paths = data.mesh, data.paths
+    space = FlightSpace(scene, data.pipeline.embodiment.radius_m, data.world)
     tasks, nodes = _TaskData(data, routes), data["objects"].texts("mesh_node")
     left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
     lists = routes.column("agent_action").to_pylist()
     stops: list[tuple[int, str, tuple[float, float, float]]] = []
-    for k in np.flatnonzero(~left_out[paths.rows]).tolist():
-        row = int(paths.rows[k])
-        target = int(data.target_of_route[row])
-        if tasks.task_of_route[row] < 0 or target < 0:
-            continue
-        if lists[row] is None:  # an older version wrote it
-            continue
-        actions = [-1 if action is None else action for action in lists[row] or []]
+    # An older version wrote null lists.
+    flown_rows = tasks.fit & ~left_out & (data.target_of_route >= 0) & routes.valid("agent_action")
+    for row in np.flatnonzero(flown_rows).tolist():
+        actions = [-1 if action is None else action for action in lists[row]]
         wrong = [action for action in actions if not 0 <= action < APPROACH]
         if wrong or STOP in actions[:-1] or actions[-1:] != [STOP]:
             what = f"action {wrong[0]}" if wrong else "no Stop at its end alone"
             yield Finding(row, what, "actions 0 to 15, of which the last alone is 0 (Stop)")
             continue
-        where, own = paths.of(k), paths.action[paths.of(k)]
+        own = paths.action[paths.of(row)]
         if actions == own[own != APPROACH].tolist():
             # These have been flown by the check above, to where the Approach begins.
-            end = tuple(paths.xyz[where][-2 if own[-2] == APPROACH else -1].tolist())
+            end = tuple(paths.xyz[paths.of(row)][-2 if own[-2] == APPROACH else -1].tolist())
         else:
             flown = fly(space, tasks.reference(row, actions))
-            lack = spl_fault(flown, 0.0, SUCCESS_RADIUS_M)
-            if lack:
+            if lack := spl_fault(flown, 0.0, SUCCESS_RADIUS_M):
                 yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
                 continue
             end = flown.position
         away = math.dist(end, tasks.goal[row])
         if away > NEAR_GOAL_M + _REPLAY_M:
             yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
-        elif (node := nodes[target]) in scene:
+        elif (node := nodes[data.target_of_route[row]]) in scene:
             stops.append((row, str(node), end))
     ends = np.array([end for _, _, end in stops]).reshape(-1, 3)
     for k in np.flatnonzero(~all_in_sight(scene, [node for _, node, _ in stops], ends)).tolist():
@@ -102,15 +90,17 @@ class _TaskData:
     def __init__(self, data: SceneData, routes: Rows) -> None:
         tasks = data["tasks"]
         # Instances agree in these columns: one suffices.
-        self.task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
-        self._start = tasks.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
+        self._task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
+        # Whether a route can be flown: it has poses, and a task.
+        self.fit: Mask = data.paths.fit & (self._task_of_route >= 0)
+        self._start = tasks.floats(*START).tolist()
         self._budget = tasks.ints("action_budget").tolist()
         self._length_m = routes.floats("length_m").tolist()
         self.goal: list[list[float]] = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist()
 
     def reference(self, row: int, actions: Sequence[int]) -> Reference:
         """Make the reference of a route's row, which has a task, of some actions."""
-        task = int(self.task_of_route[row])
+        task = int(self._task_of_route[row])
         x, y, z, yaw = self._start[task]
         goal_x, goal_y, goal_z = self.goal[row]
         budget, length_m = self._budget[task], self._length_m[row]

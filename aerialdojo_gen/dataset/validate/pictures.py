@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.validate.images import POSE
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, UncheckedError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import open_renderer
 
@@ -91,7 +90,7 @@ def _drawn(
     """Pictures of these objects from where theirs were taken, by row; without those that do not say where."""
     places, config = rows.floats(*POSE), data.pipeline.reference_images
     poses = {row: places[row] for row in stored if np.isfinite(places[row]).all()}
-    scene = scene_mesh(data).scene
+    scene = data.mesh
     if not poses:
         return {}
     try:
