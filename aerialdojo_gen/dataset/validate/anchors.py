@@ -8,7 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
@@ -52,17 +52,18 @@ def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors")
 def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
-    names = (*WEIGHTS, *FACTORS)
-    parts = rows.floats(*(f"part_{name}" for name in names))
-    for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
-        yield Finding(int(row), f"part_{names[k]} = {parts[row, k]:.6g}", "0 to 1")
     weights = data.pipeline.anchor_sample.weights
     asked = {name: getattr(weights, name) for name in SCORERS}
     scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
+    names, optional = (*WEIGHTS, *FACTORS), ("tells", "front")
+    parts, known = (rows.floats(*(f"part_{name}" for name in some)) for some in (names, optional))
+    for some, values, wrong, expected in (
+        (names, parts, ~((parts >= 0) & (parts <= 1)), "0 to 1"),
+        (optional, known, (known < 0) | (known > 1), "0 to 1, or null"),
+    ):
+        for row, k in np.argwhere(wrong).tolist():
+            yield Finding(row, f"part_{some[k]} = {values[row, k]:.6g}", expected)
     geometric = parts[:, : len(WEIGHTS)] @ np.array([*WEIGHTS.values()])
-    known = rows.floats("part_tells", "part_front")
-    for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
-        yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
     share = np.where(np.isnan(known), 0.0, [PARTS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     framed, unhindered = parts[:, len(WEIGHTS) :].T
@@ -125,15 +126,10 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
-    scene, objects, expected = data.mesh, data["objects"], data.pipeline.anchor_sample.standoff_m
-    item = objects.find("object_id", rows.column("object_id"))
+    expected = data.pipeline.anchor_sample.standoff_m
     place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
-    centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
-    for k in np.unique(item[item >= 0]).tolist():
-        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
-        if nodes[k] not in scene or not len(own):
-            continue
-        distance = Surface.of(scene[str(nodes[k])]).distance_m(place[own])
+    centre = data["objects"].floats("x_m", "y_m", "z_m")
+    for k, own, distance in _distances(data, rows):
         off = np.abs(wrap_angle_rad(yaw[own] - yaw_towards(place[own], centre[k])))
         for n, row in enumerate(own.tolist()):
             if abs(distance[n] - expected) > _STANDOFF_M:
@@ -142,6 +138,17 @@ def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"yaw_rad = {yaw[row]:.6g}", "the yaw that faces the object's centre")
             elif number[row] != n:
                 yield Finding(row, f"viewpoint_id = {number[row]}", f"{n}")
+
+
+def _distances(data: SceneData, rows: Rows) -> Iterator[tuple[int, Ints, Floats]]:
+    """Objects in the mesh, by their row, with the rows that are at a place by each, and how far from its surface."""
+    scene, nodes = data.mesh, data["objects"].texts("mesh_node")
+    item = data["objects"].find("object_id", rows.column("object_id"))
+    place = rows.floats("x_m", "y_m", "z_m")
+    for k in np.unique(item[item >= 0]).tolist():
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        if nodes[k] in scene and len(own):
+            yield k, own, Surface.of(scene[str(nodes[k])]).distance_m(place[own])
 
 
 @check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
@@ -173,19 +180,11 @@ def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
-    scene = data.mesh
     annotated = rows.texts("selected_by") == "annotation"
     slack = np.where(annotated, SLACK_M + _SAME_M, _STANDOFF_M)
-    expected = data.pipeline.anchor_sample.standoff_m
-    nodes = data["objects"].texts("mesh_node")
-    item = data["objects"].find("object_id", rows.column("object_id"))
-    place, stored = rows.floats("x_m", "y_m", "z_m"), rows.floats("surface_distance_m")
-    for k in np.unique(item[item >= 0]).tolist():
-        if nodes[k] not in scene:
-            continue
-        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
-        found = Surface.of(scene[str(nodes[k])]).distance_m(place[own]) if len(own) else np.empty(0)
-        for row, distance in zip(own.tolist(), found.tolist(), strict=True):
+    expected, stored = data.pipeline.anchor_sample.standoff_m, rows.floats("surface_distance_m")
+    for _, own, distances in _distances(data, rows):
+        for row, distance in zip(own.tolist(), distances.tolist(), strict=True):
             if abs(distance - expected) > slack[row]:
                 yield Finding(row, f"{distance:.4f} m from the object's surface", f"{expected:g} m")
             elif abs(distance - stored[row]) > _SAME_M:

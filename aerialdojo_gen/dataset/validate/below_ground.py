@@ -92,10 +92,9 @@ def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
 def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
     found = np.zeros(len(points), dtype=np.bool_)
     if len(points):
-        roofed = np.flatnonzero(np.isfinite(ground.first_hit(points, np.repeat(_UP, len(points), axis=0))[0]))
-        if len(roofed):
-            beneath, _ = ground.first_hit(points[roofed], np.repeat(_DOWN, len(roofed), axis=0))
-            found[roofed] = np.isinf(beneath)
+        found = np.isfinite(ground.first_hit(points, np.repeat(_UP, len(points), axis=0))[0])
+    if found.any():
+        found[found] = np.isinf(ground.first_hit(points[found], np.repeat(_DOWN, found.sum(), axis=0))[0])
     return found
 
 

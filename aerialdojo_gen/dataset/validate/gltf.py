@@ -10,14 +10,14 @@ from __future__ import annotations
 import json
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import wraps
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.registry import Finding, Function, check
 from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError
 
 _SAME = 1e-6
@@ -28,9 +28,7 @@ _FACTOR, _MEAN = 2e-6, 1.0
 _MOVING = ("animations", "skins")
 
 
-def _whole(
-    function: Callable[[SceneData, Rows], Iterator[Finding]],
-) -> Callable[[SceneData, Rows], Iterator[Finding]]:
+def _whole(function: Function) -> Function:
     """Make a fault of a document that a viewer stumbles over, and this program's reader does not."""
 
     @wraps(function)
@@ -38,9 +36,8 @@ def _whole(
         try:
             yield from function(data, rows)
         except (KeyError, IndexError, TypeError, ValueError) as error:
-            yield Finding(
-                0, f"glTF that does not hold together ({type(error).__name__}: {error})", "a whole document"
-            )
+            found = f"glTF that does not hold together ({type(error).__name__}: {error})"
+            yield Finding(0, found, "a whole document")
 
     return run
 
@@ -63,9 +60,8 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     if off:
         name, world = off[0]
         others = f" and {len(off) - 1:,} more" if len(off) > 1 else ""
-        yield Finding(
-            0, f"node {name}{others} moved by {_describe(world)}", "z up turned into y up, and no other transform"
-        )
+        found = f"node {name}{others} moved by {_describe(world)}"
+        yield Finding(0, found, "z up turned into y up, and no other transform")
     expected = Counter(instance.node for instance in (*data.mesh.instances, *data.mesh.backdrop))
     if shown != expected:
         odd = sorted(((shown - expected) + (expected - shown)).elements())
@@ -117,10 +113,8 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         for primitive, part in zip(primitives, instances[node["name"]].parts, strict=True):
             accessor = document["accessors"][primitive["attributes"]["POSITION"]]
             low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
-            off = max(
-                np.abs(low - accessor.get("min", np.nan)).max(), np.abs(high - accessor.get("max", np.nan)).max()
-            )
-            if not off <= _SAME * max(1.0, float(np.abs([low, high]).max())):
+            off = (np.abs(own - accessor.get(name, np.nan)).max() for own, name in ((low, "min"), (high, "max")))
+            if not max(off) <= _SAME * max(1.0, float(np.abs([low, high]).max())):
                 found = f"node {node['name']} from {_triple(low)} to {_triple(high)}"
                 stated = f"{_triple(accessor.get('min', ()))} to {_triple(accessor.get('max', ()))} m as told"
                 yield Finding(0, found, stated)
