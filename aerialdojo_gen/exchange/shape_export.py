@@ -168,7 +168,8 @@ def _write_occupancy(scene: Scene, stem: Path, voxel_m: float) -> dict[str, int]
     if cells > _MAX_CELLS:
         raise UsageError(f"{scene.name}: {cells:,} voxels are more than {_MAX_CELLS:,}: choose a larger --voxel-m")
     grid = Occupancy.of(scene, voxel_m)
-    facts = {"origin_m": grid.origin_m, "voxel_m": np.float64(grid.voxel_m)}
-    path = stem.with_name(f"{stem.name}.npz")
-    np.savez_compressed(path, occupied=grid.occupied, reachable=grid.reachable, **facts)
+    np.savez_compressed(
+        stem.with_name(f"{stem.name}.npz"), occupied=grid.occupied, reachable=grid.reachable,
+        origin_m=grid.origin_m, voxel_m=np.float64(grid.voxel_m),
+    )  # fmt: skip
     return {"voxels": grid.occupied.size, "occupied": int(grid.occupied.sum())}

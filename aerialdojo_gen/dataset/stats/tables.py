@@ -190,8 +190,8 @@ def split_table(made: Sequence[Made]) -> Comparison:
     figures["all"] = sum(figures.values(), np.zeros((2, len(SETTINGS)), np.int64))
     rows = []
     for name, both in figures.items():
-        ours, papers = ((*row.tolist(), int(row.sum())) for row in both)
-        rows.append(Row(name, ours, papers if whole else (None,) * len(papers)))
+        mine, papers = ((*row.tolist(), int(row.sum())) for row in both)
+        rows.append(Row(name, mine, papers if whole else (None,) * len(papers)))
     return Comparison("Splits", "split", _COUNTS[2:], tuple(rows))
 
 

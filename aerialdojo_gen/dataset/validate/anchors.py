@@ -57,12 +57,12 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
     names, optional = (*WEIGHTS, *FACTORS), ("tells", "front")
     parts, known = (rows.floats(*(f"part_{name}" for name in some)) for some in (names, optional))
-    for some, values, wrong, expected in (
+    for some, values, wrong, allowed in (
         (names, parts, ~((parts >= 0) & (parts <= 1)), "0 to 1"),
         (optional, known, (known < 0) | (known > 1), "0 to 1, or null"),
     ):
         for row, k in np.argwhere(wrong).tolist():
-            yield Finding(row, f"part_{some[k]} = {values[row, k]:.6g}", expected)
+            yield Finding(row, f"part_{some[k]} = {values[row, k]:.6g}", allowed)
     geometric = parts[:, : len(WEIGHTS)] @ np.array([*WEIGHTS.values()])
     share = np.where(np.isnan(known), 0.0, [PARTS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.pictures import decode_grey
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, repeated
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, repeated
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.casters import triangle_caster
 
@@ -106,17 +106,11 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Box and share of pixels are those of the object as rays from the picture's camera find it."""
     rays = data.rays
     index = {node: k for k, node in enumerate(rays.nodes)}
-    places = rows.floats(*POSE)
     nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
-    for row, picture in _decoded(data, rows, "image_damaged", "image_box", "object_node", "image_pose"):
-        place = places[row]
-        if not np.isfinite(place).all():
-            continue
-        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
-        pose = view_pose(place[:3], float(place[3]), "front")
-        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
-        seen = rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
-        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
+    for row, place, directions in _cameras(data, rows, "image_damaged", "image_box", "object_node", "image_pose"):
+        some = directions[::_EVERY, ::_EVERY]
+        seen = rays.first_hit(place, some.reshape(-1, 3))[1] == index[str(nodes[row])]
+        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), some.shape[:2]))
         u0, v0, u1, v1 = boxes[row].tolist()
         share = float(seen.mean())
         stored = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
@@ -135,25 +129,19 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     scene = data.mesh
     first = dict(zip(data.rays.nodes, np.cumsum([0, *(len(i.faces) for i in scene.instances)]), strict=False))
     nodes, shown, missing = rows.texts("mesh_node"), rows.floats("tells_shown"), rows.texts("tells_missing")
-    triangles, places, boxes = triangle_caster(scene), rows.floats(*POSE), rows.floats(*_BOX).reshape(-1, 4)
-    for row, picture in _decoded(data, rows, "image_box"):
-        place = places[row]
+    triangles, boxes = triangle_caster(scene), rows.floats(*_BOX).reshape(-1, 4)
+    for row, place, directions in _cameras(data, rows, "image_box"):
         anatomy = scene[str(nodes[row])].anatomy if nodes[row] in scene else None
         tells = () if anatomy is None else anatomy.identifying_parts
-        if not np.isfinite(place).all():
-            continue
         if bool(tells) == bool(np.isnan(shown[row])):
             yield Finding(row, f"tells_shown = {shown[row]:g}", f"{'a share' if tells else 'null'}")
             continue
-        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
-        pose = view_pose(place[:3], float(place[3]), "front")
-        rays = camera.rays()
+        least, near = _MIN_PART_SHARE * directions[..., 0].size, directions
         if np.isfinite(boxes[row]).all():
             u0, v0, u1, v1 = boxes[row].astype(int).tolist()
-            rays = rays[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
-        hit = triangles.first_hit(pose[:3, 3], rays.reshape(-1, 3) @ pose[:3, :3].T)[1] - first[str(nodes[row])]
+            near = directions[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
+        hit = triangles.first_hit(place, near.reshape(-1, 3))[1] - first[str(nodes[row])]
         counts = {tell: int(np.isin(hit, scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
-        least = _MIN_PART_SHARE * picture.size
         stored = [word for word in (missing[row] or "").split(", ") if word]
         wrong = [t for t, n in counts.items() if (t in stored) != (n < least) and abs(n - least) > _EDGE * least + 2]
         if wrong:
@@ -179,6 +167,16 @@ def _decoded(data: SceneData, rows: Rows, *faults: str) -> Iterator[tuple[int, N
     for row, raw in enumerate(rows.column("reference_image")):
         if raw.is_valid and not skip[row] and (picture := decode_grey(raw.as_py())) is not None:
             yield row, picture
+
+
+def _cameras(data: SceneData, rows: Rows, *faults: str) -> Iterator[tuple[int, Floats, Floats]]:
+    """Rows of `_decoded` that say where theirs was taken: that place, and the direction of each pixel, (H, W, 3)."""
+    poses = rows.floats(*POSE)
+    for row, picture in _decoded(data, rows, *faults):
+        if np.isfinite(poses[row]).all():
+            camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+            pose = view_pose(poses[row, :3], float(poses[row, 3]), "front")
+            yield row, pose[:3, 3], camera.rays() @ pose[:3, :3].T
 
 
 def _chunks(png: bytes) -> list[str]:

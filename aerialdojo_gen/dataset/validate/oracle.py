@@ -6,14 +6,14 @@ So do the references as an agent can fly them (`agent_action`), which besides en
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M, SUCCESS_RADIUS_M
 from aerialdojo_gen.dataset.episode import MIN_SPL, Reference, fly, spl_fault
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import ALWAYS_AFTER, START, Ints, Mask, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import ALWAYS_AFTER, START, Mask, Rows, SceneData
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -33,11 +33,11 @@ _REPLAY_M = 1e-5
 @check("routes", needs=("tasks", "mesh"), after=_ROUTE_FAULTS)
 def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
-    paths = data.paths
     space = FlightSpace(data.mesh, data.pipeline.embodiment.radius_m, data.world)
-    tasks = _TaskData(data, routes)
-    for row in np.flatnonzero(tasks.fit & ~_left_out(data, _ROUTE_FAULTS)).tolist():
-        reference = tasks.reference(row, paths.action[paths.of(row)].tolist())
+    left_out = _left_out(data, _ROUTE_FAULTS)
+    for row, reference in _references(data, routes):
+        if left_out[row]:
+            continue
         if lack := spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M):
             yield Finding(row, lack, _EXPECTED)
 
@@ -51,13 +51,13 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
     scene, paths = data.mesh, data.paths
     space = FlightSpace(scene, data.pipeline.embodiment.radius_m, data.world)
-    tasks, nodes = _TaskData(data, routes), data["objects"].texts("mesh_node")
-    left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
-    lists = routes.column("agent_action").to_pylist()
-    stops: list[tuple[int, str, tuple[float, float, float]]] = []
+    nodes, lists = data["objects"].texts("mesh_node"), routes.column("agent_action").to_pylist()
     # An older version wrote null lists.
-    flown_rows = tasks.fit & ~left_out & (data.target_of_route >= 0) & routes.valid("agent_action")
-    for row in np.flatnonzero(flown_rows).tolist():
+    left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target")) | ~routes.valid("agent_action")
+    stops: list[tuple[int, str, tuple[float, float, float]]] = []
+    for row, reference in _references(data, routes):
+        if left_out[row] or data.target_of_route[row] < 0:
+            continue
         actions = [-1 if action is None else action for action in lists[row]]
         wrong = [action for action in actions if not 0 <= action < APPROACH]
         if wrong or STOP in actions[:-1] or actions[-1:] != [STOP]:
@@ -69,12 +69,12 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
             # These have been flown by the check above, to where the Approach begins.
             end = tuple(paths.xyz[paths.of(row)][-2 if own[-2] == APPROACH else -1].tolist())
         else:
-            flown = fly(space, tasks.reference(row, actions))
+            flown = fly(space, reference._replace(actions=actions))
             if lack := spl_fault(flown, 0.0, SUCCESS_RADIUS_M):
                 yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
                 continue
             end = flown.position
-        away = math.dist(end, tasks.goal[row])
+        away = math.dist(end, reference.goal)
         if away > NEAR_GOAL_M + _REPLAY_M:
             yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
         elif (node := nodes[data.target_of_route[row]]) in scene:
@@ -84,27 +84,16 @@ def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
         yield Finding(stops[k][0], "a Stop from where no straight line reaches the target", "the target in sight")
 
 
-class _TaskData:
-    """Start, goal and budget of routes' episodes."""
-
-    def __init__(self, data: SceneData, routes: Rows) -> None:
-        tasks = data["tasks"]
-        # Instances agree in these columns: one suffices.
-        self._task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
-        # Whether a route can be flown: it has poses, and a task.
-        self.fit: Mask = data.paths.fit & (self._task_of_route >= 0)
-        self._start = tasks.floats(*START).tolist()
-        self._budget = tasks.ints("action_budget").tolist()
-        self._length_m = routes.floats("length_m").tolist()
-        self.goal: list[list[float]] = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist()
-
-    def reference(self, row: int, actions: Sequence[int]) -> Reference:
-        """Make the reference of a route's row, which has a task, of some actions."""
-        task = int(self._task_of_route[row])
-        x, y, z, yaw = self._start[task]
-        goal_x, goal_y, goal_z = self.goal[row]
-        budget, length_m = self._budget[task], self._length_m[row]
-        return Reference((x, y, z, yaw), (goal_x, goal_y, goal_z), budget, length_m, actions)
+def _references(data: SceneData, routes: Rows) -> Iterator[tuple[int, Reference]]:
+    """Routes that can be flown, as they have poses and a task: their rows, and what an episode is made of."""
+    tasks, paths = data["tasks"], data.paths
+    # Instances agree in these columns: one suffices.
+    task_of_route = tasks.find("nav_id", routes.column("nav_id"))
+    starts, budgets = tasks.floats(*START).tolist(), tasks.ints("action_budget").tolist()
+    goals, lengths_m = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist(), routes.floats("length_m").tolist()
+    for row in np.flatnonzero(paths.fit & (task_of_route >= 0)).tolist():
+        task, actions = task_of_route[row], paths.action[paths.of(row)].tolist()
+        yield row, Reference(tuple(starts[task]), tuple(goals[row]), budgets[task], lengths_m[row], actions)
 
 
 def _left_out(data: SceneData, faults: tuple[str, ...]) -> Mask:
