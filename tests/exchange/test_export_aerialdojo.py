@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
-from support.releases import copy_release, released, replace_rows
+from support.releases import copy_release, files_of, released, replace_rows
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
@@ -255,11 +255,7 @@ def test_numbers_are_ours_turned(layout, smoke):
 
 def test_the_same_release_gives_the_same_bytes(layout, smoke, tmp_path):
     export_release("aerialdojo", smoke, tmp_path / "again")
-    first = {p.relative_to(layout): p.read_bytes() for p in layout.rglob("*") if p.is_file()}
-    second = {
-        p.relative_to(tmp_path / "again"): p.read_bytes() for p in (tmp_path / "again").rglob("*") if p.is_file()
-    }
-    assert first == second
+    assert files_of(tmp_path / "again") == files_of(layout)
 
 
 def test_a_picture_is_on_the_disk_once(layout):
