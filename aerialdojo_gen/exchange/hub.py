@@ -203,10 +203,6 @@ def scene_of(name: str) -> str:
     return stem if name in own else ""
 
 
-def _is_ours(name: str) -> bool:
-    return name in _COMPANIONS or _is_policy(name) or bool(scene_of(name))
-
-
 def _is_mesh(name: str) -> bool:
     return name.startswith("meshes/")
 
@@ -215,14 +211,14 @@ def _policy_file(name: str) -> str:
     return f"policies/{name}/policy.safetensors"
 
 
-def _is_policy(name: str) -> bool:
-    training = PurePosixPath(name).parent.name
-    return is_plain(training) and name == _policy_file(training)
-
-
 def _is_companion(name: str) -> bool:
-    """Whether a file lies beside the release in a data directory, and not in it."""
-    return _is_mesh(name) or _is_policy(name)
+    """Whether a file lies beside the release in a data directory, and not in it: a mesh, or a policy's weights."""
+    training = PurePosixPath(name).parent.name
+    return _is_mesh(name) or (is_plain(training) and name == _policy_file(training))
+
+
+def _is_ours(name: str) -> bool:
+    return name in _COMPANIONS or bool(scene_of(name)) or (_is_companion(name) and not _is_mesh(name))
 
 
 def _mesh(root: LocalRoot, scene: str) -> Path:

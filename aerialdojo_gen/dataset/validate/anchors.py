@@ -8,7 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, at
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
@@ -89,12 +89,10 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
-    scene, objects = data.mesh, data["objects"]
-    item = objects.find("object_id", rows.column("object_id"))
-    nodes, off = objects.texts("mesh_node"), rows.floats("off_front_rad")
+    scene, nodes, off = data.mesh, data["objects"].texts("mesh_node"), rows.floats("off_front_rad")
     reasons, selected = rows.texts("no_front_reason"), rows.floats("selected") == 1.0
     places = rows.floats("x_m", "y_m", "z_m")
-    for row, k in enumerate(item.tolist()):
+    for row, k in enumerate(data.objects_of(rows).tolist()):
         if k < 0 or nodes[k] not in scene or not np.isfinite(places[row]).all():
             continue
         anatomy = scene[str(nodes[k])].anatomy
@@ -113,9 +111,8 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
     back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
-    item = data["objects"].find("object_id", rows.column("object_id"))
     selected, stored = rows.floats("selected") == 1.0, data["objects"].floats("step_back_m")
-    for row, k in enumerate(item.tolist()):
+    for row, k in enumerate(data.objects_of(rows).tolist()):
         expected = min(back[row], data.pipeline.reference_images.step_back_m)
         if not 0.0 <= back[row] <= most or abs(back[row] * 100.0 - round(back[row] * 100.0)) > _SAME_M:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"0 to {most:g}, in centimetres")
@@ -143,8 +140,7 @@ def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def _distances(data: SceneData, rows: Rows) -> Iterator[tuple[int, Ints, Floats]]:
     """Objects in the mesh, by their row, with the rows that are at a place by each, and how far from its surface."""
     scene, nodes = data.mesh, data["objects"].texts("mesh_node")
-    item = data["objects"].find("object_id", rows.column("object_id"))
-    place = rows.floats("x_m", "y_m", "z_m")
+    item, place = data.objects_of(rows), rows.floats("x_m", "y_m", "z_m")
     for k in np.unique(item[item >= 0]).tolist():
         own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
         if nodes[k] in scene and len(own):
@@ -166,15 +162,12 @@ def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects",), after=("unknown_object",))
 def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
-    objects = data["objects"]
-    item = objects.find("object_id", rows.column("object_id"))
-    annotated = rows.texts("selected_by") == "annotation"
-    fit = np.flatnonzero(comparable(data, "objects", item) & ~annotated)
-    centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
-    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
-    off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))
-    for k in np.flatnonzero(off > _SAME_RAD):
-        yield Finding(int(fit[k]), f"{rows.floats('yaw_rad')[fit[k]]:.6f} rad", f"{yaw[k]:.6f} rad")
+    item, own = data.objects_of(rows), rows.floats("yaw_rad")
+    centre = at(data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3), item)
+    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m"), centre)
+    fit = comparable(data, "objects", item) & (rows.texts("selected_by") != "annotation")
+    for row in np.flatnonzero(fit & (np.abs(wrap_angle_rad(own - yaw)) > _SAME_RAD)):
+        yield Finding(int(row), f"{own[row]:.6f} rad", f"{yaw[row]:.6f} rad")
 
 
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))

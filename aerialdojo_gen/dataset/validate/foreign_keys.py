@@ -56,13 +56,12 @@ def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     landmarks = data["landmarks"]
     if not len(landmarks):
         raise UncheckedError("there is no landmark")
-    own = landmarks.find("landmark_id", rows.column("landmark_id"))
+    ids, own = landmarks.ints("landmark_id"), landmarks.find("landmark_id", rows.column("landmark_id"))
     away = rows.floats("x_m", "y_m")[:, None] - landmarks.floats("x_m", "y_m")[None]
     distance = np.linalg.norm(away, axis=2)
-    nearest = distance.argmin(axis=1)
     for row in np.flatnonzero(distance[np.arange(len(rows)), own] > distance.min(axis=1) + _SAME_PLACE_M):
-        ids = landmarks.ints("landmark_id")
-        yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{ids[nearest[row]]}, which is nearer")
+        nearest = ids[distance[row].argmin()]
+        yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{nearest}, which is nearer")
 
 
 @check("objects", needs=("landmarks",), after=("unknown_landmark",))
@@ -80,14 +79,14 @@ def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects",))
 def unknown_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's object exists."""
-    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+    for row in np.flatnonzero(data.objects_of(rows) < 0):
         yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "an object of the scene")
 
 
 @check("viewpoints", needs=("objects",))
 def viewpoint_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is one of an object that there is."""
-    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+    for row in np.flatnonzero(data.objects_of(rows) < 0):
         yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "the id of an object")
 
 

@@ -337,6 +337,10 @@ class SceneData:
         """Row of `objects` of every task's target, -1 if there is none."""
         return at(self.target_of_route, self.route_of_task)
 
+    def objects_of(self, rows: Rows) -> Ints:
+        """Row of `objects` of every anchor's or viewpoint's object, -1 if there is none."""
+        return self["objects"].find("object_id", rows.column("object_id"))
+
     @cached_property
     def selected_of_object(self) -> dict[int, int]:
         """Row of `anchors` of every object's selected anchor; without objects that have none or several."""
