@@ -47,13 +47,12 @@ def _hf_type(kind: pa.DataType, indent: int = 4) -> str:
 
 
 def _scene_rows(root: DataRoot, made: list[Made]) -> list[dict[str, Any]]:
-    rows = [store.read_scene(root, "release/scenes", m.scene).to_pylist()[0] for m in made]
-    return [
-        row
-        | {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
-        | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None}
-        for row, m in zip(rows, made, strict=True)
-    ]
+    rows = []
+    for m in made:
+        row = store.read_scene(root, "release/scenes", m.scene).to_pylist()[0]
+        row |= {"landmarks": m.landmarks, "objects": m.objects, "tasks": m.instances, "km": m.path_m / 1000}
+        rows.append(row | {"paper_km": m.paper_scene.path_m / 1000 if m.paper_scene else None})
+    return rows
 
 
 def _attributions(scenes: list[dict[str, Any]]) -> dict[str, list[str]]:
@@ -78,11 +77,8 @@ def _example(root: DataRoot, scenes: list[str]) -> dict[str, Any] | None:
     for scene in scenes:
         for subset in ("train", "test"):
             tasks = store.read_scene(root, f"tasks/{subset}", scene)
-            examples: list[dict[str, Any]] = (
-                tasks.filter(pc.equal(tasks.column("modality"), "semantic")).slice(0, 1).to_pylist()
-            )
-            if examples:
-                return examples[0]
+            for example in tasks.filter(pc.equal(tasks["modality"], "semantic")).slice(0, 1).to_pylist():
+                return dict(example)
     return None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -175,15 +176,13 @@ def _faults(root: DataRoot, scene: str, present: list[str]) -> list[str]:
 
 def counts(root: Where, scenes: list[str]) -> dict[str, dict[str, int]]:
     """Count the rows of every table and split of these scenes, from the footers."""
-    found: dict[str, dict[str, int]] = {name: {} for name in TABLES}
+    found: dict[str, Counter[str]] = {name: Counter() for name in TABLES}
     for scene in scenes:
         for name in SHARDS:
             table, split = table_and_split(name, scene)
-            rows = found[table]
-            rows[split] = rows.get(split, 0) + store.count_rows(root, name, scene)
-    return {
-        table: {s: rows[s] for s in (*schemas.SUBSETS, "all") if s in rows} for table, rows in found.items()
-    }  # fmt: skip
+            found[table][split] += store.count_rows(root, name, scene)
+    splits = (*schemas.SUBSETS, "all")
+    return {table: {split: rows[split] for split in splits if split in rows} for table, rows in found.items()}
 
 
 def sizes(where: Where, scenes: list[str]) -> dict[str, int]:

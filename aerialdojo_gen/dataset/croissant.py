@@ -20,8 +20,10 @@ CITE_AS = (
     f"author = {{{{The aerialdojo-gen contributors}}}}, year = {{{PUBLISHED[:4]}}}}}"
 )
 
+Document = dict[str, Any]
+
 # The standard context of Croissant 1.0: readers compare it key by key.
-_CONTEXT: dict[str, Any] = {
+_CONTEXT: Document = {
     "@language": "en",
     "@vocab": "https://schema.org/",
     **{
@@ -54,7 +56,7 @@ _TYPES = {
 }
 
 
-def croissant(found: dict[str, dict[str, int]]) -> dict[str, Any]:
+def croissant(found: dict[str, dict[str, int]]) -> Document:
     """Describe a release."""
     total = sum(found["tasks"].values())
     return {
@@ -79,7 +81,7 @@ def croissant(found: dict[str, dict[str, int]]) -> dict[str, Any]:
     }
 
 
-def _file_set(name: str, table: Table, splits: dict[str, int]) -> dict[str, Any]:
+def _file_set(name: str, table: Table, splits: dict[str, int]) -> Document:
     folders = [f"{name}/{split}" for split in splits] if table.split else [name]
     return {
         "@type": "cr:FileSet",
@@ -91,25 +93,15 @@ def _file_set(name: str, table: Table, splits: dict[str, int]) -> dict[str, Any]
     }
 
 
-def _record_set(name: str, table: Table, splits: dict[str, int]) -> dict[str, Any]:
-    fields = [_field(name, field) for field in table.spec.schema]
+def _record_set(name: str, table: Table, splits: dict[str, int]) -> Document:
+    fields = [_column(name, field) for field in table.spec.schema]
     about = table.about
     if table.split:
         about += " Splits: " + ", ".join(f"{split} ({rows:,} rows)" for split, rows in splits.items()) + "."
-        fields.append(
-            {
-                "@type": "cr:Field",
-                "@id": f"{name}/split",
-                "name": "split",
-                "description": "The split, which is the folder that the row lies in.",
-                "dataType": ["sc:Text", "cr:Split"],
-                "source": {
-                    "fileSet": {"@id": f"{name}-files"},
-                    "extract": {"fileProperty": "fullpath"},
-                    "transform": {"regex": f"^{name}/([a-z_]+)/.*$"},
-                },
-            }
-        )
+        source = {"extract": {"fileProperty": "fullpath"}, "transform": {"regex": f"^{name}/([a-z_]+)/.*$"}}
+        kind = {"dataType": ["sc:Text", "cr:Split"]}
+        about_split = {"description": "The split, which is the folder that the row lies in."}
+        fields.append(_field(name, "split", about_split, kind, source))
     else:
         about += f" {splits['all']:,} rows."
     return {
@@ -122,43 +114,30 @@ def _record_set(name: str, table: Table, splits: dict[str, int]) -> dict[str, An
     }
 
 
-def _field(table: str, field: pa.Field) -> dict[str, Any]:
-    repeated = pa.types.is_list(field.type)
-    kind = field.type.value_type if repeated else field.type
-    return {
-        "@type": "cr:Field",
-        "@id": f"{table}/{field.name}",
-        "name": field.name,
-        "description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else ""),
-        **(
-            {"subField": _sub_fields(table, field.name, kind)}
-            if pa.types.is_struct(kind)
-            else {"dataType": _TYPES[kind]}
-        ),
-        **({"repeated": True} if repeated else {}),
-        "source": {"fileSet": {"@id": f"{table}-files"}, "extract": {"column": field.name}},
-    }
+def _field(table: str, name: str, about: Document, kind: Document, source: Document) -> Document:
+    own = {"@type": "cr:Field", "@id": f"{table}/{name}", "name": name.rpartition("/")[2]}
+    return own | about | kind | {"source": {"fileSet": {"@id": f"{table}-files"}} | source}
 
 
-def _sub_fields(table: str, column: str, kind: pa.StructType) -> list[dict[str, Any]]:
-    found = []
-    for field in kind:
-        repeated = pa.types.is_list(field.type)
-        found.append(
-            {
-                "@type": "cr:Field",
-                "@id": f"{table}/{column}/{field.name}",
-                "name": field.name,
-                "dataType": _TYPES[field.type.value_type if repeated else field.type],
-                **({"repeated": True} if repeated else {}),
-                "source": {
-                    "fileSet": {"@id": f"{table}-files"},
-                    "extract": {"column": column},
-                    "transform": {"jsonPath": field.name},
-                },
-            }
-        )
-    return found
+def _column(table: str, field: pa.Field) -> Document:
+    about = {"description": meaning(field) + (f"; unit: {unit(field)}" if unit(field) else "")}
+    kind, repeated = _kind(field)
+    if pa.types.is_struct(kind):
+        shape: Document = {"subField": [_sub_field(table, field.name, part) for part in kind]}
+    else:
+        shape = {"dataType": _TYPES[kind]}
+    return _field(table, field.name, about, shape | repeated, {"extract": {"column": field.name}})
+
+
+def _sub_field(table: str, column: str, field: pa.Field) -> Document:
+    kind, repeated = _kind(field)
+    source = {"extract": {"column": column}, "transform": {"jsonPath": field.name}}
+    return _field(table, f"{column}/{field.name}", {}, {"dataType": _TYPES[kind]} | repeated, source)
+
+
+def _kind(field: pa.Field) -> tuple[pa.DataType, Document]:
+    """Type of a field's values, and what says that there are several."""
+    return (field.type.value_type, {"repeated": True}) if pa.types.is_list(field.type) else (field.type, {})
 
 
 def write_croissant(data: Where) -> Path:

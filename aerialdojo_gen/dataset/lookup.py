@@ -103,8 +103,7 @@ class ReleasedScene:
 
     def instances(self, nav_id: str) -> list[dict[str, Any]]:
         """Return the rows of `tasks` of a navigation task: semantic first, then image."""
-        tasks = self._tasks
-        rows = tasks.filter(pc.equal(tasks["nav_id"], nav_id)).to_pylist()
+        rows = self._tasks.filter(pc.equal(self._tasks["nav_id"], nav_id)).to_pylist()
         return sorted(rows, key=lambda row: row["modality"] != "semantic")
 
     @cached_property

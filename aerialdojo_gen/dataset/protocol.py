@@ -7,7 +7,7 @@ sample is drawn by rule, so that everyone who has the release flies the same tas
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import pyarrow as pa
@@ -94,7 +94,7 @@ def draw_sample(data: Where) -> Sample:
         rows = store.read_scene(root, "tasks/test", scene, _COLUMNS).to_pydict()
         if not rows["task_id"]:
             continue
-        drawn = dict(_draw(rows))
+        drawn = _draw(rows)
         fewest = min(len(drawn.get((setting, goal), ())) for setting in _SETTINGS for goal in MODALITIES)
         place = -fewest, rng.rank(0, "protocol", scene)
         tasks = {s: tuple(sorted(i for goal in MODALITIES for i in drawn.get((s, goal), ()))) for s in _SETTINGS}
@@ -104,16 +104,12 @@ def draw_sample(data: Where) -> Sample:
     return Sample({scene: tasks for _, scene, tasks in sorted(best.values(), key=lambda chosen: chosen[1])})
 
 
-def _draw(rows: Mapping[str, Sequence[str]]) -> Iterator[tuple[tuple[str, str], list[str]]]:
+def _draw(rows: Mapping[str, Sequence[str]]) -> dict[tuple[str, str], list[str]]:
     """Draw a scene's tasks by setting and goal."""
-    for setting in _SETTINGS:
-        for goal in MODALITIES:
-            pool = [
-                task_id
-                for task_id, s, g in zip(rows["task_id"], rows["setting"], rows["modality"], strict=True)
-                if (s, g) == (setting, goal)
-            ]
-            yield (setting, goal), sorted(pool, key=lambda i: rng.rank(0, "protocol", i))[:_PER_GOAL]
+    pools: dict[tuple[str, str], list[str]] = {}
+    for task_id, setting, goal in zip(rows["task_id"], rows["setting"], rows["modality"], strict=True):
+        pools.setdefault((setting, goal), []).append(task_id)
+    return {kind: sorted(pool, key=lambda i: rng.rank(0, "protocol", i))[:_PER_GOAL] for kind, pool in pools.items()}
 
 
 def write_sample(data: Where) -> None:

@@ -90,13 +90,7 @@ def record_makers(data: Where, pipeline: Pipeline, scenes: Sequence[str]) -> Non
     found = makers(root)
     found |= {scene: maker_of(pipeline) for scene in scenes if scene in found}
     entries = [
-        {
-            "name": maker.name,
-            "sha256": maker.sha256,
-            "paper_counts": maker.paper_counts,
-            "prefer_harder": maker.prefer_harder,
-            "scenes": sorted(s for s in found if found[s] == maker),
-        }
+        vars(maker) | {"scenes": sorted(s for s in found if found[s] == maker)}
         for maker in sorted(set(found.values()) - {Maker()}, key=lambda maker: (maker.name, maker.sha256))
     ]
     text = json.dumps({"pipelines": entries}, indent=1) + "\n"
@@ -117,12 +111,9 @@ def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, wh
     if not lost:
         return
     others = sorted({found[scene] for scene in lost}, key=lambda maker: maker.name)
-    named = " and ".join(
-        dict.fromkeys(str(m) + (" with other settings" if m.name == mine.name else "") for m in others)
-    )
-    what = " and ".join(
-        f"{verb} {_listed(root, part)}" for verb, part in (("remove", removed), ("replace", replaced)) if part
-    )
+    named = " and ".join(dict.fromkeys(f"{m}{' with other settings' * (m.name == mine.name)}" for m in others))
+    parts = (("remove", removed), ("replace", replaced))
+    what = " and ".join(f"{verb} {_listed(root, part)}" for verb, part in parts if part)
     names = {maker.name for maker in others} - {"", mine.name}
     own = f"give --pipeline {names.pop()}, " if len(names) == 1 else ""
     raise UsageError(

@@ -38,21 +38,18 @@ def move(name: str, *, forward: float = 0, left: float = 0, up: float = 0, turn_
     if not any(step):
         return Move(name, step, STOP)
     if turn_deg:
-        ours = {15: TURN_LEFT, -15: TURN_RIGHT}.get(round(turn_deg))
-        return Move(name, step, ours)
-    same = [a for a in range(STOP + 1, APPROACH) if tuple(DISPLACEMENTS[a]) == step[:3]]
-    return Move(name, step, same[0] if same else None)
+        return Move(name, step, {15: TURN_LEFT, -15: TURN_RIGHT}.get(round(turn_deg)))
+    same = (a for a in range(STOP + 1, APPROACH) if tuple(DISPLACEMENTS[a]) == step[:3])
+    return Move(name, step, next(same, None))
 
 
-def replay(start: Sequence[float] | Floats, steps: Floats) -> Floats:
+def replay(start: Floats, steps: Floats) -> Floats:
     """Replay steps, (n, 4), from a pose, without a map: poses, (n + 1, 4)."""
-    x, y, z, yaw = start
-    yaws = yaw + np.concatenate([[0.0], np.cumsum(steps[:, 3])])
+    ahead, left, up, turn = steps.T
+    yaws = start[3] + np.concatenate([[0.0], np.cumsum(turn)])
     cos, sin = np.cos(yaws[:-1]), np.sin(yaws[:-1])
-    moves = np.stack(
-        [cos * steps[:, 0] - sin * steps[:, 1], sin * steps[:, 0] + cos * steps[:, 1], steps[:, 2]], axis=1
-    )
-    path = np.concatenate([np.zeros((1, 3)), np.cumsum(moves, axis=0)]) + np.array([x, y, z])
+    moves = np.column_stack([cos * ahead - sin * left, sin * ahead + cos * left, up])
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum(moves, axis=0)]) + start[:3]
     return np.column_stack([path, yaws])
 
 
@@ -64,16 +61,13 @@ def body_steps(poses: Floats) -> Floats:
     return np.column_stack([cos * d[:, 0] + sin * d[:, 1], cos * d[:, 1] - sin * d[:, 0], d[:, 2], turn])
 
 
-# The words of the authors' layout: the axis of a step, and which way along it.
-WORDS: Mapping[str, tuple[int, int]] = {
-    "forward": (0, 1), "left": (1, 1), "right": (1, -1), "ascend": (2, 1), "descend": (2, -1), "rotl": (3, 1),
-    "rotr": (3, -1),
+# The words of the authors' layout: the axis of a step, which way along it, and how the names of ours begin.
+WORDS: Mapping[str, tuple[int, int, str]] = {
+    "forward": (0, 1, "MoveForward"), "left": (1, 1, "MoveLeft"), "right": (1, -1, "MoveRight"),
+    "ascend": (2, 1, "MoveUp"), "descend": (2, -1, "MoveDown"), "rotl": (3, 1, "TurnLeft"),
+    "rotr": (3, -1, "TurnRight"),
 }  # fmt: skip
-_PREFIX = {
-    "forward": "MoveForward", "left": "MoveLeft", "right": "MoveRight", "ascend": "MoveUp", "descend": "MoveDown",
-    "rotl": "TurnLeft", "rotr": "TurnRight",
-}  # fmt: skip
-_OURS = {word: [i for i, name in enumerate(ACTION_NAMES) if name.startswith(p)] for word, p in _PREFIX.items()}
+_OURS = {word: [i for i, name in enumerate(ACTION_NAMES) if name.startswith(p)] for word, (_, _, p) in WORDS.items()}
 _SIZES = {
     word: [float(np.abs(DISPLACEMENTS[a]).sum()) or TURN_RAD for a in actions] for word, actions in _OURS.items()
 }
@@ -89,7 +83,7 @@ def words_of(actions: NDArray[np.int8], poses: Floats) -> list[str]:
             continue
         step = body_steps(poses[k : k + 2])[0, :3]
         # The set has no way back: an approach backwards is named by the next axis.
-        ways = {word: sign * float(step[axis]) for word, (axis, sign) in WORDS.items() if axis < 3}
+        ways = {word: sign * float(step[axis]) for word, (axis, sign, _) in WORDS.items() if axis < 3}
         words.append(max(ways, key=lambda word: ways[word]))
     return words
 
@@ -100,7 +94,7 @@ def actions_of(words: Sequence[str], poses: Floats) -> tuple[list[int] | None, f
     steps = np.zeros_like(found)
     actions: list[int] = []
     for k, word in enumerate(words):
-        axis, sign = WORDS[word]
+        axis, sign, _ = WORDS[word]
         sizes, along = _SIZES[word], sign * float(found[k, axis])
         nearest = min(range(len(sizes)), key=lambda i: abs(sizes[i] - along))
         steps[k, axis] = sign * sizes[nearest]

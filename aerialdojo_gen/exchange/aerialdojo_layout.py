@@ -19,6 +19,9 @@ SETTING_WORDS = {
 }
 SETTING_OF = {words[2]: setting for setting, words in SETTING_WORDS.items()}
 
+# What a task says of its route, and our columns.
+INFO = {"geodesic_distance": "length_m", "euclidean_distance": "euclidean_m", "complexity": "detour_ratio"}
+
 # The loader says IID, some documents ID.
 _SPLIT = re.compile(r"(I?ID|OOD)_(TRAIN|TEST)S")
 _FOLDER = re.compile(r"(.+)_([BSL])_(Train|Test)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,10 @@ from aerialdojo_gen.exchange.task import Context, Instance, Route, Task, digest,
 from aerialdojo_gen.pipeline.stages.work.build_scenes import parse_name
 
 _PAIR = re.compile(r"(\d{1,9})_(\d{1,9})__(\d{1,9})")
+_NUMBERS = ("start_object_id", "start_anchor_id", "target_object_id")
 _STEP = ("position_ned_m", "quaternion_xyzw")
 _KNOWN = {"action", *_STEP}
-_STATED = {
-    "geodesic_distance": "stated_length_m", "euclidean_distance": "euclidean_m", "complexity": "detour_ratio",
-}  # fmt: skip
+_STATED = layout.INFO | {"geodesic_distance": "stated_length_m"}
 _START_FAR_M = 0.01
 _EXACT = 1e-6
 
@@ -55,7 +55,7 @@ class Reader:
 
     def __init__(self) -> None:
         self._partition: tuple[str, ...] = ()
-        self._known: dict[str, dict[str, Any]] = {}
+        self._known: dict[str, Task] = {}
         self._met: set[tuple[str, str]] = set()
         self._nav_ids: set[str] = set()
 
@@ -135,31 +135,20 @@ class Reader:
         if place != self._partition:
             self._partition, self._known = place, {}
             self._met = {pair for pair in self._met if pair[0] == context.label}
-        met = self._known.get(task.source_id)
-        if met is None:
-            met = self._trajectory(task, context, folder, partition, own)
-            self._known[task.source_id] = met
-        else:
-            task.has_route_row = False
-            if float(np.linalg.norm(task.start[:3] - met["start"])) > _START_FAR_M:
+        if (other := self._known.get(task.source_id)) is not None:
+            if float(np.linalg.norm(task.start[:3] - other.start[:3])) > _START_FAR_M:
                 raise BadField("start_pose.start_position", "is not that of the episode's other instance")
-            if task.object_key != met["target"]:
+            if task.object_key != other.object_key:
                 raise BadField("goal_object_name", "is not that of the episode's other instance")
-        task.nav_id, task.goal = met["nav_id"], task.goal if task.goal is not None else met["goal"]
-        task.known |= met["known"]
-        if task.has_route_row:
-            task.route = met.pop("route")
-
-    def _trajectory(
-        self, task: Task, context: Context, folder: Path, partition: layout.Partition | None, own: str | None
-    ) -> dict[str, Any]:
-        met: dict[str, Any] = {"route": None, "known": {}, "goal": None, "start": task.start[:3]}
-        met["target"] = task.object_key
+            task.nav_id, task.has_route_row = other.nav_id, False
+            task.goal = other.goal if task.goal is None else task.goal
+            task.known |= {name: other.known[name] for name in _NUMBERS if name in other.known}
+            return
         pair = None
         if partition is not None:
             root = folder.parents[3] / layout.TRAJECTORIES
             if (root / partition.path).is_dir():
-                pair = self._read(root, partition, task, context, met)
+                pair = _read_trajectory(root, partition, task, context)
             else:
                 context.notes[f"no folder in {layout.TRAJECTORIES} for its partition: no route"] += 1
         # Ours bring their name; of others the objects make it, so that any part of a dataset gives the same names.
@@ -171,43 +160,42 @@ class Reader:
                 context.notes["task_id appears twice in the scene: named by partition and episode"] += 1
             name = f"{task.scene}-{digest(*(partition.path.parts if partition else [context.label]), task.source_id)}"
         self._nav_ids.add(name)
-        return met | {"nav_id": name}
+        task.nav_id = name
+        self._known[task.source_id] = replace(task, route=None)
 
-    def _read(
-        self, root: Path, partition: layout.Partition, task: Task, context: Context, met: dict[str, Any]
-    ) -> str | None:
-        """Read a trajectory into `met`; returns its pair of objects where it names one."""
-        relative = partition.path / f"{task.source_id}.json"
-        label = f"{layout.TRAJECTORIES}/{relative.as_posix()}"
-        try:
-            document = Fields(small_document(inside(root, relative.as_posix())), label)
-        except OSError as error:
-            raise BadField("episode_id", f"{label}: {error.strerror}") from None
-        except ValueError as error:
-            raise BadField("episode_id", f"{label}: {error}") from None
-        version = document.text("schema_version")
-        if version != layout.SCHEMA_VERSION:
-            raise BadField(document.path("schema_version"), f"{shown(version)}, expected {layout.SCHEMA_VERSION!r}")
-        if document.text("map_name") != task.scene:
-            raise BadField(document.path("map_name"), f"is not the task's, {task.scene}")
-        if document.has("status") and document.text("status") != "planned":
-            raise BadField(document.path("status"), f"{shown(document.text('status'))}, expected 'planned'")
-        name = document.child("goal").text("Object_name")
-        if name != task.object_key:
-            raise BadField(document.path("goal.Object_name"), f"{shown(name)} is not the task's goal_object_name")
-        pair = document.text("task_id")
-        met["route"] = _route(document, context)
-        poses = met["route"].poses
-        if float(np.linalg.norm(poses[0, :3] - task.start[:3])) > _START_FAR_M:
-            context.notes["start_pose is not where its trajectory starts: each is kept as it is"] += 1
-        if task.goal is None:
-            met["goal"] = poses[-1, :3]
-        if (match := _PAIR.fullmatch(pair)) is None:
-            context.notes["task_id names no pair of objects: their numbers are null"] += 1
-            return None
-        names = ("start_object_id", "start_anchor_id", "target_object_id")
-        met["known"] = dict(zip(names, map(int, match.groups()), strict=True))
-        return pair
+
+def _read_trajectory(root: Path, partition: layout.Partition, task: Task, context: Context) -> str | None:
+    """Give a task its trajectory; returns the pair of objects where the file names one."""
+    relative = partition.path / f"{task.source_id}.json"
+    label = f"{layout.TRAJECTORIES}/{relative.as_posix()}"
+    try:
+        document = Fields(small_document(inside(root, relative.as_posix())), label)
+    except OSError as error:
+        raise BadField("episode_id", f"{label}: {error.strerror}") from None
+    except ValueError as error:
+        raise BadField("episode_id", f"{label}: {error}") from None
+    version = document.text("schema_version")
+    if version != layout.SCHEMA_VERSION:
+        raise BadField(document.path("schema_version"), f"{shown(version)}, expected {layout.SCHEMA_VERSION!r}")
+    if document.text("map_name") != task.scene:
+        raise BadField(document.path("map_name"), f"is not the task's, {task.scene}")
+    if document.has("status") and document.text("status") != "planned":
+        raise BadField(document.path("status"), f"{shown(document.text('status'))}, expected 'planned'")
+    name = document.child("goal").text("Object_name")
+    if name != task.object_key:
+        raise BadField(document.path("goal.Object_name"), f"{shown(name)} is not the task's goal_object_name")
+    pair = document.text("task_id")
+    task.route = _route(document, context)
+    poses = task.route.poses
+    if float(np.linalg.norm(poses[0, :3] - task.start[:3])) > _START_FAR_M:
+        context.notes["start_pose is not where its trajectory starts: each is kept as it is"] += 1
+    if task.goal is None:
+        task.goal = poses[-1, :3]
+    if (match := _PAIR.fullmatch(pair)) is None:
+        context.notes["task_id names no pair of objects: their numbers are null"] += 1
+        return None
+    task.known |= dict(zip(_NUMBERS, map(int, match.groups()), strict=True))
+    return pair
 
 
 def _attitude(pose: Fields) -> NDArray[np.float64]:

@@ -42,10 +42,8 @@ class RerenderedImages:
         try:
             mesh = mesh_copy(root, row["mesh_path"])
         except FileNotFoundError:
-            missing = root.at(row["mesh_path"])
-            raise AssetError(
-                f"{missing} is missing, so its pictures cannot be drawn at {size_px} px: {keep}"
-            ) from None
+            missing = f"{root.at(row['mesh_path'])} is missing"
+            raise AssetError(f"{missing}, so its pictures cannot be drawn at {size_px} px: {keep}") from None
         if hashlib.sha256(mesh.read_bytes()).hexdigest() != row["mesh_sha256"]:
             raise AssetError(f"{mesh} is not the mesh that the release was made from: {keep}")
         self._scene_name = scene
@@ -82,6 +80,7 @@ def _image_difference(rgb: NDArray[np.uint8], picture: bytes) -> float:
 
 
 Floats = NDArray[np.float64]
+Row = Mapping[str, Any]
 
 # What the layout has no field for; sizes of actions are in the poses, trajectory_id is the nav_id.
 LOST: Mapping[str, Sequence[str]] = {
@@ -120,14 +119,14 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
             mine = tasks.filter(pa.compute.equal(tasks["setting"], setting)).sort_by("nav_id").to_pylist()
             partition = layout.partition_of(scene, setting, store.partition(scene).upper(), subset)
             ends = {row["nav_id"]: row for row in chosen.select(_ENDS).to_pylist()}
-            for kind, modality in ((layout.SEMANTIC, "semantic"), (layout.IMAGE, "image")):
+            for kind, modality in layout.KINDS.items():
                 rows = [row for row in mine if row["modality"] == modality]
                 folder = root / kind / partition.path
                 folder.mkdir(parents=True)
-                lines = ",\n".join(
-                    _text(_task(row, episodes[row["nav_id"]], ends[row["nav_id"]], objects, pictures, folder))
-                    for row in rows
+                tasks_of = (
+                    _task(row, episodes[row["nav_id"]], ends[row["nav_id"]], pictures, folder) for row in rows
                 )
+                lines = ",\n".join(map(_text, tasks_of))
                 (folder / layout.TASK_FILE).write_text(f"[\n{lines}\n]\n" if rows else "[]\n", encoding="utf-8")
                 counts["task files"] += 1
                 counts["tasks"] += len(rows)
@@ -135,18 +134,11 @@ def write_scene(data: DataRoot, scene: str, root: Path, picture_px: int = 0) -> 
     return counts | {"pictures": len(pictures.first)}
 
 
-def _task(
-    row: Mapping[str, Any],
-    episode: str,
-    ends: Mapping[str, Any],
-    objects: Mapping[int, Mapping[str, Any]],
-    pictures: _Pictures,
-    folder: Path,
-) -> dict[str, Any]:
+def _task(row: Row, episode: str, ends: Row, pictures: _Pictures, folder: Path) -> dict[str, Any]:
     start = NED.positions_from_world([row[f"start_{a}_m"] for a in "xyz"])
     goal = NED.positions_from_world([ends[f"goal_{a}_m"] for a in "xyz"])
     quaternion = NED.quaternion_from_world_yaw(row["start_yaw_rad"]).tolist()
-    start_object, target = objects[ends["start_object_id"]], objects[ends["target_object_id"]]
+    start_object, target = (pictures.objects[ends[f"{end}_object_id"]] for end in ("start", "target"))
     record = {
         "episode_id": episode,
         # By it their replay finds a trajectory, where actors have several.
@@ -166,18 +158,11 @@ def _task(
     record |= {"category": target["category"], "Landmark": row["landmark"], "Direction": row["direction"]}
     if row["modality"] == "image":
         record["image"] = pictures.place(folder, ends["target_object_id"])
-    record["start_pose"] = {
-        "start_position": start.tolist(),
-        "start_quaternion_xyzw": quaternion,
-        # The same numbers under the name that their evaluator reads.
-        "start_quaternionr": quaternion,
-    }
+    # The same numbers besides under the name that their evaluator reads.
+    attitude = {"start_quaternion_xyzw": quaternion, "start_quaternionr": quaternion}
+    record["start_pose"] = {"start_position": start.tolist(), **attitude}
     record["goal_pose"] = {"goal_position": goal.tolist()}
-    record["info"] = {
-        "geodesic_distance": ends["length_m"],
-        "euclidean_distance": ends["euclidean_m"],
-        "complexity": ends["detour_ratio"],
-    }
+    record["info"] = {theirs: ends[ours] for theirs, ours in layout.INFO.items()}
     return record
 
 
@@ -188,18 +173,19 @@ def _text(record: Mapping[str, Any]) -> str:
 class _Pictures:
     """Puts an object's picture beside every task file that names it: one file, linked, where the disk can."""
 
-    def __init__(self, scene: str, objects: Mapping[int, Mapping[str, Any]], draw: RerenderedImages | None) -> None:
-        self._scene, self._objects, self._draw = scene, objects, draw
+    def __init__(self, scene: str, objects: Mapping[int, Row], draw: RerenderedImages | None) -> None:
+        self.objects = objects
+        self._scene, self._draw = scene, draw
         self.first: dict[int, Path] = {}
 
     def place(self, folder: Path, object_id: int) -> str:
         """Put a picture below a task file's folder; returns its path relative to it."""
-        name = self._objects[object_id]["reference_image_id"]
+        name = self.objects[object_id]["reference_image_id"]
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
             raise StoreError(f"objects of {self._scene}: reference_image_id {name!r} cannot name a file")
         path = folder / _PICTURES / f"{name}.png"
         if object_id not in self.first:
-            picture = self._objects[object_id]["reference_image"]
+            picture = self.objects[object_id]["reference_image"]
             if picture is None:
                 raise StoreError(f"object {object_id} of {self._scene} has no reference image: "
                                  f"run {command('split', scene=self._scene)}")  # fmt: skip
@@ -212,11 +198,7 @@ class _Pictures:
 
 
 def _write_trajectories(
-    root: Path,
-    partition: layout.Partition,
-    routes: pa.Table,
-    episodes: Mapping[str, str],
-    objects: Mapping[int, Mapping[str, Any]],
+    root: Path, partition: layout.Partition, routes: pa.Table, episodes: Mapping[str, str], objects: Mapping[int, Row]
 ) -> int:
     folder = root / layout.TRAJECTORIES / partition.path
     folder.mkdir(parents=True)

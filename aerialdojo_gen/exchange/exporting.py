@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tarfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,22 +13,37 @@ import pyarrow.compute as pc
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import unknown
-from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.dataset.contents import scenes_in_release
 from aerialdojo_gen.exchange import aerialdojo_writer, habitat_writer
-from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.exchange.folder import MARKER, whole_folder, write_marker
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES, SETTINGS, SUBSETS
 
-# Measured on the paper's scenes: bytes of text a pose and a task, by format; bytes of a picture grow with this power
-# of its edge.
-_POSE, _TASK = {"aerialdojo": 178.0, "habitat": 21.5}, {"aerialdojo": 2009.0, "habitat": 0.0}
+# Bytes of a picture grow with this power of its edge.
 _GROWTH, _OWN_PX = 0.8, 320
 _KINDS = 2
 # A file takes whole blocks of a disk.
 _BLOCK = 4096
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of others."""
+
+    frame: str
+    lost: Mapping[str, Sequence[str]]  # Columns that it has no field for, by table
+    pose_bytes: float  # Of its text, measured on the paper's scenes
+    task_bytes: float
+
+
+FORMATS = {
+    "aerialdojo": Format(
+        "north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST, 178.0, 2009.0
+    ),
+    "habitat": Format("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST, 21.5, 0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -47,13 +62,13 @@ class Size:
 
 def estimate_size(format_name: str, data: DataRoot, scenes: Sequence[str], picture_px: int) -> Size:
     """Reckon what an export of scenes will be."""
-    files, size = 1, 0.0
+    form, files, size = FORMATS[format_name], 1, 0.0
     for scene in scenes:
         for subset in ("train", "test"):
             routes = store.read_scene(data, f"routes/{subset}", scene, ("nav_id", "n_actions"))
             # A pose before every action, and the last one.
             poses = (pc.sum(routes["n_actions"]).as_py() or 0) + routes.num_rows
-            size += poses * _POSE[format_name] + routes.num_rows * _TASK[format_name]
+            size += poses * form.pose_bytes + routes.num_rows * form.task_bytes
             if format_name == "habitat":
                 files += bool(routes.num_rows)
             else:
@@ -103,14 +118,9 @@ def pack_tar(folder: Path, archive: Path) -> None:
     shutil.rmtree(folder)
 
 
-MARKER = "export.json"
 PICTURE_PX = 640
 # So many that file systems, copies and hubs become slow.
 _MANY_FILES = 10_000
-FORMATS = {
-    "aerialdojo": ("north, east, down, metres; quaternions xyzw; forward +x", aerialdojo_writer.LOST),
-    "habitat": ("east, up, south, metres; quaternions xyzw; forward -z", habitat_writer.LOST),
-}
 
 
 def export_release(
@@ -131,7 +141,7 @@ def export_release(
         raise UsageError("--picture-size is for --format aerialdojo: 16 to 4096 pixels, or 0 for the release's own")
     root = open_root(data)
     chosen = scenes_in_release(root, scenes)
-    frame, lost = FORMATS[format_name]
+    form = FORMATS[format_name]
     size_px = PICTURE_PX if picture_px is None else picture_px
     if shards and format_name != "aerialdojo":
         raise UsageError(f"--shards is for --format aerialdojo: {format_name} has a file a scene as it is")
@@ -151,18 +161,8 @@ def export_release(
             for scene in chosen:
                 counts.update(write_scene(scene))
                 bar.advance()
-        write_json(
-            folder / MARKER,
-            {
-                "format": format_name,
-                "written_by": f"aerialdojo-gen {__version__}",
-                "frame": frame,
-                "scenes": list(chosen),
-                "counts": dict(counts),
-                "actions": dict(enumerate(ACTION_NAMES)) if format_name == "habitat" else None,
-                "lost": {table: list(columns) for table, columns in lost.items()},
-            },
-        )
+        actions = dict(enumerate(ACTION_NAMES)) if format_name == "habitat" else None
+        write_marker(folder, format_name, form.frame, scenes=chosen, counts=counts, actions=actions, lost=form.lost)
     return dict(counts)
 
 

@@ -14,10 +14,13 @@ from typing import Any
 
 from aerialdojo_gen.base.errors import Malformed, StoreError, UsageError, disk_error
 from aerialdojo_gen.base.safe_parse import loads_json
+from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.store.atomic import atomic_file, atomic_folder, make_folder
 from aerialdojo_gen.store.root import DataRoot, LocalRoot
 from aerialdojo_gen.store.staging import NO_LOCKS, remove, sweep
 
+# Stands in every export, and says what it holds.
+MARKER = "export.json"
 _PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
 _LARGEST_PICTURE = 32 << 20
 
@@ -65,6 +68,12 @@ def whole_folder_below(root: DataRoot, relative: str, marker: str, *, force: boo
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
     """Write a small JSON document for people and programs."""
     path.write_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def write_marker(folder: Path, format_name: str, frame: str, **facts: Any) -> None:
+    """Write the marker of an export: its format, frame and program, and what else there is to know."""
+    head = {"format": format_name, "written_by": f"aerialdojo-gen {__version__}", "frame": frame}
+    write_json(folder / MARKER, head | facts)
 
 
 def inside(root: Path, relative: str) -> Path:
@@ -140,21 +149,8 @@ class PartialExport:
         self.resumed = same and any((self.folder / "parts").iterdir())
 
     def part(self, number: int) -> Path:
-        """Return where a part lies, or will lie."""
-        return part_folder(self.folder, number)
-
-    def has(self, number: int) -> bool:
-        """Whether a part is finished: its folder appears whole."""
-        return self.part(number).is_dir()
-
-    def remove(self) -> None:
-        """Remove all of it, when the export is whole."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def part_folder(unfinished: Path, number: int) -> Path:
-    """Return where a part lies."""
-    return unfinished / "parts" / f"{number:06d}"
+        """Return where a part lies, whose folder appears when it is finished."""
+        return self.folder / "parts" / f"{number:06d}"
 
 
 def link_or_copy(source: Path, target: Path) -> None:

@@ -24,31 +24,16 @@ from aerialdojo_gen.store.schemas import DIFFICULTY_COLUMNS, SPLIT_COLUMNS, SUBS
 
 LOST: Mapping[str, Sequence[str]] = {
     "tasks": [
-        "modality (one episode a navigation task)",
-        "description",
-        "reference_image_id",
-        "image_distance_m",
-        "landmark",
-        "direction",
-        *SPLIT_COLUMNS,
+        "modality (one episode a navigation task)", "description", "reference_image_id", "image_distance_m",
+        "landmark", "direction", *SPLIT_COLUMNS,
     ],
     "routes": ["min_clearance_m", "goal_yaw_rad", *DIFFICULTY_COLUMNS],
     "objects": [
-        "description",
-        "claims",
-        "shape",
-        "shape_held_out",
-        "paraphrases",
-        "mesh_node",
-        "size_x_m",
-        "size_y_m",
-        "size_z_m",
-        "direction",
-        "reference_image",
-        "box",
+        "description", "claims", "shape", "shape_held_out", "paraphrases", "mesh_node", "size_x_m", "size_y_m",
+        "size_z_m", "direction", "reference_image", "box",
     ],
     "landmarks": ["all"],
-}
+}  # fmt: skip
 
 
 def categories_of(data: DataRoot, scenes: Sequence[str]) -> dict[str, int]:
@@ -71,13 +56,11 @@ def write_scene(data: DataRoot, scene: str, root: Path, categories: Mapping[str,
     """Write a scene's episodes, a file a subset."""
     mesh = store.read_scene(data, "release/scenes", scene, ["mesh_path"])["mesh_path"][0].as_py()
     rows = store.read_scene(data, "release/objects", scene).drop_columns("reference_image").to_pylist()
-    anchors = defaultdict(list)
-    for anchor in store.read_scene(data, "release/anchors", scene).to_pylist():
-        anchors[anchor["object_id"]].append(anchor)
-    goals: dict[str, list[dict[str, Any]]] = {}
+    anchors = store.read_scene(data, "release/anchors", scene).to_pylist()
+    goals = defaultdict(list)
     for row in rows:
-        key = f"{Path(mesh).name}_{row['category']}"
-        goals.setdefault(key, []).append(_goal(row, anchors[row["object_id"]]))
+        own = [anchor for anchor in anchors if anchor["object_id"] == row["object_id"]]
+        goals[f"{Path(mesh).name}_{row['category']}"].append(_goal(row, own))
     category_of = {row["object_id"]: row["category"] for row in rows}
     counts = {"episode files": 0, "episodes": 0}
     for subset in ("train", "test"):

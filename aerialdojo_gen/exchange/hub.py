@@ -22,7 +22,6 @@ from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 # What stands beside the tables; the dataset card is what the Hub shows of a data set.
 _COMPANIONS = ("README.md", "croissant.json", "pipeline.json", "protocol.json")
 _AT_ONCE = 8
-_CHUNK = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -115,9 +114,8 @@ def push_to_hub(
             repo, operations, commit_message=f"Release of {len(scenes)} scenes", repo_type="dataset",
             revision=revision, num_threads=_AT_ONCE,
         )  # fmt: skip
-    return Moved(
-        f"{hub.address}/datasets/{repo}", str(made.oid), len(scenes), len(files), size, sum(map(_is_mesh, files))
-    )
+    where = f"{hub.address}/datasets/{repo}"
+    return Moved(where, str(made.oid), len(scenes), len(files), size, sum(map(_is_mesh, files)))
 
 
 def pull_release(
@@ -173,10 +171,9 @@ def pull_release(
     with hub.explain_errors("read"):
         info = hub.api.repo_info(repo, repo_type="dataset", revision=revision, files_metadata=True)
     commit = str(info.sha)
-    chosen = {
-        s.rfilename: s for s in info.siblings if _is_ours(s.rfilename) and (meshes or not _is_mesh(s.rfilename))
-    }
-    left = tuple(s.rfilename for s in info.siblings if not _is_ours(s.rfilename) and s.rfilename != ".gitattributes")
+    there = {sibling.rfilename: sibling for sibling in info.siblings}
+    chosen = {name: there[name] for name in there if _is_ours(name) and (meshes or not _is_mesh(name))}
+    left = tuple(name for name in there if not _is_ours(name) and name != ".gitattributes")
     scenes = {scene for name in chosen if (scene := scene_of(name)) and not _is_mesh(name)}
     if not scenes:
         raise UsageError(f"the data set {repo} at {hub.address} holds no release of aerialdojo-gen")
@@ -206,10 +203,6 @@ def scene_of(name: str) -> str:
     return stem if name in own else ""
 
 
-def _is_ours(name: str) -> bool:
-    return name in _COMPANIONS or _is_policy(name) or bool(scene_of(name))
-
-
 def _is_mesh(name: str) -> bool:
     return name.startswith("meshes/")
 
@@ -218,14 +211,14 @@ def _policy_file(name: str) -> str:
     return f"policies/{name}/policy.safetensors"
 
 
-def _is_policy(name: str) -> bool:
-    training = PurePosixPath(name).parent.name
-    return is_plain(training) and name == _policy_file(training)
-
-
 def _is_companion(name: str) -> bool:
-    """Whether a file lies beside the release in a data directory, and not in it."""
-    return _is_mesh(name) or _is_policy(name)
+    """Whether a file lies beside the release in a data directory, and not in it: a mesh, or a policy's weights."""
+    training = PurePosixPath(name).parent.name
+    return _is_mesh(name) or (is_plain(training) and name == _policy_file(training))
+
+
+def _is_ours(name: str) -> bool:
+    return name in _COMPANIONS or bool(scene_of(name)) or (_is_companion(name) and not _is_mesh(name))
 
 
 def _mesh(root: LocalRoot, scene: str) -> Path:
@@ -238,9 +231,8 @@ def _mesh(root: LocalRoot, scene: str) -> Path:
 def _weights(root: LocalRoot, name: str) -> Path:
     path = root.path / _policy_file(name)
     if not is_plain(name) or not path.is_file():
-        raise UsageError(
-            f"there are no weights {path}: --policy takes the name of a training in {root.path / 'policies'}"
-        )
+        known = root.path / "policies"
+        raise UsageError(f"there are no weights {path}: --policy takes the name of a training in {known}")
     return path
 
 
@@ -263,13 +255,12 @@ def _fetch(hub: Hub, commit: str, files: Sequence[Any], folder: Path, reporter: 
         path = _place(folder, sibling.rfilename)
         if path.is_file() and _matches_server(path, sibling):
             return
-        below = path.parents[len(PurePosixPath(sibling.rfilename).parts) - 1]
-        hub.api.hf_hub_download(hub.repo, sibling.rfilename, repo_type="dataset", revision=commit, local_dir=below)
+        name = sibling.rfilename
+        below = path.parents[len(PurePosixPath(name).parts) - 1]
+        hub.api.hf_hub_download(hub.repo, name, repo_type="dataset", revision=commit, local_dir=below)
         if not _matches_server(path, sibling):
             path.unlink(missing_ok=True)
-            raise StoreError(
-                f"{sibling.rfilename} of {hub.repo} was damaged in transfer: the same command fetches it again"
-            )
+            raise StoreError(f"{name} of {hub.repo} was damaged in transfer: the same command fetches it again")
 
     with reporter.bar("pull", len(files), "files") as bar, hub.explain_errors("read"):
         pool = ThreadPoolExecutor(_AT_ONCE)
@@ -291,8 +282,7 @@ def _matches_server(path: Path, sibling: Any) -> bool:
     else:
         expected, digest = sibling.blob_id, hashlib.sha1(b"blob %d\0" % size, usedforsecurity=False)
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK):
-            digest.update(chunk)
+        hashlib.file_digest(file, lambda: digest)
     return expected is not None and digest.hexdigest() == expected
 
 

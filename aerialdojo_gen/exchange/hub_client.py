@@ -25,12 +25,10 @@ class Hub:
             raise UsageError(f"{brief(repo, 100)!r} is no data set's name: write USER/NAME")
         self.repo = repo
         self.endpoint = os.environ.get(ENDPOINT, "").strip().rstrip("/") or USUAL
-        if not re.match(r"https?://[^\s/]", self.endpoint):
-            raise UsageError(
-                f"{ENDPOINT}={brief(Secrets().text(self.endpoint), 100)!r} is no address: write https://…"
-            )
         # As messages say it: an address may have a password in it.
         self.address = Secrets().text(self.endpoint)
+        if not re.match(r"https?://[^\s/]", self.endpoint):
+            raise UsageError(f"{ENDPOINT}={brief(self.address, 100)!r} is no address: write https://…")
         self.token: str | bool = os.environ.get(TOKEN, "").strip() or False
         if self.token and _is_open(self.endpoint):
             raise UsageError(

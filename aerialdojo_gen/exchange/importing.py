@@ -71,28 +71,19 @@ class Report:
         if not self._errors:
             return None
         errors = np.asarray(self._errors)
-        return {
-            "routes": len(errors),
-            "median_m": round(float(np.median(errors)), 6),
-            "max_m": round(float(errors.max()), 6),
-            f"over_{_FAR_M:g}_m": int((errors > _FAR_M).sum()),
-        }
+        median_m, max_m = (round(float(value), 6) for value in (np.median(errors), errors.max()))
+        far = int((errors > _FAR_M).sum())
+        return {"routes": len(errors), "median_m": median_m, "max_m": max_m, f"over_{_FAR_M:g}_m": far}
 
     def document(self) -> dict[str, Any]:
         """All of it, for ``import.json``."""
+        counted = {"bad_fields": self.bad_fields, "not_mapped": self.unmapped, "null_columns": self.empty}
+        counted |= {"notes": self.notes}
         return {
-            "format": self.format,
-            "frame": self.frame,
-            "files": self.files,
-            "records": self.records,
-            "rows": self.rows,
-            "bad_records": self.n_bad,
-            "bad_fields": dict(sorted(self.bad_fields.items())),
-            "not_mapped": dict(sorted(self.unmapped.items())),
-            "null_columns": dict(sorted(self.empty.items())),
-            "notes": dict(sorted(self.notes.items())),
-            "replay_error": self.replay(),
-        }
+            "format": self.format, "frame": self.frame, "files": self.files, "records": self.records,
+            "rows": self.rows, "bad_records": self.n_bad,
+            **{name: dict(sorted(counts.items())) for name, counts in counted.items()}, "replay_error": self.replay(),
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """All of it, for a person."""
@@ -104,10 +95,8 @@ class Report:
         if self.unmapped:
             lines.append("not mapped: " + ", ".join(f"{name} {n:,}" for name, n in sorted(self.unmapped.items())))
         for table, rows in sorted(self.rows.items(), reverse=True):
-            names = [
-                c.split(".")[1] for c, n in sorted(self.empty.items()) if c.startswith(f"{table}.") and n == rows
-            ]
-            if names:
+            columns = (column.split(".") for column, n in sorted(self.empty.items()) if n == rows)
+            if names := [name for of, name in columns if of == table]:
                 lines.append(f"always null in {table}: {', '.join(names)}")
         lines += [f"{n:,} x {note}" for note, n in sorted(self.notes.items())]
         if (replay := self.replay()) is not None:
@@ -144,14 +133,8 @@ class Objects:
         """Take in what the task says about its target and its start."""
         known = task.known
         texts = [i.description for i in task.instances if i.description]
-        row = {
-            "name": known.get("target_name"),
-            "mesh_node": known.get("mesh_node"),
-            "category": known.get("category"),
-            "description": texts[0] if texts else known.get("description"),
-            "direction": known.get("direction"),
-            "landmark": known.get("landmark"),
-        }
+        row = {name: known.get(name) for name in ("mesh_node", "category", "direction", "landmark")}
+        row |= {"name": known.get("target_name"), "description": texts[0] if texts else known.get("description")}
         if task.object_m is not None:
             row |= dict(zip(("x_m", "y_m", "z_m"), task.object_m.tolist(), strict=True))
         self._merge(task.scene, number, row)

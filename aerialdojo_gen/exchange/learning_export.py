@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from aerialdojo_gen.base.version import __version__
 from aerialdojo_gen.benchmark.tasks import mesh_of
 from aerialdojo_gen.dataset.contents import part_name
 from aerialdojo_gen.exchange import lerobot_writer, webdataset_writer
-from aerialdojo_gen.exchange.folder import PartialExport, check_target, part_folder, whole_folder, write_json
+from aerialdojo_gen.exchange.folder import MARKER, PartialExport, check_target, whole_folder, write_marker
 from aerialdojo_gen.exchange.samples import ExportOptions, Part, plan_parts
 from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
@@ -28,7 +29,6 @@ from aerialdojo_gen.store.root import DataRoot, Where, open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 from aerialdojo_gen.store.staging import scratch_folder
 
-MARKER = "export.json"
 WRITERS: dict[str, ModuleType] = {"lerobot": lerobot_writer, "webdataset": webdataset_writer}
 FRAME = "of the body at the start: x ahead, y left, z up, metres; yaw in radians, counter-clockwise"
 LOST = {"routes": ["goal_x_m", "goal_y_m", "goal_z_m", "goal_yaw_rad", "the world's frame of all poses"]}
@@ -87,10 +87,10 @@ def export_for_learning(
     parts = plan_parts(root, options, writer.frames_a_part(options))
     unfinished = PartialExport(out, _request(format_name, root, options, parts))
     with unfinished.locked():
-        left = [part for part in parts if not unfinished.has(part.number)]
+        left = [part for part in parts if not unfinished.part(part.number).is_dir()]
         if unfinished.resumed:
             progress.line(f"going on: {len(parts) - len(left)} of {len(parts)} parts are finished")
-        jobs = [_Job(format_name, root.url, options, part, unfinished.folder) for part in left]
+        jobs = [_Job(format_name, root.url, options, part, unfinished.part(part.number)) for part in left]
         with progress.bar("export", len(jobs), "parts") as bar, make_executor("local", workers) as pool:
             for outcome in pool.map(_write, jobs, lambda job: job.part.scene):
                 if isinstance(outcome, AerialDojoError):
@@ -99,8 +99,11 @@ def export_for_learning(
         with whole_folder(out, MARKER, force=force) as folder:
             made = [unfinished.part(part.number) for part in parts]
             counts = {"scenes": len({part.scene for part in parts})} | writer.finish(parts, options, made, folder)
-            write_json(folder / MARKER, _marker(format_name, options, parts, counts))
-        unfinished.remove()
+            write_marker(
+                folder, format_name, FRAME, scenes=sorted({part.scene for part in parts}), counts=counts,
+                wanted=_requested(options), actions=dict(enumerate(ACTION_NAMES[:16])), lost=LOST,
+            )  # fmt: skip
+        shutil.rmtree(unfinished.folder, ignore_errors=True)
     return ExportResult(counts, len(parts), len(parts) - len(left))
 
 
@@ -116,15 +119,10 @@ def estimate_for_learning(
     seconds = opening = 0.0
     for part in drawn:
         # The first picture of a scene opens it.
-        seconds_of = {}
-        for what, sample in (("open", part.cut(1, 1)), ("all", part.cut(2, _MEASURED_STEPS))):
-            with scratch_folder() as folder:
-                begun = time.process_time()
-                writer.write_part(root, sample, options, folder)
-                seconds_of[what] = time.process_time() - begun
-                written = sum(size_of(path) for path in folder.iterdir())
-        opening += seconds_of["open"]
-        seconds, measured, size = seconds + seconds_of["all"], measured + sample.frames, size + written
+        opening += _measure(writer, root, part.cut(1, 1), options)[0]
+        sample = part.cut(2, _MEASURED_STEPS)
+        spent, written = _measure(writer, root, sample, options)
+        seconds, measured, size = seconds + spent, measured + sample.frames, size + written
     frames = sum(part.frames for part in parts)
     count = workers or make_executor("local").workers
     scenes = len({part.scene for part in parts})
@@ -133,6 +131,14 @@ def estimate_for_learning(
         sum(len(part.index) for part in parts), frames, len(parts), cpu_s, cpu_s / min(count, len(parts)),
         frames * size / measured, count, measured,
     )  # fmt: skip
+
+
+def _measure(writer: ModuleType, root: DataRoot, sample: Part, options: ExportOptions) -> tuple[float, int]:
+    """Seconds of CPU that a part takes, and its bytes."""
+    with scratch_folder() as folder:
+        begun = time.process_time()
+        writer.write_part(root, sample, options, folder)
+        return time.process_time() - begun, sum(size_of(path) for path in folder.iterdir())
 
 
 def _writer(format_name: str, options: ExportOptions) -> ModuleType:
@@ -152,7 +158,7 @@ class _Job:
     data: str
     options: ExportOptions
     part: Part
-    unfinished: Path
+    place: Path  # Of its folder among the finished parts
 
     @property
     def label(self) -> str:
@@ -160,7 +166,7 @@ class _Job:
 
 
 def _write(job: _Job) -> int:
-    with atomic_folder(part_folder(job.unfinished, job.part.number), job.unfinished) as folder:
+    with atomic_folder(job.place, job.place.parents[1]) as folder:
         WRITERS[job.format_name].write_part(open_root(job.data), job.part, job.options, folder)
     return job.part.frames
 
@@ -189,18 +195,3 @@ def _recordings(root: DataRoot, scene: str) -> list[str]:
     if not root.list("recordings", f"{scene}/*.parquet"):
         return []
     return sorted(store.read_stored(root, "recordings", scene, ("sha256",))["sha256"].to_pylist())
-
-
-def _marker(
-    format_name: str, options: ExportOptions, parts: list[Part], counts: dict[str, int]
-) -> dict[str, Any]:  # fmt: skip
-    return {
-        "format": format_name,
-        "written_by": f"aerialdojo-gen {__version__}",
-        "frame": FRAME,
-        "scenes": sorted({part.scene for part in parts}),
-        "counts": counts,
-        "wanted": _requested(options),
-        "actions": {str(k): name for k, name in enumerate(ACTION_NAMES[:16])},
-        "lost": LOST,
-    }

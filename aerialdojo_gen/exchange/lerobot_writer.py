@@ -50,16 +50,11 @@ _NUMBERS: dict[str, tuple[str, tuple[str, ...] | None]] = {
 }
 
 
-def _of_actions() -> NDArray[np.float32]:
-    table = np.zeros((TURN_RIGHT + 1, len(ACTION)), np.float32)
-    table[:, :3] = DISPLACEMENTS[: TURN_RIGHT + 1]
-    table[TURN_LEFT, 3], table[TURN_RIGHT, 3] = TURN_RAD, -TURN_RAD
-    table[STOP, 4] = 1.0
-    return table
-
-
 # What each of the 16 actions does in the body's frame, (16, 5) float32: see `ACTION`.
-OF_ACTION = _of_actions()
+OF_ACTION = np.zeros((TURN_RIGHT + 1, len(ACTION)), np.float32)
+OF_ACTION[:, :3] = DISPLACEMENTS[: TURN_RIGHT + 1]
+OF_ACTION[TURN_LEFT, 3], OF_ACTION[TURN_RIGHT, 3] = TURN_RAD, -TURN_RAD
+OF_ACTION[STOP, 4] = 1.0
 
 
 def view_key(view: str) -> str:
@@ -82,12 +77,10 @@ def video_kinds(options: ExportOptions) -> dict[str, str]:
 
 def features(options: ExportOptions) -> dict[str, dict[str, Any]]:
     """Return the features of frames: their types, shapes, names, and how videos are to be read."""
-    videos = {key: _video(options, kind) for key, kind in video_kinds(options).items()}
-    numbers = {
-        name: {"dtype": dtype, "shape": [len(names) if names else 1], "names": names and [*names]}
-        for name, (dtype, names) in _NUMBERS.items()
-    }
-    return {**videos, **numbers}
+    found = {key: _video(options, kind) for key, kind in video_kinds(options).items()}
+    for name, (dtype, names) in _NUMBERS.items():
+        found[name] = {"dtype": dtype, "shape": [len(names) if names else 1], "names": names and [*names]}
+    return found
 
 
 def frame_schema() -> pa.Schema:
@@ -103,26 +96,17 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
     s = options.sensors
     depth = kind == "depth"
     info: dict[str, Any] = {
-        "video.height": s.height,
-        "video.width": s.width,
-        "video.codec": "hevc" if depth else "h264",
-        "video.pix_fmt": "gray12le" if depth else "yuv420p",
-        "video.fps": FPS,
-        "video.channels": 1 if depth else 3,
+        "video.height": s.height, "video.width": s.width, "video.codec": "hevc" if depth else "h264",
+        "video.pix_fmt": "gray12le" if depth else "yuv420p", "video.fps": FPS, "video.channels": 1 if depth else 3,
         "video.g": KEY_EVERY,
         # The first is LeRobot's name of today, the second that of 0.4 and 0.5.
-        "is_depth_map": depth,
-        "video.is_depth_map": depth,
-        "has_audio": False,
-    }
+        "is_depth_map": depth, "video.is_depth_map": depth, "has_audio": False,
+    }  # fmt: skip
     if depth:
         info |= {
-            "video.depth_min": DEPTH_MIN_M,
-            "video.depth_max": s.max_depth_m,
-            "video.shift": DEPTH_SHIFT_M,
-            "video.use_log": True,
-            "depth_unit": "m",
-        }
+            "video.depth_min": DEPTH_MIN_M, "video.depth_max": s.max_depth_m, "video.shift": DEPTH_SHIFT_M,
+            "video.use_log": True, "depth_unit": "m",
+        }  # fmt: skip
     shape = [s.height, s.width, 1 if depth else 3]
     return {"dtype": "video", "shape": shape, "names": ["height", "width", "channels"], "info": info}
 
@@ -130,20 +114,15 @@ def _video(options: ExportOptions, kind: str) -> dict[str, Any]:
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 Stats = dict[str, list[Any]]
+Counts = dict[str, NDArray[np.int64]]
 
 
 def row_stats(values: NDArray[Any]) -> Stats:
     """Statistics of the rows of an (n, d) array: d numbers each, and the count."""
     table = np.asarray(values, np.float64).reshape(len(values), -1)
+    found: Stats = {name: getattr(table, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
     levels = np.quantile(table, list(QUANTILES.values()), axis=0)
-    return {
-        "min": table.min(axis=0).tolist(),
-        "max": table.max(axis=0).tolist(),
-        "mean": table.mean(axis=0).tolist(),
-        "std": table.std(axis=0).tolist(),
-        "count": [len(table)],
-        **{name: levels[k].tolist() for k, name in enumerate(QUANTILES)},
-    }
+    return {**found, "count": [len(table)], **dict(zip(QUANTILES, levels.tolist(), strict=True))}
 
 
 def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: int) -> Stats:
@@ -153,16 +132,10 @@ def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: 
     # Of the differences, not of the squares: those of large values cancel.
     deviation = np.sqrt(np.einsum("cv,cv->c", counts, (values[None] - mean[:, None]) ** 2) / total)
     reached = np.cumsum(counts, axis=1)
-    found = {
-        "min": values[(counts > 0).argmax(axis=1)],
-        "max": values[-1 - (counts[:, ::-1] > 0).argmax(axis=1)],
-        "mean": mean,
-        "std": deviation,
-        **{
-            name: values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
-            for name, level in QUANTILES.items()
-        },
-    }
+    least, most = (counts > 0).argmax(axis=1), -1 - (counts[:, ::-1] > 0).argmax(axis=1)
+    found = {"min": values[least], "max": values[most], "mean": mean, "std": deviation}
+    for name, level in QUANTILES.items():
+        found[name] = values[(reached >= np.ceil(level * total)[:, None]).argmax(axis=1)]
     shaped: Stats = {name: of.reshape(-1, 1, 1).tolist() for name, of in found.items()}
     return {**shaped, "count": [frames]}
 
@@ -170,8 +143,6 @@ def count_stats(counts: NDArray[np.int64], values: NDArray[np.float64], frames: 
 # Steps of a part: a video of so many is some MB to 200 MB large, as LeRobot's own are.
 FRAMES_A_PART = 2048
 _FACTS = "part.json"
-
-Counts = dict[str, NDArray[np.int64]]
 
 
 def frames_a_part(options: ExportOptions) -> int:
@@ -338,10 +309,8 @@ def _episodes(part: Part, stats: list[dict[str, Stats]], keys: list[str], at: di
         columns[f"videos/{key}/from_timestamp"] = begin / FPS
         columns[f"videos/{key}/to_timestamp"] = end / FPS
     columns |= {"nav_id": index.nav_id, "scene": [part.scene] * n, "split": part.splits, "setting": part.settings}
-    columns |= {
-        name: pa.array(index.goal_columns[name], pa.string())
-        for name in ("target_name", "landmark", "direction", "reference_image_id")
-    }
+    for name in ("target_name", "landmark", "direction", "reference_image_id"):
+        columns[name] = pa.array(index.goal_columns[name], pa.string())
     columns["image_distance_m"] = pa.array(index.goal_columns["image_distance_m"], pa.float64())
     for key in stats[0]:
         for name in stats[0][key]:

@@ -36,15 +36,14 @@ def route_of(moves: list[Move], poses: Floats, context: Context) -> Route:
     done = moves[:-1] if moves[-1].name == "stop" else moves
     if "stop" in names[: len(done)]:
         raise BadField(f"actions[{names.index('stop')}]", "stop before the end")
-    error = replay_error_m(done, poses)
+    ours, lack = [m.ours for m in done if m.ours is not None], ""
     if len(done) != len(poses) - 1:
-        context.notes["not one action a pose: action is null, source_action has them"] += 1
-        return Route(poses, None, names, error)
-    ours = [m.ours for m in done if m.ours is not None]
-    if len(ours) < len(done):
-        context.notes["has actions that are none of ours: action is null, source_action has them"] += 1
-        return Route(poses, None, names, error)
-    return Route(poses, [*ours, 0], names, error)
+        lack = "not one action a pose"
+    elif len(ours) < len(done):
+        lack = "has actions that are none of ours"
+    if lack:
+        context.notes[f"{lack}: action is null, source_action has them"] += 1
+    return Route(poses, None if lack else [*ours, 0], names, replay_error_m(done, poses))
 
 
 def read_aerialvln(record: Fields, context: Context) -> Task:
@@ -177,10 +176,8 @@ def read_uav_on(record: Fields, context: Context) -> Task:
     }
     if record.has("used-in-train"):
         known["subset"] = "train" if record.flag("used-in-train") else "test"
-    if record.has("info"):
-        info = record.child("info")
-        if info.has("geodesic_distance"):
-            known["stated_length_m"] = info.number("geodesic_distance")
+    if record.has("info") and (info := record.child("info")).has("geodesic_distance"):
+        known["stated_length_m"] = info.number("geodesic_distance")
     return Task(
         source_id=f"{scene}/{record.name('episode_id')}",
         scene=scene,

@@ -121,19 +121,12 @@ def plan_parts(root: DataRoot, options: ExportOptions, frames_a_part: int) -> li
     number = {text: k for k, text in enumerate(dict.fromkeys(texts))}
     parts: list[Part] = []
     for rows in _cuts(chosen, frames_a_part):
-        own = [known[chosen.nav_id[k]] for k in rows]
-        parts.append(
-            Part(
-                len(parts),
-                chosen.take(rows),
-                [row["setting"] for row in own],
-                [f"{row['partition'].lower()}_{row['subset']}" for row in own],
-                np.array([number[texts[k]] for k in rows], np.int64),
-                [texts[k] for k in rows],
-                int(rows[0]),
-                int(chosen.first[rows[0]]),
-            )
-        )
+        own, said = [known[chosen.nav_id[k]] for k in rows], [texts[k] for k in rows]
+        parts.append(Part(
+            len(parts), chosen.take(rows), [row["setting"] for row in own],
+            [f"{row['partition'].lower()}_{row['subset']}" for row in own],
+            np.array([number[text] for text in said], np.int64), said, int(rows[0]), int(chosen.first[rows[0]]),
+        ))  # fmt: skip
     return parts
 
 
@@ -143,23 +136,19 @@ def _chosen(index: Index, known: dict[str, dict[str, str]], options: ExportOptio
     by_scene: dict[str, list[dict[str, str]]] = {}
     for nav_id in index.nav_id:
         by_scene.setdefault(known[nav_id]["scene"], []).append(known[nav_id])
-    taken = {
-        nav_id for rows in by_scene.values() for nav_id in choose_trajectories(rows, options.limit, options.seed)
-    }
+    taken: set[str] = set()
+    for rows in by_scene.values():
+        taken.update(choose_trajectories(rows, options.limit, options.seed))
     return np.flatnonzero([nav_id in taken for nav_id in index.nav_id])
 
 
 def _cuts(index: Index, frames_a_part: int) -> Iterator[NDArray[np.int64]]:
-    begun: list[int] = []
-    frames = 0
-    for k in range(len(index)):
-        if begun and (frames >= frames_a_part or index.scene[k] != index.scene[begun[0]]):
-            yield np.array(begun, np.int64)
-            begun, frames = [], 0
-        begun.append(k)
-        frames += int(index.steps[k])
-    if begun:
-        yield np.array(begun, np.int64)
+    begin = 0
+    for k in range(1, len(index) + 1):
+        whole = k == len(index) or index.first[k] - index.first[begin] >= frames_a_part
+        if whole or index.scene[k] != index.scene[begin]:
+            yield np.arange(begin, k)
+            begin = k
 
 
 class SampleFrames:
@@ -167,10 +156,9 @@ class SampleFrames:
 
     def __init__(self, root: DataRoot, part: Part, options: ExportOptions) -> None:
         self._root, self._part, self._sensors = root, part, options.sensors
-        drawn: Source = RenderedFrames(part.index, options.sensors, options.renderer)
-        self._source: Source = (
-            drawn if options.source == "render" else RecordedFrames(part.index, options.sensors, drawn)
-        )
+        self._source: Source = RenderedFrames(part.index, options.sensors, options.renderer)
+        if options.source != "render":
+            self._source = RecordedFrames(part.index, options.sensors, self._source)
 
     def frames(self, k: int) -> Iterator[tuple[int, Frames]]:
         """Yield the pictures of trajectory k, some steps at a time, with the first of these steps."""

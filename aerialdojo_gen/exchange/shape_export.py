@@ -13,8 +13,7 @@ from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.base.names import choose_scenes, unknown
-from aerialdojo_gen.base.version import __version__
-from aerialdojo_gen.exchange.folder import whole_folder, write_json
+from aerialdojo_gen.exchange.folder import MARKER, whole_folder, write_json, write_marker
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.occupancy import Occupancy
@@ -102,7 +101,6 @@ def _colours(
     return found if material.mask is None else np.where(material.mask[row, column, None], found, plain)
 
 
-MARKER = "export.json"
 SHAPES = ("pointcloud", "occupancy")
 POINTS_PER_M2, VOXEL_M = 20.0, 0.5
 _MIN_VOXEL_M, _LARGEST_VOXEL_M = 0.05, 5.0
@@ -132,34 +130,18 @@ def export_shapes(
     chosen = choose_scenes(scenes, _scenes_with_mesh(root))
     counts: Counter[str] = Counter(scenes=len(chosen))
     reporter = reporter or Reporter(quiet=True)
-    with (
-        whole_folder(out, MARKER, force=force) as folder,
-        reporter.bar("export", len(chosen), "scenes") as bar,
-    ):
-        meshes = {}
-        for name in chosen:
-            mesh = f"meshes/{name}.glb"
-            meshes[name] = root.digest(mesh)
-            scene = read_scene_mesh(root, mesh, meshes[name])
+    meshes = {name: root.digest(f"meshes/{name}.glb") for name in chosen}
+    with whole_folder(out, MARKER, force=force) as folder, reporter.bar("export", len(chosen), "scenes") as bar:
+        for name, sha256 in meshes.items():
+            scene = read_scene_mesh(root, f"meshes/{name}.glb", sha256)
             if format_name == "pointcloud":
-                found = _write_points(scene, folder / name, points_per_m2)
+                counts.update(_write_points(scene, folder / name, points_per_m2))
             else:
-                found = _write_occupancy(scene, folder / name, voxel_m)
-            counts.update(found)
+                counts.update(_write_occupancy(scene, folder / name, voxel_m))
             bar.advance()
         own = {"points_per_m2": points_per_m2} if format_name == "pointcloud" else {"voxel_m": voxel_m}
-        write_json(
-            folder / MARKER,
-            {
-                "format": format_name,
-                "written_by": f"aerialdojo-gen {__version__}",
-                "frame": "east, north, up, metres",
-                **own,
-                "scenes": list(chosen),
-                "mesh_sha256": meshes,
-                "counts": counts,
-            },
-        )
+        frame = "east, north, up, metres"
+        write_marker(folder, format_name, frame, **own, scenes=chosen, mesh_sha256=meshes, counts=counts)
     return dict(counts)
 
 
@@ -175,9 +157,8 @@ def _scenes_with_mesh(root: DataRoot) -> list[str]:
 
 def _write_points(scene: Scene, stem: Path, points_per_m2: float) -> dict[str, int]:
     points = sample_surface(scene, points_per_m2)
-    stem.with_name(f"{stem.name}.ply").write_bytes(
-        ply_bytes(points, f"{scene.name}: x east, y north, z up, metres; instance k is node k - 1 of the mesh")
-    )
+    about = f"{scene.name}: x east, y north, z up, metres; instance k is node k - 1 of the mesh"
+    stem.with_name(f"{stem.name}.ply").write_bytes(ply_bytes(points, about))
     write_json(stem.with_name(f"{stem.name}.nodes.json"), {"nodes": [one.node for one in scene.instances]})
     return {"points": len(points)}
 
@@ -188,10 +169,7 @@ def _write_occupancy(scene: Scene, stem: Path, voxel_m: float) -> dict[str, int]
         raise UsageError(f"{scene.name}: {cells:,} voxels are more than {_MAX_CELLS:,}: choose a larger --voxel-m")
     grid = Occupancy.of(scene, voxel_m)
     np.savez_compressed(
-        stem.with_name(f"{stem.name}.npz"),
-        occupied=grid.occupied,
-        reachable=grid.reachable,
-        origin_m=grid.origin_m,
-        voxel_m=np.float64(grid.voxel_m),
-    )
+        stem.with_name(f"{stem.name}.npz"), occupied=grid.occupied, reachable=grid.reachable,
+        origin_m=grid.origin_m, voxel_m=np.float64(grid.voxel_m),
+    )  # fmt: skip
     return {"voxels": grid.occupied.size, "occupied": int(grid.occupied.sum())}

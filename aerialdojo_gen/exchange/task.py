@@ -102,27 +102,18 @@ def task_rows(task: Task, nav_id: str, source: dict[str, Any], pictures: list[st
     """Make the task's rows of `aerialdojo_gen.exchange.tables.IMPORTED_TASKS`, one an instance."""
     known = task.known
     setting = known.get("setting")
-    shared = {
-        **dict.fromkeys(SPLIT_COLUMNS),
-        "nav_id": nav_id,
-        "scene": task.scene,
-        **{name: known.get(name) for name in _KNOWN},
-        "setting": setting,
+    shared = source | dict.fromkeys(SPLIT_COLUMNS) | {name: known.get(name) for name in _KNOWN} | {
+        "nav_id": nav_id, "scene": task.scene, "setting": setting,
         "action_budget": _BUDGETS.get(setting) if setting else None,
         **dict(zip(("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad"), task.start.tolist(), strict=True)),
-        **source,
-    }
+    }  # fmt: skip
     return [
-        {
-            **shared,
-            "task_id": f"{nav_id}-{instance.modality[0]}",
-            "modality": instance.modality,
-            "description": instance.description,
-            "reference_image_id": picture,
-            "image_distance_m": None,
+        shared | {
+            "task_id": f"{nav_id}-{instance.modality[0]}", "modality": instance.modality,
+            "description": instance.description, "reference_image_id": picture, "image_distance_m": None,
         }
         for instance, picture in zip(task.instances, pictures, strict=True)
-    ]
+    ]  # fmt: skip
 
 
 def route_row(task: Task, nav_id: str, source: dict[str, Any]) -> dict[str, Any]:

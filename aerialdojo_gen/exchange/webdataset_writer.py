@@ -67,29 +67,15 @@ def _to_json(labels: Labels, part: Part, k: int, options: ExportOptions) -> list
     n = int(index.steps[k])
     found = labels.of(np.array([k]), np.arange(n)[None], np.ones((1, n), np.bool_))
     whole: dict[str, Any] = {
-        "nav_id": index.nav_id[k],
-        "scene": part.scene,
-        "split": part.splits[k],
-        "setting": part.settings[k],
-        "n_steps": n,
-        "task": part.texts[k],
-    }
-    if "text" in options.goal:
-        names = ("target_name", "landmark", "direction", "description")
-        whole |= {name: index.goal_columns[name][k] for name in names}
-    if "image" in options.goal:
-        whole |= {name: index.goal_columns[name][k] for name in ("reference_image_id", "image_distance_m")}
-    return [
-        {
-            **whole,
-            "step": step,
-            "action": int(found["action"][0, step]),
-            "previous_action": int(found["previous_action"][0, step]),
-            "remaining_actions": int(found["remaining_actions"][0, step]),
-            "odometry": [float(value) for value in found["odometry"][0, step]],
-        }
-        for step in range(n)
-    ]
+        "nav_id": index.nav_id[k], "scene": part.scene, "split": part.splits[k], "setting": part.settings[k],
+        "n_steps": n, "task": part.texts[k],
+    }  # fmt: skip
+    told = ["target_name", "landmark", "direction", "description"] if "text" in options.goal else []
+    told += ["reference_image_id", "image_distance_m"] if "image" in options.goal else []
+    whole |= {name: index.goal_columns[name][k] for name in told}
+    names = ("action", "previous_action", "remaining_actions", "odometry")
+    columns = zip(*(found[name][0].tolist() for name in names), strict=True)
+    return [{**whole, "step": step, **dict(zip(names, of, strict=True))} for step, of in enumerate(columns)]
 
 
 def _kind(options: ExportOptions) -> str:
@@ -127,8 +113,5 @@ def finish(parts: list[Part], options: ExportOptions, made: list[Path], folder: 
         shards.append({"url": name, "nsamples": part.frames, "filesize": (source / _FILE).stat().st_size})
     # The list that WebDataset's own reader of indexed shards takes.
     write_json(folder / "index.json", {"__kind__": "wids-shard-index-v1", "wids_version": 1, "shardlist": shards})
-    return {
-        "trajectories": sum(len(part.index) for part in parts),
-        "samples": sum(part.frames for part in parts),
-        "shards": len(parts),
-    }
+    trajectories, samples = sum(len(part.index) for part in parts), sum(part.frames for part in parts)
+    return {"trajectories": trajectories, "samples": samples, "shards": len(parts)}

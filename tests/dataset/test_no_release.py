@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
-
-from aerialdojo_gen.cli import app as cli
+from support.command_line import said
 
 TASK = "U_Courtyard_0-0123456789ab"
 COMMANDS = {
@@ -27,26 +24,20 @@ COMMANDS = {
 }
 
 
-def line(command, data, capsys, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *command, "--data", str(data)])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    assert ended.value.code == 1
-    return capsys.readouterr().err
-
-
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
 def test_every_command_says_the_same_line(command, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     told = "name its folder with --data, or make one with make dataset\n"
     where = f"error: there is no release in {tmp_path}/data: "
-    assert line(command, "data", capsys, monkeypatch) == f"{where}the folder does not exist; {told}"
+    asked = (*command, "--data", "data")
+    code, _, err = said(capsys, *asked)
+    assert (code, err) == (1, f"{where}the folder does not exist; {told}")
     (tmp_path / "data" / "meshes").mkdir(parents=True)
     lack = "it has no folder release" + (
         ", nor tasks, routes, objects, landmarks, anchors, viewpoints or scenes" if command[0] == "validate" else ""
     )
-    assert line(command, "data", capsys, monkeypatch) == f"{where}{lack}; {told}"
+    assert said(capsys, *asked)[2] == f"{where}{lack}; {told}"
     (tmp_path / "data" / "release" / "tasks").mkdir(parents=True)
     lack = "tasks without a file part-<scene>.parquet"
-    assert line(command, "data", capsys, monkeypatch) == f"{where}{lack}; {told}"
+    assert said(capsys, *asked)[2] == f"{where}{lack}; {told}"
     assert {path.name for path in tmp_path.iterdir()} == {"data"}

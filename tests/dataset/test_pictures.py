@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import shutil
-import sys
-from pathlib import Path
 
 import pytest
+from support.command_line import said
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.cli import app as cli
 from aerialdojo_gen.dataset.pictures import pictured_objects, scenes_with_pictures
 
 
-def test_a_release_alone_has_the_same_pictures(smoke: Path, tmp_path: Path) -> None:
+def test_a_release_alone_has_the_same_pictures(smoke, tmp_path):
     shutil.copytree(smoke / "release", tmp_path / "release")
     scenes = scenes_with_pictures(smoke)
     assert scenes == scenes_with_pictures(tmp_path)
@@ -28,14 +26,9 @@ def test_a_release_alone_has_the_same_pictures(smoke: Path, tmp_path: Path) -> N
         scenes_with_pictures(tmp_path, ["U_Nowhere_0"])
 
 
-def test_the_gallery_takes_the_scenes_that_are_there(
-    smoke: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    given = ["gallery", "--references", "--small", "--data", str(smoke), "--out", str(tmp_path / "sheets")]
-    monkeypatch.setattr(sys, "argv", ["aerialdojo-gen", *given])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    assert not ended.value.code
+def test_the_gallery_takes_the_scenes_that_are_there(smoke, tmp_path, capsys):
+    code, out, _ = said(capsys, "gallery", "--references", "--small", "--data", smoke, "--out", tmp_path / "sheets")
+    assert code == 0
     made = sorted((tmp_path / "sheets").iterdir())
     assert [path.name for path in made] == [f"references-{name}-1.jpg" for name in scenes_with_pictures(smoke)]
-    assert capsys.readouterr().out.split() == [str(path) for path in made]
+    assert out.split() == [str(path) for path in made]

@@ -10,6 +10,7 @@ import shutil
 import pandas as pd
 import pytest
 from support.command_line import said
+from support.releases import files_of
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.base.errors import StoreError, UsageError
@@ -42,10 +43,6 @@ def pipeline(project, tmp_path):
     return write
 
 
-def release(data):
-    return {p.relative_to(data): p.read_bytes() for p in (data / "release").rglob("*") if p.is_file()}
-
-
 def times(data):
     return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
 
@@ -71,10 +68,10 @@ def test_another_pipeline_is_refused_at_once_and_nothing_is_lost(data, pipeline,
 
 
 def test_commands_take_the_pipeline_of_the_release(data, capsys):
-    before = release(data)
+    before = files_of(data / "release")
     code, _, err = said(capsys, "render", "--data", data, "--limit", "1", "--workers", "1")
     assert (code, bool(re.search(r"render: [1-9] rows in", err))) == (0, True), err
-    assert release(data) == before
+    assert files_of(data / "release") == before
     for place in (data, data / "release"):
         code, out, err = said(
             capsys, "validate", "--release", place, "--no-meshes", "--pictures", "0", "--workers", "1"
@@ -129,10 +126,10 @@ def test_what_describes_a_release_is_written_again_only_where_something_is_anoth
 
 
 def test_the_same_pipeline_on_some_scenes_keeps_the_others(data, project):
-    before = release(data)
+    before = files_of(data / "release")
     shutil.rmtree(data / "release" / "tasks" / "id_train")
     split(data, project / "pipelines" / "smoke.toml", scene=[A])
-    assert release(data) == before
+    assert files_of(data / "release") == before
 
 
 def test_a_scene_is_added_beside_another_pipeline_s_and_not_put_in_its_place(data, project, pipeline):
@@ -145,10 +142,10 @@ def test_a_scene_is_added_beside_another_pipeline_s_and_not_put_in_its_place(dat
 
 
 def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipeline):
-    before = release(data)
+    before = files_of(data / "release")
     with pytest.raises(UsageError, match=f"'smoke' with other settings: pipeline 'smoke' would remove 1 .*{A}"):
         split(data, pipeline("smoke", more="[filter]\nmin_detour_ratio = 1.1\n"))
-    assert release(data) == before
+    assert files_of(data / "release") == before
     # Narrowed and nothing else: the release holds what the pipeline asks for, as ever.
     split(data, pipeline("smoke"))
     assert existing_scenes(data) == [B]
@@ -157,14 +154,14 @@ def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipe
 @pytest.mark.parametrize("record", [None, "{", '{"pipelines": [{"name": 3}]}'])
 def test_a_release_that_does_not_say_is_not_thinned_out_but_made_again(data, project, pipeline, record):
     path = data / "release" / "pipeline.json"
-    before = release(data)
+    before = files_of(data / "release")
     path.unlink()
     if record is not None:
         path.write_text(record)
     with pytest.raises(UsageError, match="made by a pipeline that it does not name: pipeline 'other' would remove 1"):
         split(data, pipeline())
     split(data, project / "pipelines" / "smoke.toml")
-    assert release(data) == before
+    assert files_of(data / "release") == before
 
 
 def test_what_stands_beside_the_tables_is_written_while_the_data_is_held(tmp_path):

@@ -21,16 +21,7 @@ from aerialdojo_gen.dataset.stats.figures.maps import _round_length
 from aerialdojo_gen.dataset.stats.figures.ranking import _ranking
 from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
-from aerialdojo_gen.dataset.stats.measures import (
-    difficulty_tables,
-    flight_table,
-    goal_table,
-    goal_tables,
-    held_out_table,
-    novelty_table,
-    scene_table,
-    setting_table,
-)
+from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
 from aerialdojo_gen.pipeline.stages.work.quota import train_quotas
 from aerialdojo_gen.store import schemas
@@ -131,17 +122,8 @@ def test_the_release_stands_below_the_benchmarks_of_table_1(papers):
     assert [row[0] for row in table.rows] == [
         "AerialVLN", "CityNav", "OpenUAV", "OpenFly", "UAV-ON", "CityAVOS", "AerialDojo-200K", "this release"
     ]  # fmt: skip
-    assert table.rows[-1] == (
-        "this release",
-        "",
-        "OGS",
-        "4",
-        "instance",
-        "semantic or image",
-        "205,732",
-        "U N I D",
-        "42",
-    )
+    ours = ("this release", "", "OGS", "4", "instance", "semantic or image", "205,732", "U N I D", "42")
+    assert table.rows[-1] == ours
     lines = table.terminal()
     assert max(map(len, lines)) <= 100
     assert table.markdown()[4] == "| AerialVLN | 2023 | VLN | 4 | location | movement instruction | 25.3K | U | 25 |"
@@ -193,7 +175,7 @@ def frame(smoke):
 
 def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
     tasks = read_tasks(smoke, check_release(smoke))
-    by_scene = {row.name: row.ours for row in scene_table(tasks).rows}
+    by_setting, by_scene, *_ = ({row.name: row.ours for row in table.rows} for table in difficulty_tables(tasks))
     for scene in (*check_release(smoke), "all"):
         own = frame if scene == "all" else frame[frame["scene"] == scene]
         assert by_scene[scene] == pytest.approx((
@@ -202,20 +184,18 @@ def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
             100 * (own["target_visible_at_start"] > 0).mean(), own["climb_m"].median(),
         ))  # fmt: skip
     assert by_scene["all"][0] == len(frame)
-    settings = {row.name: row.ours for row in setting_table(tasks).rows}
-    assert settings["base"][0] == (frame["setting"] == "base").sum()
+    assert by_setting["base"][0] == (frame["setting"] == "base").sum()
 
 
 def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
     tasks = read_tasks(smoke, check_release(smoke))
     test = frame[frame["subset"] == "test"]
     new = [~test[f"{what}_seen_in_train"] for what in ("target", "start", "pair")]
-    seen = {row.name: row.ours for row in novelty_table(tasks).rows}["all"]
-    assert seen == pytest.approx((
+    seen, held = ({row.name: row.ours for row in table.rows} for table in difficulty_tables(tasks)[2:])
+    assert seen["all"] == pytest.approx((
         len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
         new[2].sum(), 100 * new[2].mean(),
     ))  # fmt: skip
-    held = {row.name: row.ours for row in held_out_table(tasks).rows}
     for partition in ("ID", "OOD"):
         for side in ("train", "test"):
             own = frame[(frame["partition"] == partition) & (frame["target_split"] == side)]
@@ -230,7 +210,8 @@ def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
                         for t in ("anchors", "objects"))  # fmt: skip
     goals = anchors[anchors["selected"]]
     fronts, told = goals["off_front_rad"].dropna(), objects["tells_shown"].dropna()
-    table = goal_table(read_goals(smoke, check_release(smoke)))
+    names = check_release(smoke)
+    table = goal_tables(read_goals(smoke, names), read_tasks(smoke, names))[0]
     assert table.rows[-1].ours == pytest.approx((
         len(objects), len(fronts), 100 * (fronts <= np.radians(60.0)).mean(), 100 * (told == 1.0).mean(),
         100 * goals["part_unoccluded"].mean(), 100 * goals["part_framed"].mean(), objects["step_back_m"].median(),
@@ -239,7 +220,8 @@ def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
 
 
 def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
-    table = flight_table(tasks := read_tasks(smoke, check_release(smoke)))
+    names = check_release(smoke)
+    shown = goal_tables(read_goals(smoke, names), read_tasks(smoke, names))
     turns = ahead = sideways = 0
     for actions in frame["action"]:
         names = [schemas.ACTION_NAMES[a] for a in actions]
@@ -251,14 +233,11 @@ def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
                 ahead += metres[k] * name.startswith("MoveForward")
                 sideways += metres[k] * name.startswith(("MoveLeft", "MoveRight"))
     n_actions = frame["action"].map(len)
-    assert table.rows[-1].ours == pytest.approx((
+    assert shown[1].rows[-1].ours == pytest.approx((
         len(frame), frame["min_clearance_m"].median(), frame["min_clearance_m"].quantile(0.1), n_actions.median(),
         100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
     ))  # fmt: skip
-    assert (
-        max(len(line) for t in goal_tables(read_goals(smoke, check_release(smoke)), tasks) for line in t.terminal(80))
-        <= 80
-    )
+    assert max(len(line) for table in shown for line in table.terminal(80)) <= 80
 
 
 def test_tables_of_difficulty_fit_a_terminal(smoke):
@@ -268,7 +247,7 @@ def test_tables_of_difficulty_fit_a_terminal(smoke):
     for table in difficulty_tables(many):
         assert max(map(len, table.terminal())) <= 100
         assert max(map(len, table.terminal(80))) <= 80
-    assert len(scene_table(many).terminal(80)) == 3 + 42 + 1
+    assert len(difficulty_tables(many)[1].terminal(80)) == 3 + 42 + 1
 
 
 def test_a_release_that_does_not_say_has_no_such_tables(smoke):

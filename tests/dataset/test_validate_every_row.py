@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pyarrow as pa
 import pytest
-from support.planting import definitions
+from support.planting import add, definitions, put
 
 from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
 from aerialdojo_gen.dataset.validate.registry import run_checks
@@ -47,24 +47,6 @@ def judged(data, name, table, change, wanted=lambda _: True):
     (outcome,) = (o for o in run_checks(here, [one]) if o.table == table)
     assert not outcome.skipped
     return sorted(planted.key(k) for k in places), sorted({fault.key for fault in outcome.faults})
-
-
-def add(column, off, at=None):
-    """Add to a number, or to the number that stands in a list at a place: 0 first, 0.5 in the middle, 1 last."""
-
-    def change(row):
-        into, key = (row, column) if at is None else (row[column], int(at * (len(row[column]) - 1)))
-        into[key] += off
-
-    return change
-
-
-def put(column, value, at=None):
-    def change(row):
-        into, key = (row, column) if at is None else (row[column], int(at * (len(row[column]) - 1)))
-        into[key] = value
-
-    return change
 
 
 def approaches(row):

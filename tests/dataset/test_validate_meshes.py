@@ -8,7 +8,7 @@ import zlib
 import cv2
 import numpy as np
 import pytest
-from support.planting import PlantedFault, check, definitions, named, plant, put
+from support.planting import PlantedFault, changed, check, definitions, named, plant, put
 
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 
@@ -69,11 +69,6 @@ def test_a_mesh_that_is_a_link_out(planted, tmp_path):
     assert check(planted) == {"mesh_outside": scene_key(planted)}
 
 
-def off(name, change):
-    """The change of a value by a function of it."""
-    return lambda row: row.update({name: change(row[name])})
-
-
 def other_anchor(row):
     """No selected one, nor one of the objects in which faults are planted; another stands before it."""
     return not row["selected"] and row["object_id"] > 1 and row["anchor_id"] > 0
@@ -81,23 +76,23 @@ def other_anchor(row):
 
 # A fault of a landmark's node keeps its box from being judged, so that it is planted in another copy.
 OF_NODES = (
-    PlantedFault("scene_of_mesh", SCENES, off("n_triangles", lambda v: v + 1)),
+    PlantedFault("scene_of_mesh", SCENES, changed("n_triangles", lambda v: v + 1)),
     PlantedFault("landmark_node", LANDMARKS, put("mesh_node", "nothing_000")),
     PlantedFault("object_node", OBJECTS, put("mesh_node", "nothing_000")),
-    PlantedFault("object_category", OBJECTS, off("category", lambda v: v + "_")),
-    PlantedFault("anchor_surface", ANCHORS, off("surface_distance_m", lambda v: v + 0.01), other_anchor),
-    PlantedFault("anchor_clearance", ANCHORS, off("clearance_m", lambda v: v - 0.01), other_anchor),
-    PlantedFault("anchor_visibility", ANCHORS, off("visible_fraction", lambda v: v / 10), other_anchor),
+    PlantedFault("object_category", OBJECTS, changed("category", lambda v: v + "_")),
+    PlantedFault("anchor_surface", ANCHORS, changed("surface_distance_m", lambda v: v + 0.01), other_anchor),
+    PlantedFault("anchor_clearance", ANCHORS, changed("clearance_m", lambda v: v - 0.01), other_anchor),
+    PlantedFault("anchor_visibility", ANCHORS, changed("visible_fraction", lambda v: v / 10), other_anchor),
 )
 OF_VALUES = (
-    PlantedFault("scene_of_mesh", SCENES, off("ceiling_m", lambda v: v + 1.0)),
-    PlantedFault("landmark_box", LANDMARKS, off("z_m", lambda v: v + 0.01)),
-    PlantedFault("object_box", OBJECTS, off("size_z_m", lambda v: v + 0.01)),
-    PlantedFault("anchor_score", ANCHORS, off("part_contrast", lambda v: v / 2 + 0.4), other_anchor),
-    PlantedFault("anchor_score", ANCHORS, off("score_geometric", lambda v: v - 0.01), other_anchor),
+    PlantedFault("scene_of_mesh", SCENES, changed("ceiling_m", lambda v: v + 1.0)),
+    PlantedFault("landmark_box", LANDMARKS, changed("z_m", lambda v: v + 0.01)),
+    PlantedFault("object_box", OBJECTS, changed("size_z_m", lambda v: v + 0.01)),
+    PlantedFault("anchor_score", ANCHORS, changed("part_contrast", lambda v: v / 2 + 0.4), other_anchor),
+    PlantedFault("anchor_score", ANCHORS, changed("score_geometric", lambda v: v - 0.01), other_anchor),
     PlantedFault("anchor_score", ANCHORS, put("score_vlm", 0.5), other_anchor),
-    PlantedFault("anchor_rank", ANCHORS, off("score", lambda v: v + 1.0), other_anchor),
-    PlantedFault("anchor_yaw", ANCHORS, off("yaw_rad", lambda v: v * 0.5), other_anchor),
+    PlantedFault("anchor_rank", ANCHORS, changed("score", lambda v: v + 1.0), other_anchor),
+    PlantedFault("anchor_yaw", ANCHORS, changed("yaw_rad", lambda v: v * 0.5), other_anchor),
 )
 
 
@@ -142,16 +137,16 @@ def with_words(png):
 
 OF_PICTURES = (
     PlantedFault("image_missing", OBJECTS, put("reference_image", None)),
-    PlantedFault("image_damaged", OBJECTS, off("reference_image", lambda png: png[:-2000])),
+    PlantedFault("image_damaged", OBJECTS, changed("reference_image", lambda png: png[:-2000])),
     PlantedFault("image_damaged", OBJECTS, put("reference_image", b"\xff\xd8\xff a JPEG")),
-    PlantedFault("image_damaged", OBJECTS, off("reference_image", with_words)),
+    PlantedFault("image_damaged", OBJECTS, changed("reference_image", with_words)),
     PlantedFault("image_blank", OBJECTS, put("reference_image", picture(np.full((320, 320, 3), 130)))),
 )
 OF_BOXES = (
     PlantedFault("image_box", OBJECTS, put("box_u1_px", 321)),
     PlantedFault("image_box", OBJECTS, lambda row: row.update(box_v0_px=row["box_v1_px"])),
     PlantedFault("image_box", OBJECTS, lambda row: row.update(image_fraction=1.0, box_u0_px=row["box_u1_px"] - 1)),
-    PlantedFault("image_target", OBJECTS, off("image_fraction", lambda v: v / 2)),
+    PlantedFault("image_target", OBJECTS, changed("image_fraction", lambda v: v / 2)),
     PlantedFault("image_target", OBJECTS, lambda row: row.update(shifted(row))),
 )
 

@@ -24,7 +24,6 @@ from support.planting import (
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
 from aerialdojo_gen.dataset.validate.detours import _pieces
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id
 from aerialdojo_gen.store.schemas import APPROACH
 
@@ -247,10 +246,10 @@ def longer(row, insert, data):
     if row["length_m"] > SHORT_M or row["action"][0] == APPROACH:
         return None
     new = refly(row, [*insert, *row["action"]])
-    mesh, path, radius = scene_mesh(data), poses(new)[:, :3], data.pipeline.embodiment.radius_m
-    low, high = mesh.scene.bounds
+    path, radius = poses(new)[:, :3], data.pipeline.embodiment.radius_m
+    low, high = data.mesh.bounds
     inside = ((path >= low + radius) & (path <= high - radius)).all()
-    return new if inside and not mesh.world.route_in_collision(path, radius) else None
+    return new if inside and not data.world.route_in_collision(path, radius) else None
 
 
 def test_routes_longer_than_they_need_be_with_right_figures(planted):

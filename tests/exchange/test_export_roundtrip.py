@@ -108,18 +108,10 @@ def flown(rows: dict, start, actions, approach) -> dict:
     length, distance = route_length_m(poses[:, :3]), float(np.linalg.norm(end[:3] - poses[0, :3]))
     lists = {name: poses[:, k].tolist() for k, name in enumerate(LISTS[:4])}
     goal = dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), end[:3].tolist(), strict=True))
-    return (
-        rows
-        | lists
-        | goal
-        | {
-            "action": [*actions, APPROACH, 0],
-            "n_actions": len(actions) + 2,
-            "length_m": length,
-            "euclidean_m": distance,
-            "detour_ratio": length / distance if distance else 0.0,
-        }
-    )
+    return rows | lists | goal | {
+        "action": [*actions, APPROACH, 0], "n_actions": len(actions) + 2, "length_m": length,
+        "euclidean_m": distance, "detour_ratio": length / distance if distance else 0.0,
+    }  # fmt: skip
 
 
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -1,6 +1,5 @@
 """The exports for training, read back by LeRobot's and WebDataset's readers: the loader's pictures and labels."""
 
-import hashlib
 import json
 import os
 import shutil
@@ -12,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from support import lerobot_reader
+from support.releases import files_of
 from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
@@ -54,14 +54,6 @@ def seen(smoke, lerobot):
     whole = Trajectories(smoke, split="all", views=VIEWS, size=(48, 32), past=None, goal=("text", "image"))
     number = {nav_id: k for k, nav_id in enumerate(whole.index.nav_id)}
     return [whole[number[nav_id]] for nav_id in lerobot.episodes["nav_id"]]
-
-
-def files(folder):
-    return {
-        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in folder.rglob("*")
-        if p.is_file()
-    }
 
 
 def test_lerobot_has_the_loaders_labels(lerobot, seen):
@@ -198,7 +190,7 @@ def test_the_same_bytes_by_any_number_of_workers_and_the_same_data_in_other_part
     folder, options = made[0] / "lerobot", ExportOptions(**OPTIONS)
     again = export_for_learning("lerobot", smoke, tmp_path / "again", options, workers=2)
     assert again == made[1]["lerobot"]
-    assert files(tmp_path / "again") == files(folder)
+    assert files_of(tmp_path / "again") == files_of(folder)
     assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
     monkeypatch.setattr(lerobot_writer, "frames_a_part", lambda options: 20)
     cut = export_for_learning("lerobot", smoke, tmp_path / "cut", options, workers=1)
@@ -241,7 +233,7 @@ export_for_learning("webdataset", sys.argv[1], pathlib.Path(sys.argv[2]), Export
     resumed = export_for_learning("webdataset", smoke, out, ExportOptions(**OPTIONS), workers=1)
     assert (resumed.parts_kept, resumed.parts) == (1, 2)
     assert (out / "shard-000000.tar").stat().st_ino == first, "it is the file of the killed run"
-    assert files(out) == files(made[0] / "webdataset")
+    assert files_of(out) == files_of(made[0] / "webdataset")
     assert not unfinished.exists()
 
 
@@ -291,12 +283,12 @@ def test_the_command_says_what_it_made_and_does_not_replace_it_unasked(smoke, tm
     done = call(*arguments, "--json")
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["counts"]["shards"] == 2
-    before = files(tmp_path / "x")
+    before = files_of(tmp_path / "x")
     again = call(*arguments)
     assert again.exit_code == 2 or again.exit_code == 1
     assert "--force replaces it" in str(again.exception or again.output)
     assert call(*arguments, "--force", "--quiet").stdout == ""
-    assert files(tmp_path / "x") == before
+    assert files_of(tmp_path / "x") == before
 
 
 @pytest.mark.parametrize(

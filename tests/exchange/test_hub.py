@@ -7,6 +7,7 @@ import pytest
 from huggingface_hub import constants
 from support.command_line import said
 from support.hub_server import READER, TOKEN, Repo, hub_server, is_large
+from support.releases import files_of
 
 from aerialdojo_gen.exchange.hub import scene_of
 from aerialdojo_gen.store import shards
@@ -29,10 +30,6 @@ def hub(monkeypatch):
 def call(capsys):
     """Call a command; returns the exit code, standard output and standard error."""
     return partial(said, capsys)
-
-
-def files_of(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def fails(answer, code, *words):

@@ -116,14 +116,24 @@ def named(key: str, row: Row) -> str:
     return " ".join(f"{name}={row[name]}" for name in names)
 
 
-def put(name: str, value: object) -> Callable[[Row], None]:
+def changed(name: str, new: Callable[[Any], object], at: float | None = None) -> Callable[[Row], None]:
+    """The change of a value by a function of it; of a list, at a place: 0 first, 0.5 in the middle, 1 last."""
+
+    def change(row: Row) -> None:
+        into, key = (row, name) if at is None else (row[name], int(at * (len(row[name]) - 1)))
+        into[key] = new(into[key])
+
+    return change
+
+
+def put(name: str, value: object, at: float | None = None) -> Callable[[Row], None]:
     """The change that gives a column a value."""
-    return lambda row: row.update({name: value})
+    return changed(name, lambda _: value, at)
 
 
-def add(name: str, off: float) -> Callable[[Row], None]:
+def add(name: str, off: float, at: float | None = None) -> Callable[[Row], None]:
     """The change that adds to a number."""
-    return lambda row: row.update({name: row[name] + off})
+    return changed(name, lambda value: value + off, at)
 
 
 def of_nav(nav_id: object) -> Callable[[Row], bool]:

@@ -33,6 +33,11 @@ def replace_rows(data: Path, table: str, scene: str, rows: list[dict]) -> None:
     store.write_shard(data, table, scene, 0, from_rows(spec, rows))
 
 
+def files_of(folder: Path) -> dict[str, bytes]:
+    """All files of a folder, by their place in it."""
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
 def released(data: Path, table: str) -> pd.DataFrame:
     """All rows of tasks or routes of a release, by their id."""
     parts = [pd.read_parquet(path) for path in sorted((data / "release" / table).glob("*/*.parquet"))]

@@ -36,19 +36,13 @@ def uav_on(n: int = 3) -> list[dict]:
                 # A heading of 2i sixteenths of a turn, rounded as the files are.
                 "start_quaternionr": [0, 0, round(math.sin(math.pi * i / 8), 3), round(math.cos(math.pi * i / 8), 3)],
             },
-            "info": {"geodesic_distance": 91, "euclidean_distance": 57.0111},
-            "map_name": "BrushifyRoad_test",
-            "true_name": " MonkeyBars",
-            "object_name": "SM_PullupBar01_2",
-            "pose": [[-56.23, 267.50, 29.62], [400.0, 0.0, 0.0]],
-            "size": " small(2.0*0.5=1.0 squares)",
-            "description": "A playground structure of blue bars. ",
-            "category": "",
-            "used-in-train": i % 2,
-            "commonsenible": 1,
+            "info": {"geodesic_distance": 91, "euclidean_distance": 57.0111}, "map_name": "BrushifyRoad_test",
+            "true_name": " MonkeyBars", "object_name": "SM_PullupBar01_2", "size": " small(2.0*0.5=1.0 squares)",
+            "pose": [[-56.23, 267.50, 29.62], [400.0, 0.0, 0.0]], "category": "", "used-in-train": i % 2,
+            "description": "A playground structure of blue bars. ", "commonsenible": 1,
         }
         for i in range(n)
-    ]
+    ]  # fmt: skip
 
 
 def cityavos(folder: Path, n: int = 3) -> list[dict]:
@@ -58,17 +52,11 @@ def cityavos(folder: Path, n: int = 3) -> list[dict]:
         image = f"data/target_image/Scene1/Target{i}.png"
         (folder / image).parent.mkdir(parents=True, exist_ok=True)
         (folder / image).write_bytes(PNG)
-        rows.append(
-            {
-                "mission_id": str(i + 1),
-                "scene_id": "1",
-                "mission_grade": "1",
-                "initial_pos": [6360, -4160, -5, 0, 0, 0.5 * i],
-                "target_pos": [6382.97 + i, -4209.66, -5.98],
-                "target_text": "A coffee shop named CENTRAL ALL-STAR",
-                "target_image_path": image,
-            }
-        )
+        rows.append({
+            "mission_id": str(i + 1), "scene_id": "1", "mission_grade": "1",
+            "initial_pos": [6360, -4160, -5, 0, 0, 0.5 * i], "target_pos": [6382.97 + i, -4209.66, -5.98],
+            "target_text": "A coffee shop named CENTRAL ALL-STAR", "target_image_path": image,
+        })  # fmt: skip
     return rows
 
 
@@ -87,19 +75,12 @@ def aerialvln(actions: tuple[int, ...] = (1, 2, 1, 4, 7, 3, 6, 5, 0), n: int = 2
             cos, sin = math.cos(heading), math.sin(heading)
             at = at + np.array([cos * x - sin * y, sin * x + cos * y, z])
             heading += {2: -1, 3: 1}.get(action, 0) * math.radians(15)
-        episodes.append(
-            {
-                "episode_id": f"A{i}",
-                "trajectory_id": f"T{i}",
-                "scene_id": 5,
-                "instruction": {"instruction_text": "Rise, then fly to the red roof.", "instruction_tokens": [1, 2]},
-                "start_position": position.tolist(),
-                "start_rotation": [math.cos(start / 2), 0.0, 0.0, math.sin(start / 2)],
-                "goals": [{"position": path[-1]}],
-                "reference_path": path,
-                "actions": list(actions),
-            }
-        )
+        episodes.append({
+            "episode_id": f"A{i}", "trajectory_id": f"T{i}", "scene_id": 5,
+            "instruction": {"instruction_text": "Rise, then fly to the red roof.", "instruction_tokens": [1, 2]},
+            "start_position": position.tolist(), "goals": [{"position": path[-1]}], "reference_path": path,
+            "start_rotation": [math.cos(start / 2), 0.0, 0.0, math.sin(start / 2)], "actions": list(actions),
+        })  # fmt: skip
     return {"episodes": episodes, "instruction_vocab": {"word_list": ["roof"], "num_vocab": 1}}
 
 
@@ -117,14 +98,9 @@ def openfly(actions: tuple[int, ...] = (9, 2, 8, 3, 1, 0), n: int = 2, drift_m: 
             at = at + _OPENFLY_FORWARD.get(action, 0) * np.array([math.cos(yaw), math.sin(yaw), 0.0])
             yaw += {2: 1, 3: -1}.get(action, 0) * math.radians(30)
         positions[-1][0] += drift_m
-        rows.append(
-            {
-                "image_path": f"env_airsim_16/astar_data/medium_average/2025-1-9_{i}",
-                "gpt_instruction": "Head for the glass tower and stop before it.",
-                "action": list(actions),
-                "index_list": [f"20250109_131812_{k}" for k in range(len(actions))],
-                "pos": positions,
-                "yaw": yaws,
-            }
-        )
+        rows.append({
+            "image_path": f"env_airsim_16/astar_data/medium_average/2025-1-9_{i}", "pos": positions, "yaw": yaws,
+            "gpt_instruction": "Head for the glass tower and stop before it.", "action": list(actions),
+            "index_list": [f"20250109_131812_{k}" for k in range(len(actions))],
+        })  # fmt: skip
     return rows

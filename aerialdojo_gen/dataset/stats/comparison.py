@@ -58,18 +58,13 @@ class Comparison:
     @property
     def compared(self) -> int:
         """How many figures that are to be the paper's there are."""
-        return sum(
-            column.exact and theirs is not None
-            for row in self.rows
-            for column, theirs in zip(self.columns, row.theirs, strict=True)
-        )
+        return sum(len(self._comparable(row)) for row in self.rows)
+
+    def _comparable(self, row: Row) -> list[int]:
+        return [k for k, column in enumerate(self.columns) if column.exact and row.theirs[k] is not None]
 
     def _differing(self, row: Row) -> list[int]:
-        return [
-            k
-            for k, (column, ours, theirs) in enumerate(zip(self.columns, row.ours, row.theirs, strict=True))
-            if column.exact and theirs is not None and ours != theirs
-        ]
+        return [k for k in self._comparable(row) if row.ours[k] != row.theirs[k]]
 
     def _split(self, k: int) -> bool:
         """Whether the paper's figures of a column have a column of their own."""
@@ -115,10 +110,8 @@ class Comparison:
 
     def markdown(self) -> list[str]:
         """Lines of Markdown; a count that is not the paper's has the paper's in brackets."""
-        heads = self._heads()
-        lines = [f"### {self.title}", "", "| " + " | ".join(heads) + " |", "|---|" + "---:|" * (len(heads) - 1)]
-        lines += ["| " + " | ".join(self._cells(row, bracket=True)) + " |" for row in self.rows]
-        return [*lines, "", *self._verdict()]
+        cells = [self._cells(row, bracket=True) for row in self.rows]
+        return _markdown(self.title, self._heads(), "---:|", cells, self._verdict())
 
     def as_json(self) -> dict[str, Any]:
         """Return title, notes, units by column, and a row's figures by column, ours and the paper's."""
@@ -157,8 +150,7 @@ class Listing:
 
     def markdown(self) -> list[str]:
         """Lines of Markdown."""
-        lines = [f"### {self.title}", "", "| " + " | ".join(self.heads) + " |", "|---" * len(self.heads) + "|"]
-        return [*lines, *("| " + " | ".join(row) + " |" for row in self.rows), "", *self.notes]
+        return _markdown(self.title, self.heads, "---|", self.rows, self.notes)
 
     def as_json(self) -> dict[str, Any]:
         """Return title, notes, and the cells of each row by their heading."""
@@ -172,6 +164,14 @@ class Listing:
             for row in self.rows
             for head, cell in zip(self.heads[1:], row[1:], strict=True)
         ]
+
+
+def _markdown(
+    title: str, heads: Sequence[str], rule: str, rows: Sequence[Sequence[str]], notes: Sequence[str]
+) -> list[str]:
+    """Lines of Markdown; `rule` is below every heading but the first."""
+    table = ["| " + " | ".join(cells) + " |" for cells in (heads, *rows)]
+    return [f"### {title}", "", table[0], "|---|" + rule * (len(heads) - 1), *table[1:], "", *notes]
 
 
 def as_csv(tables: Sequence[Comparison | Listing]) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerialdojo_gen.base.paper_figures import PaperScene, benchmarks, family_counts, inventory, shares, splits
-from aerialdojo_gen.dataset.stats.comparison import Column, Comparison, Listing, Row
+from aerialdojo_gen.dataset.stats.comparison import Column, Comparison, Figure, Listing, Row
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import Where, open_root
 from aerialdojo_gen.store.schemas import FAMILIES, SETTINGS
@@ -107,12 +107,11 @@ def scene_table(made: Sequence[Made]) -> Comparison:
 
 def family_table(made: Sequence[Made]) -> Comparison:
     """Table of the families, the paper's Table 2 (Types and Anchors) and the sums of its Table 10."""
-    groups = [(family, [m for m in made if m.family == family]) for family in FAMILIES.values()]
-    groups += [
-        (f, [m for m in made if m.family == f]) for f in sorted({m.family for m in made} - {*FAMILIES.values()})
-    ]
+    there = {m.family for m in made}
+    names = [*(family for family in FAMILIES.values() if family in there), *sorted(there - {*FAMILIES.values()})]
     rows = []
-    for name, group in [*(g for g in groups if g[1]), ("all", list(made))]:
+    for name in (*names, "all"):
+        group = [m for m in made if name in (m.family, "all")]
         ours, papers = _figures(group), _paper_figures(group)
         known = len(group) if papers[0] is not None else None
         types, anchors = len({m.scene_type for m in group}), sum(m.anchors for m in group)
@@ -183,43 +182,37 @@ def benchmark_table(made: Sequence[Made]) -> Listing:
 def split_table(made: Sequence[Made]) -> Comparison:
     """Table of the splits and the paper's figures, in instances; without those for a part of the scenes."""
     whole = _whole(made)
-    rows = []
+    figures = {}
     for (partition, subset), cells in splits().items():
         group = [m for m in made if store.partition(m.scene).upper() == partition]
         ours = [2 * sum(m.of(s, subset) for m in group) for s in SETTINGS]
-        papers = [2 * cells[s] for s in SETTINGS]
-        known = (*papers, sum(papers)) if whole else (None,) * 4
-        rows.append(Row(f"{partition} {subset}", (*ours, sum(ours)), known))
-    ours_all = tuple(sum(column) for column in zip(*(row.ours for row in rows), strict=True))
-    paper_all = (
-        tuple(sum(column) for column in zip(*(row.theirs for row in rows), strict=True)) if whole else (None,) * 4
-    )
-    return Comparison("Splits", "split", _COUNTS[2:], (*rows, Row("all", ours_all, paper_all)))
+        figures[f"{partition} {subset}"] = np.array([ours, [2 * cells[s] for s in SETTINGS]])
+    figures["all"] = sum(figures.values(), np.zeros((2, len(SETTINGS)), np.int64))
+    rows = []
+    for name, both in figures.items():
+        mine, papers = ((*row.tolist(), int(row.sum())) for row in both)
+        rows.append(Row(name, mine, papers if whole else (None,) * len(papers)))
+    return Comparison("Splits", "split", _COUNTS[2:], tuple(rows))
 
 
 def total_table(made: Sequence[Made]) -> Comparison:
     """Table of the whole benchmark; the paper's figures are the sums of its Table 10."""
     ours, papers = _figures(made), _paper_figures(made)
     known = papers[0] is not None
-    rows = [
-        Row(name, (n,), (n if known else None,))
-        for name, n in (
-            ("families", len({m.family for m in made})),
-            ("scene types", len({m.scene_type for m in made})),
-            ("scenes", len(made)),
-        )
-    ]
-    rows += [Row(c.name, (a,), (b,)) for c, a, b in zip(_COUNTS[:2], ours, papers, strict=False)]
-    rows.append(Row("object categories", (len(frozenset().union(*(m.categories for m in made))),), (None,)))
+    sets = {"families": {m.family for m in made}, "scene types": {m.scene_type for m in made}}
+    sizes = {name: len(members) for name, members in sets.items()} | {"scenes": len(made)}
+    figures: dict[str, tuple[Figure, Figure]] = {name: (n, n if known else None) for name, n in sizes.items()}
+    both = list(zip(ours, papers, strict=True))
+    figures |= dict(zip(("landmarks", "objects"), both, strict=False))
+    figures["object categories"] = len(frozenset().union(*(m.categories for m in made))), None
     names = ("instances, base", "instances, standard", "instances, long-horizon", "instances")
-    rows += [Row(name, (a,), (b,)) for name, a, b in zip(names, ours[2:6], papers[2:6], strict=True)]
-    tasks = [None if n is None else int(n) // 2 for n in (ours[5], papers[5])]
-    rows.append(Row("navigation tasks", (tasks[0],), (tasks[1],)))
-    rows.append(Row("routes in all, km", (ours[6],), (papers[6],)))
-    means = [
-        1000 * km / n if km is not None and n else None for km, n in zip((ours[6], papers[6]), tasks, strict=True)
-    ]
-    rows.append(Row("mean route, m", (means[0],), (means[1],)))
+    figures |= dict(zip(names, both[2:6], strict=True))
+    tasks = [None if n is None else int(n) // 2 for n in both[5]]
+    figures["navigation tasks"] = tasks[0], tasks[1]
+    figures["routes in all, km"] = both[6]
+    means = [1000 * km / n if km is not None and n else None for km, n in zip(both[6], tasks, strict=True)]
+    figures["mean route, m"] = means[0], means[1]
+    rows = [Row(name, (mine,), (theirs,)) for name, (mine, theirs) in figures.items()]
     return Comparison("The benchmark as a whole", "", (Column("figure", exact=False),), tuple(rows))
 
 

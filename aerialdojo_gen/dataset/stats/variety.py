@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,15 +18,6 @@ from aerialdojo_gen.store.root import Where, open_root
 
 _TOKEN = re.compile(r"[a-zé]+(?:['’-][a-zé]+)*|\d+")
 _OPENING, _LONGEST = 4, 4
-# What holds a sentence together; any other word is of a noun phrase, and becomes a part of a slot.
-_KEPT = re.compile(
-    r"it|this|(?:that|it|there|you)['’]\w+|you|your|there|here|and|but|then|is|are|was|ha[sd]|have|so|if|where|what|who|"
-    r"how|look|find|search|go|fly|head|get|make|see|spot|notice|know|tell|want|need|seek|watch|reach|stop|aim|target|"
-    r"goal|will|would|should|can|could|may|must|we|us|i|me|be|finish|start"
-)
-_POSITION = re.compile(
-    r"(?:stand|sit|lie|lay|lean|hang|rise|float|grow|rest|drift|perch|wait|park|moor|stretch|fly|bloom|lying|set)\w*"
-)
 PATTERNS = {
     "adjective before a collective": re.compile(
         r"\b(?:red|blue|green|grey|gray|white|black|brown|yellow|orange|pink|purple|beige|rusty|wooden|empty|brick|"
@@ -40,62 +30,31 @@ PATTERNS = {
 }
 
 
-@dataclass(frozen=True)
-class Variety:
-    """Figures of a set of texts."""
-
-    texts: int
-    words: int
-    vocabulary: int  # Distinct words
-    once: int  # Words that occur once
-    frames: int  # Texts with their noun phrases and phrases of place replaced by slots
-    commonest: float  # Share of the most common frame
-    covering: int  # Frames that cover 99.9 % of the texts
-    openings: float  # Share of texts whose first four words a text of another object has
-    distinct: tuple[float, ...]  # Distinct n-grams over all, for n = 1 to 4
-    self_bleu: float
-    lengths: tuple[int, int, int]  # Fewest, median and most words
-    patterns: dict[str, float]  # Share of the texts by pattern
-
-
 def words_of(text: str) -> list[str]:
     """Split a text into its words, lower case."""
     return _TOKEN.findall(text.lower())
 
 
-def frame_of(text: str) -> str:
-    """Replace noun phrases and phrases of place by slots: what is left is the sentences' build."""
-    out: list[str] = []
-    for sentence in re.split(r"([.,;:!?])\s*", text.lower()):
-        for word in _TOKEN.findall(sentence):
-            slot = word if _KEPT.fullmatch(word) else "V" if _POSITION.fullmatch(word) else "_"
-            if slot != "_" or out[-1:] != ["_"]:
-                out.append(slot)
-        if sentence in (".", ",", ";", ":", "!", "?") and out:
-            out.append(sentence)
-    return " ".join(out)
-
-
-def measure(texts: Sequence[str], owners: Sequence[object], frames: Sequence[str] | None = None) -> Variety:
-    """Measure texts; `owners` are the objects that they describe, `frames` the derivations where these are known."""
+def measure(texts: Sequence[str], owners: Sequence[object], frames: Sequence[str]) -> dict[str, str]:
+    """Measure texts; `owners` are the objects that they describe, `frames` the derivations that they were made by."""
     tokens = [words_of(text) for text in texts]
-    counts = Counter(word for words in tokens for word in words)
-    built = Counter(frames if frames is not None else map(frame_of, texts))
+    counts, built = Counter(word for words in tokens for word in words), Counter(frames)
     lengths = sorted(map(len, tokens))
-    return Variety(
-        texts=len(texts),
-        words=sum(lengths),
-        vocabulary=len(counts),
-        once=sum(n == 1 for n in counts.values()),
-        frames=len(built),
-        commonest=max(built.values()) / len(texts),
-        covering=_covering(built, len(texts)),
-        openings=_shared_openings(tokens, owners),
-        distinct=tuple(_distinct(tokens, n) for n in range(1, _LONGEST + 1)),
-        self_bleu=self_bleu(tokens, owners),
-        lengths=(lengths[0], lengths[len(lengths) // 2], lengths[-1]),
-        patterns={name: sum(bool(p.search(t.lower())) for t in texts) / len(texts) for name, p in PATTERNS.items()},
-    )
+    patterns = {name: sum(bool(p.search(t.lower())) for t in texts) / len(texts) for name, p in PATTERNS.items()}
+    return {
+        "texts": f"{len(texts):,}",
+        "words": f"{sum(lengths):,}",
+        "fewest, median, most words": f"{lengths[0]}, {lengths[len(lengths) // 2]}, {lengths[-1]}",
+        "vocabulary": f"{len(counts):,}",
+        "words that occur once": f"{sum(n == 1 for n in counts.values()):,}",
+        "frames": f"{len(built):,}",
+        "frames that cover 99.9 %": f"{_covering(built, len(texts)):,}",
+        "most common frame": f"{max(built.values()) / len(texts):.2%}",
+        "first four words shared": f"{_shared_openings(tokens, owners):.1%}",
+        "distinct 1-, 2-, 3- and 4-grams": ", ".join(f"{_distinct(tokens, n):.3f}" for n in range(1, _LONGEST + 1)),
+        "self-BLEU-4": f"{self_bleu(tokens, owners):.3f}",
+        **{f"pattern: {name}": f"{share:.1%}" for name, share in patterns.items()},
+    }
 
 
 def _covering(built: Counter[str], texts: int, share: float = 0.999) -> int:
@@ -147,29 +106,15 @@ _DEFINITION = (
     "Frames: texts with slots for noun phrases, places, details. Openings: first four words that a text of another "
     "object has. Self-BLEU-4: mean over 500 texts of different objects, each against the others."
 )
-_ROWS: tuple[tuple[str, Callable[[Variety], str]], ...] = (
-    ("texts", lambda v: f"{v.texts:,}"),
-    ("words", lambda v: f"{v.words:,}"),
-    ("fewest, median, most words", lambda v: "{}, {}, {}".format(*v.lengths)),
-    ("vocabulary", lambda v: f"{v.vocabulary:,}"),
-    ("words that occur once", lambda v: f"{v.once:,}"),
-    ("frames", lambda v: f"{v.frames:,}"),
-    ("frames that cover 99.9 %", lambda v: f"{v.covering:,}"),
-    ("most common frame", lambda v: f"{v.commonest:.2%}"),
-    ("first four words shared", lambda v: f"{v.openings:.1%}"),
-    ("distinct 1-, 2-, 3- and 4-grams", lambda v: ", ".join(f"{share:.3f}" for share in v.distinct)),
-    ("self-BLEU-4", lambda v: f"{v.self_bleu:.3f}"),
-)
 
 
-def variety_table(measured: Mapping[str, Variety]) -> Listing:
+def variety_table(measured: Mapping[str, Mapping[str, str]]) -> Listing:
     """Set measures of several sets of texts side by side."""
-    rows = [(label, *(say(v) for v in measured.values())) for label, say in _ROWS]
-    rows += [(f"pattern: {name}", *(f"{v.patterns[name]:.1%}" for v in measured.values())) for name in PATTERNS]
-    return Listing("Variety of the descriptions", ("measure", *measured), tuple(rows), (_DEFINITION,))
+    rows = tuple((name, *(of[name] for of in measured.values())) for name in next(iter(measured.values())))
+    return Listing("Variety of the descriptions", ("measure", *measured), rows, (_DEFINITION,))
 
 
-def read_variety(data: Where, scenes: Sequence[str]) -> dict[str, Variety]:
+def read_variety(data: Where, scenes: Sequence[str]) -> dict[str, dict[str, str]]:
     """Measure a release's descriptions: all, one an object, and by level; empty for a release without paraphrases."""
     root = open_root(data)
     found: list[tuple[tuple[str, int], dict[str, Any]]] = []

@@ -8,8 +8,7 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.foreign_keys import comparable
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, at
 from aerialdojo_gen.geometry.frames import wrap_angle_rad, yaw_towards
 from aerialdojo_gen.geometry.part_visibility import FRONT_RAD
 from aerialdojo_gen.geometry.surface import Surface
@@ -29,7 +28,7 @@ _STANDOFF_M = 1e-3
 def anchor_rank(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Ranks of an object's anchors count from 0, the better score first, but for a person's choice."""
     ids, ranks, score = rows.ints("object_id"), rows.ints("anchor_id"), rows.floats("score")
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     for object_id in np.unique(ids):
         own = np.flatnonzero(ids == object_id)
         own = own[np.argsort(ranks[own], kind="stable")]
@@ -53,23 +52,24 @@ def anchor_visibility(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors")
 def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's score is what its parts make of it: each from 0 to 1, weighed as the pipeline says."""
-    names = (*WEIGHTS, *FACTORS)
-    parts = rows.floats(*(f"part_{name}" for name in names))
-    for row, k in zip(*np.nonzero(~((parts >= 0) & (parts <= 1))), strict=True):
-        yield Finding(int(row), f"part_{names[k]} = {parts[row, k]:.6g}", "0 to 1")
     weights = data.pipeline.anchor_sample.weights
     asked = {name: getattr(weights, name) for name in SCORERS}
     scores = {name: rows.floats(f"score_{name}") for name in SCORERS}
+    names, optional = (*WEIGHTS, *FACTORS), ("tells", "front")
+    parts, known = (rows.floats(*(f"part_{name}" for name in some)) for some in (names, optional))
+    for some, values, wrong, allowed in (
+        (names, parts, ~((parts >= 0) & (parts <= 1)), "0 to 1"),
+        (optional, known, (known < 0) | (known > 1), "0 to 1, or null"),
+    ):
+        for row, k in np.argwhere(wrong).tolist():
+            yield Finding(row, f"part_{some[k]} = {values[row, k]:.6g}", allowed)
     geometric = parts[:, : len(WEIGHTS)] @ np.array([*WEIGHTS.values()])
-    known = rows.floats("part_tells", "part_front")
-    for row, k in zip(*np.nonzero((known < 0) | (known > 1)), strict=True):
-        yield Finding(int(row), f"{('part_tells', 'part_front')[k]} = {known[row, k]:.6g}", "0 to 1, or null")
     share = np.where(np.isnan(known), 0.0, [PARTS_WEIGHT, FRONT_WEIGHT])
     geometric = geometric * (1.0 - share.sum(axis=1)) + (share * np.nan_to_num(known)).sum(axis=1)
     framed, unhindered = parts[:, len(WEIGHTS) :].T
     unoccluded, level = (parts[:, names.index(name)] for name in ("unoccluded", "level"))
     geometric = geometric * clarity_score(unoccluded, framed, 1.0 - unhindered, level)
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     for row, score in enumerate(rows.floats("score")):
         own = {name: values[row] for name, values in scores.items() if np.isfinite(values[row])}
         uncalled = sorted(name for name in own if not asked[name] and not annotated[row])
@@ -89,12 +89,10 @@ def anchor_score(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor says how far off its object's front it is; a goal more than 60 degrees off says why."""
-    scene, objects = scene_mesh(data).scene, data["objects"]
-    item = objects.find("object_id", rows.column("object_id"))
-    nodes, off = objects.texts("mesh_node"), rows.floats("off_front_rad")
+    scene, nodes, off = data.mesh, data["objects"].texts("mesh_node"), rows.floats("off_front_rad")
     reasons, selected = rows.texts("no_front_reason"), rows.floats("selected") == 1.0
     places = rows.floats("x_m", "y_m", "z_m")
-    for row, k in enumerate(item.tolist()):
+    for row, k in enumerate(data.objects_of(rows).tolist()):
         if k < 0 or nodes[k] not in scene or not np.isfinite(places[row]).all():
             continue
         anatomy = scene[str(nodes[k])].anatomy
@@ -113,9 +111,8 @@ def anchor_front(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A selected anchor steps back as far as its object's picture was taken, in centimetres."""
     back, most = rows.floats("step_back_m"), data.pipeline.anchor_sample.step_back_m
-    item = data["objects"].find("object_id", rows.column("object_id"))
     selected, stored = rows.floats("selected") == 1.0, data["objects"].floats("step_back_m")
-    for row, k in enumerate(item.tolist()):
+    for row, k in enumerate(data.objects_of(rows).tolist()):
         expected = min(back[row], data.pipeline.reference_images.step_back_m)
         if not 0.0 <= back[row] <= most or abs(back[row] * 100.0 - round(back[row] * 100.0)) > _SAME_M:
             yield Finding(row, f"step_back_m = {back[row]:.6g}", f"0 to {most:g}, in centimetres")
@@ -126,15 +123,10 @@ def anchor_step(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("viewpoints", needs=("objects", "mesh"), after=("viewpoint_object",))
 def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is at the standoff from its object's surface and faces its centre; numbers count from 0."""
-    scene, objects, expected = scene_mesh(data).scene, data["objects"], data.pipeline.anchor_sample.standoff_m
-    item = objects.find("object_id", rows.column("object_id"))
+    expected = data.pipeline.anchor_sample.standoff_m
     place, yaw, number = rows.floats("x_m", "y_m", "z_m"), rows.floats("yaw_rad"), rows.ints("viewpoint_id")
-    centre, nodes = objects.floats("x_m", "y_m", "z_m"), objects.texts("mesh_node")
-    for k in np.unique(item[item >= 0]).tolist():
-        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
-        if nodes[k] not in scene or not len(own):
-            continue
-        distance = Surface.of(scene[str(nodes[k])]).distance_m(place[own])
+    centre = data["objects"].floats("x_m", "y_m", "z_m")
+    for k, own, distance in _distances(data, rows):
         off = np.abs(wrap_angle_rad(yaw[own] - yaw_towards(place[own], centre[k])))
         for n, row in enumerate(own.tolist()):
             if abs(distance[n] - expected) > _STANDOFF_M:
@@ -145,11 +137,21 @@ def viewpoint_place(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 yield Finding(row, f"viewpoint_id = {number[row]}", f"{n}")
 
 
+def _distances(data: SceneData, rows: Rows) -> Iterator[tuple[int, Ints, Floats]]:
+    """Objects in the mesh, by their row, with the rows that are at a place by each, and how far from its surface."""
+    scene, nodes = data.mesh, data["objects"].texts("mesh_node")
+    item, place = data.objects_of(rows), rows.floats("x_m", "y_m", "z_m")
+    for k in np.unique(item[item >= 0]).tolist():
+        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
+        if nodes[k] in scene and len(own):
+            yield k, own, Surface.of(scene[str(nodes[k])]).distance_m(place[own])
+
+
 @check("viewpoints", needs=("mesh",), after=("viewpoint_place",))
 def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A body can be at a viewpoint, inside the flight volume."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
-    low, high = scene_mesh(data).scene.bounds
+    world, radius = data.world, data.pipeline.embodiment.radius_m
+    low, high = data.mesh.bounds
     for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
         if not (np.isfinite(place).all() and ((place >= low) & (place <= high)).all()):
             yield Finding(row, "a place outside the flight volume", "one inside")
@@ -160,33 +162,22 @@ def viewpoint_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("objects",), after=("unknown_object",))
 def anchor_yaw(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor faces its object's centre, unless a person placed it."""
-    objects = data["objects"]
-    item = objects.find("object_id", rows.column("object_id"))
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
-    fit = np.flatnonzero(comparable(data, "objects", item) & ~annotated)
-    centre = objects.floats("x_m", "y_m", "z_m")[item[fit]]
-    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m")[fit], centre)
-    off = np.abs(wrap_angle_rad(rows.floats("yaw_rad")[fit] - yaw))
-    for k in np.flatnonzero(off > _SAME_RAD):
-        yield Finding(int(fit[k]), f"{rows.floats('yaw_rad')[fit[k]]:.6f} rad", f"{yaw[k]:.6f} rad")
+    item, own = data.objects_of(rows), rows.floats("yaw_rad")
+    centre = at(data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3), item)
+    yaw = yaw_towards(rows.floats("x_m", "y_m", "z_m"), centre)
+    fit = comparable(data, "objects", item) & (rows.texts("selected_by") != "annotation")
+    for row in np.flatnonzero(fit & (np.abs(wrap_angle_rad(own - yaw)) > _SAME_RAD)):
+        yield Finding(int(row), f"{own[row]:.6f} rad", f"{yaw[row]:.6f} rad")
 
 
 @check("anchors", needs=("objects", "mesh"), after=("unknown_object",))
 def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is 1 m from its object's surface (about that, where a person placed it), and says how far."""
-    scene = scene_mesh(data).scene
-    annotated = np.asarray(rows.texts("selected_by"), dtype=object) == "annotation"
+    annotated = rows.texts("selected_by") == "annotation"
     slack = np.where(annotated, SLACK_M + _SAME_M, _STANDOFF_M)
-    expected = data.pipeline.anchor_sample.standoff_m
-    nodes = data["objects"].texts("mesh_node")
-    item = data["objects"].find("object_id", rows.column("object_id"))
-    place, stored = rows.floats("x_m", "y_m", "z_m"), rows.floats("surface_distance_m")
-    for k in np.unique(item[item >= 0]).tolist():
-        if nodes[k] not in scene:
-            continue
-        own = np.flatnonzero((item == k) & np.isfinite(place).all(axis=1))
-        found = Surface.of(scene[str(nodes[k])]).distance_m(place[own]) if len(own) else np.empty(0)
-        for row, distance in zip(own.tolist(), found.tolist(), strict=True):
+    expected, stored = data.pipeline.anchor_sample.standoff_m, rows.floats("surface_distance_m")
+    for _, own, distances in _distances(data, rows):
+        for row, distance in zip(own.tolist(), distances.tolist(), strict=True):
             if abs(distance - expected) > slack[row]:
                 yield Finding(row, f"{distance:.4f} m from the object's surface", f"{expected:g} m")
             elif abs(distance - stored[row]) > _SAME_M:
@@ -196,7 +187,7 @@ def anchor_surface(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("anchors", needs=("mesh",), after=("anchor_surface",))
 def anchor_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor is free of collision, and says how far the nearest surface is."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    world, radius = data.world, data.pipeline.embodiment.radius_m
     stored = rows.floats("clearance_m")
     for row, place in enumerate(rows.floats("x_m", "y_m", "z_m")):
         distance = world.distance_m(place) if np.isfinite(place).all() else np.nan

@@ -16,7 +16,6 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.scenes.model import Instance, Scene
@@ -58,11 +57,11 @@ def route_below_ground(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     paths = data.paths
     points, pose = _along(paths.xyz, paths.first)
     buried = _below(ground, points)
-    route = np.searchsorted(paths.first, pose[buried], side="right") - 1
-    for k, first in zip(*np.unique(route, return_index=True), strict=True):
+    route = paths.route_of(pose[buried])
+    for row, first in zip(*np.unique(route, return_index=True), strict=True):
         at = int(np.flatnonzero(buried)[first])
-        position = f"below ground at {place_text(points[at])}, after pose {pose[at] - paths.first[k]}"
-        yield Finding(int(paths.rows[k]), f"{position}, {int((route == k).sum())} samples of the way", "above ground")
+        position = f"below ground at {place_text(points[at])}, after pose {pose[at] - paths.first[row]}"
+        yield Finding(int(row), f"{position}, {int((route == row).sum())} samples of the way", "above ground")
 
 
 def _buried(data: SceneData, places: Floats) -> Iterator[Finding]:
@@ -93,15 +92,14 @@ def _along(xyz: Floats, first: np.ndarray) -> tuple[Floats, np.ndarray]:
 def _below(ground: TriangleRayCaster, points: Floats) -> Mask:
     found = np.zeros(len(points), dtype=np.bool_)
     if len(points):
-        roofed = np.flatnonzero(np.isfinite(ground.first_hit(points, np.repeat(_UP, len(points), axis=0))[0]))
-        if len(roofed):
-            beneath, _ = ground.first_hit(points[roofed], np.repeat(_DOWN, len(roofed), axis=0))
-            found[roofed] = np.isinf(beneath)
+        found = np.isfinite(ground.first_hit(points, np.repeat(_UP, len(points), axis=0))[0])
+    if found.any():
+        found[found] = np.isinf(ground.first_hit(points[found], np.repeat(_DOWN, found.sum(), axis=0))[0])
     return found
 
 
 def _ground(data: SceneData) -> TriangleRayCaster | None:
-    return data.cached("ground", lambda: open_ground(scene_mesh(data).scene))
+    return data.cached("ground", lambda: open_ground(data.mesh))
 
 
 def open_ground(scene: Scene) -> TriangleRayCaster | None:

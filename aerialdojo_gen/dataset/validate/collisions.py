@@ -13,7 +13,6 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.planning.certify import corners
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -27,23 +26,21 @@ _HALVINGS = 14
 @check("routes", needs=("mesh",), after=_FITS, samples=True)
 def route_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
-    for k, row in data.sampled_routes():
-        if hit := _hit(world, corners(data.paths.xyz[data.paths.of(k)]), radius):
+    world, radius = data.world, data.pipeline.embodiment.radius_m
+    for row in data.sampled_routes():
+        if hit := _hit(world, corners(data.paths.xyz[data.paths.of(row)]), radius):
             yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
 @check("routes", needs=("mesh",), after=(*_FITS, "action_order", "replay_differs", "route_collision"), samples=True)
 def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the replayed actions touches no surface."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    world, radius = data.world, data.pipeline.embodiment.radius_m
     paths = data.paths
-    for k, row in data.sampled_routes("list_lengths_differ", "action_order", "replay_differs"):
-        where = paths.of(k)
-        start = (*paths.xyz[where][0], paths.yaw[where][0])
-        flown = replay(start, paths.action[where][:-1])[:, :3]
+    for row in data.sampled_routes("list_lengths_differ", "action_order", "replay_differs"):
+        flown = replay(paths.starts[row], paths.action[paths.of(row)][:-1])[:, :3]
         # Where the two agree to the last bit but for the Approach, the certificate above is this one too.
-        if np.array_equal(flown[:-1], paths.xyz[where][:-1]):
+        if np.array_equal(flown[:-1], paths.xyz[paths.of(row)][:-1]):
             continue
         if hit := _hit(world, corners(flown), radius):
             yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
@@ -52,11 +49,10 @@ def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 @check("routes", needs=("mesh",), after=(*_FITS, "route_collision"), samples=True)
 def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The stored clearance is right: a body a little thinner passes everywhere, one a little thicker does not."""
-    world = scene_mesh(data).world
-    cap = data.pipeline.plan.clearance_cap_m
+    world, cap = data.world, data.pipeline.plan.clearance_cap_m
     stored, paths = rows.floats("min_clearance_m"), data.paths
-    for k, row in data.sampled_routes(*_FITS, "route_collision", "null_value", "not_finite"):
-        legs, stored_m = corners(paths.xyz[paths.of(k)]), float(stored[row])
+    for row in data.sampled_routes(*_FITS, "route_collision", "null_value", "not_finite"):
+        legs, stored_m = corners(paths.xyz[paths.of(row)]), float(stored[row])
         if stored_m > cap + _CLEARANCE_M:
             yield Finding(row, f"{stored_m:.6g} m", f"{cap:g} m at most")
             continue

@@ -14,8 +14,7 @@ import numpy as np
 import shapely
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import MESH_CHECKS, SceneMesh, scene_mesh
+from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Ints, Rows, SceneData, place_text
 from aerialdojo_gen.geometry.columns import ColumnIndex
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -28,11 +27,10 @@ _ASIDE_M = 0.1  # so far aside of what it rests on may its middle be
 @check("scenes", needs=("mesh",), after=MESH_CHECKS)
 def thing_hovers(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """Nothing hovers: all that is in a scene touches the rest of it, and its things rest on something or hang."""
-    mesh = scene_mesh(data)
-    scene = mesh.scene
+    scene = data.mesh
     if scene.imported:
         return  # Its pieces are as its author cut them.
-    apart, air = _apart(mesh), _Air(scene)
+    apart, air = _apart(data), _Air(scene)
     for k, thing in enumerate(scene.instances):
         at = f"{thing.node} at {place_text(thing.centroid)}"
         if apart[k]:
@@ -41,14 +39,14 @@ def thing_hovers(data: SceneData, _rows: Rows) -> Iterator[Finding]:
             yield Finding(0, f"{at} has {gap:.2f} m of air below", "support under its middle within 0.05 m")
 
 
-def _apart(mesh: SceneMesh) -> list[bool]:
+def _apart(data: SceneData) -> list[bool]:
     """Whether each instance has no way from contact to contact to the widest one, which is the ground."""
-    boxes = np.array([i.bounds for i in mesh.scene.instances])
+    boxes = np.array([i.bounds for i in data.mesh.instances])
     low, high = boxes[:, 0] - _AIR_M, boxes[:, 1]
     close = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
-    group = np.arange(len(boxes))
+    group, world = np.arange(len(boxes)), data.world
     for a, b in zip(*np.nonzero(np.triu(close, 1)), strict=True):
-        if group[a] != group[b] and mesh.world.within(int(a), int(b), _AIR_M):
+        if group[a] != group[b] and world.within(int(a), int(b), _AIR_M):
             group[group == group[b]] = group[a]
     widest = int(np.argmax(np.prod(np.ptp(boxes[:, :, :2], axis=1), axis=1)))
     return [bool(own != group[widest]) for own in group]

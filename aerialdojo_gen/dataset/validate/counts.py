@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.base.safe_parse import loads_json
@@ -20,34 +22,30 @@ from aerialdojo_gen.store.schemas import SETTINGS, SUBSETS
 _PATH_SHARE = 0.005
 
 
-@dataclass(frozen=True)
+@dataclass
 class SceneCounts:
     """What a scene of the release holds, for the counts of the whole."""
 
     scene: str  # Name
-    routes: Counter[tuple[str, str]] = field(default_factory=Counter)  # Counter of (str, str)
-    tasks: Counter[str] = field(default_factory=Counter)  # Instances by folder
+    complete: bool  # Whether all of its tables could be read
+    rows: Counter[tuple[str, str]] = field(default_factory=Counter)  # Rows by table (tasks, routes) and folder
+    routes: Counter[tuple[str, str]] = field(default_factory=Counter)  # Routes by folder and setting
     path_m: float = 0.0  # Summed length of the routes, metres
     images: tuple[str, ...] = ()  # Ids of the reference images
-    complete: bool = False  # Whether all of its tables could be read
 
 
 def count_scene(data: SceneData, complete: bool) -> SceneCounts:
     """Count what a scene holds."""
-    routes: Counter[tuple[str, str]] = Counter()
-    tasks: Counter[str] = Counter()
-    path, images = 0.0, []
-    if "routes" in data.tables:
-        rows = data["routes"]
-        folders = [part.split("/")[-2] for part in rows.parts]
-        routes.update(zip((folders[k] for k in rows.part_of), map(str, rows.texts("setting")), strict=True))
-        path = float(data.paths.length_m.sum())
-    if "tasks" in data.tables:
-        rows = data["tasks"]
-        tasks.update(rows.parts[k].split("/")[-2] for k in rows.part_of)
+    counts = SceneCounts(data.scene, complete)
+    for rows in (data[name] for name in ("tasks", "routes") if name in data.tables):
+        folders = [rows.parts[k].split("/")[-2] for k in rows.part_of]
+        counts.rows.update((rows.name, folder) for folder in folders)
+        if rows.name == "routes":
+            counts.routes.update(zip(folders, map(str, rows.texts("setting")), strict=True))
+            counts.path_m = float(np.nansum(data.paths.length_m))
     if "objects" in data.tables:
-        images = [text for text in data["objects"].texts("reference_image_id") if text]
-    return SceneCounts(data.scene, routes, tasks, path, tuple(images), complete)
+        counts.images = tuple(text for text in data["objects"].texts("reference_image_id") if text)
+    return counts
 
 
 def scene_counts(data: SceneData, counts: SceneCounts) -> Outcome:
@@ -81,12 +79,13 @@ def whole_counts(
     release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline, every_scene: bool
 ) -> list[Outcome]:
     """Check what needs all scenes together."""
-    outcomes = [Outcome(name, "counts") for name in WHOLE_CHECKS]
+    partial = "" if all(counts.complete for counts in totals) else "a scene cannot be read"
+    partial = partial if every_scene else "only some scenes were selected"
+    paper = partial or _not_the_papers(totals, pipeline)
+    outcomes = [Outcome(name, "counts", skipped=paper if name in _OF_PAPER else partial) for name in WHOLE_CHECKS]
     for outcome, judge in zip(outcomes, (_splits, _path, _card, _images), strict=True):
-        partial = "" if every_scene else "only some scenes were selected"
-        if not partial and not all(counts.complete for counts in totals):
-            partial = "a scene cannot be read"
-        outcome.skipped = partial or judge(outcome, release, totals, pipeline)
+        if not outcome.skipped:
+            judge(outcome, release, totals)
     return outcomes
 
 
@@ -96,11 +95,10 @@ WHOLE_CHECKS = {
     "card_counts": "The dataset card tells the numbers that are there.",
     "image_id_shared": "A picture's id stands in one scene.",
 }
+_OF_PAPER = ("split_counts", "path_total")
 
 
-def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
-    if why := _not_the_papers(totals, pipeline):
-        return why
+def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
     for (side, subset), settings in splits().items():
         folder = f"{side.lower()}_{subset}"
         for setting, n in settings.items():
@@ -108,26 +106,22 @@ def _splits(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], 
             found = sum(counts.routes[folder, setting] for counts in totals)
             if found != n:
                 outcome.fault(f"{found:,}", f"{n:,}", part=f"routes/{folder}", key=f"{setting} tasks")
-    return ""
 
 
-def _path(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:
-    if why := _not_the_papers(totals, pipeline):
-        return why
-    found, expected = (sum(x) for x in ((t.path_m for t in totals), (p.path_m for p in inventory().values())))
+def _path(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
+    found, expected = sum(one.path_m for one in totals), sum(scene.path_m for scene in inventory().values())
     outcome.rows = 1
     if abs(found - expected) > _PATH_SHARE * expected:
         stated = f"{found / 1000:,.1f} km", f"{expected / 1000:,.1f} km to within {_PATH_SHARE:.1%}"
         outcome.fault(*stated, table="routes")
-    return ""
 
 
-def _card(outcome: Outcome, release: Release, totals: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
+def _card(outcome: Outcome, release: Release, totals: Sequence[SceneCounts]) -> None:
     card = _text(release, "README.md")
     if card is None:
         outcome.rows = 1
         outcome.fault("no file", "the dataset card", part="README.md")
-        return ""
+        return
     stated = _of_card(card)
     machine = _text(release, "croissant.json")
     if machine is not None:
@@ -137,13 +131,11 @@ def _card(outcome: Outcome, release: Release, totals: Sequence[SceneCounts], _pi
             outcome.fault("no record sets", "a Croissant description", part="croissant.json")
     for file, table, folder, n in stated:
         outcome.rows += 1
-        if table == "tasks":
-            found = sum(counts.tasks[folder] for counts in totals)
-        else:
-            found = sum(k for counts in totals for (name, _), k in counts.routes.items() if name == folder)
+        found = sum(counts.rows[table, folder] for counts in totals)
         if n != found:
             outcome.fault(f"{n:,} rows told", f"{found:,}", table=table, part=file, key=folder)
-    return "" if outcome.rows else "neither card nor croissant.json tells the rows of the splits"
+    if not outcome.rows:
+        outcome.skipped = "neither card nor croissant.json tells the rows of the splits"
 
 
 def _text(release: Release, relative: str) -> str | None:
@@ -171,7 +163,7 @@ def _of_croissant(text: str) -> list[tuple[str, str, str, int]]:
     ]
 
 
-def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], _pipeline: Pipeline) -> str:
+def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts]) -> None:
     first: dict[str, str] = {}
     for counts in totals:
         for image_id in counts.images:
@@ -179,7 +171,6 @@ def _images(outcome: Outcome, _release: Release, totals: Sequence[SceneCounts], 
             if first.setdefault(image_id, counts.scene) != counts.scene:
                 key, found = f"reference_image_id={image_id}", f"of {first[image_id]} too"
                 outcome.fault(found, "one scene", scene=counts.scene, table="objects", key=key)
-    return ""
 
 
 def _not_the_papers(totals: Sequence[SceneCounts], pipeline: Pipeline) -> str:

@@ -8,11 +8,9 @@ release's own: its tables and meshes, no annotation file.
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from aerialdojo_gen.annotations.claims import Claim, SceneClaims
@@ -23,10 +21,9 @@ from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
-from aerialdojo_gen.scenes.catalogue import Catalogue, load_catalogue
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, UncheckedError
+from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance
 
 _FAULTS = ("object_node", "object_category")
@@ -49,39 +46,30 @@ _ANY_COLOUR = f"({'|'.join(_COLOURS)})"
 _NO_PART = {*_COLOURS, "and", "dark", "light", "pale", "bright", "deep"}
 
 
-@dataclass(frozen=True)
-class _SceneTexts:
-    """What is said of a scene's things, and what texts are matched with."""
-
-    claims: SceneClaims
-    matcher: Matcher
-
-
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
 def object_claims(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every claim about an object is so of the mesh, and of the very things that it names."""
-    words = _scene_texts(data)
-    for row, i in _placed(words, rows):
+    known = _scene_claims(data)
+    for row, i in _placed(known, rows):
         claims = _claims(rows, row)
         if claims is None:
             yield Finding(row, f"claims = {str(rows.texts('claims')[row])[:80]!r}", "a JSON list of claims")
-        elif wrong := next((claim for claim in claims if not words.claims.is_true(claim, i)), None):
+        elif wrong := next((claim for claim in claims if not known.is_true(claim, i)), None):
             said = f"{wrong.kind} {wrong.key!r} {' and '.join(thing.node for thing in wrong.things)}".strip()
-            yield Finding(row, f"it claims {said}", f"what is so of {words.claims.scene.instances[i].node}")
+            yield Finding(row, f"it claims {said}", f"what is so of {data.mesh.instances[i].node}")
 
 
 @check("objects", needs=("landmarks", "mesh"), after=_FAULTS)
 def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Names and texts name their own thing, and say no value, relation or direction that is not so in the mesh."""
-    words = _scene_texts(data)
-    instances = words.claims.scene.instances
-    for row, i in _placed(words, rows):
+    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
+    for row, i in _placed(known, rows):
         made = {one["text"] for one in _made(rows, row) if one["claims"]}
         for column, text in (("name", rows.texts("name")[row] or ""), *_texts(rows, row)):
             # What was made of claims is held to these, not read back.
-            wrong = "" if text in made else next(iter(words.matcher.faults(i, text)), "")
+            wrong = "" if text in made else next(iter(matcher.faults(i, text)), "")
             wrong = wrong or _recoloured(instances[i], text)
-            if wrong := wrong or _turned(words, i, text):
+            if wrong := wrong or _turned(known, i, text):
                 yield Finding(row, f"{column} = {text!r}: {wrong}", f"what is so of {instances[i].node}")
                 break
 
@@ -89,38 +77,35 @@ def object_words(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("objects", needs=("landmarks", "mesh"), after=(*_FAULTS, "object_words", "object_claims"))
 def object_ambiguous(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A text fits nothing else of its category in the same direction of the same landmark."""
-    words = _scene_texts(data)
-    instances = words.claims.scene.instances
-    for row, i in _placed(words, rows):
+    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
+    for row, i in _placed(known, rows):
         own = _claims(rows, row) or []
         made = [(one["text"], one["claims"]) for one in _made(rows, row) if one["claims"]]
         texts = [(text, [own[k] for k in chosen if k < len(own)]) for text, chosen in made]
-        known = {text for text, _ in made}
-        texts += [(t, words.matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in known]
+        told = {text for text, _ in made}
+        texts += [(t, matcher.true_claims(i, t)) for _, t in _texts(rows, row) if t not in told]
         for text, claims in texts or [("all that is claimed", own)]:
-            if others := _listed(instances, words.claims.distractors(i, claims)):
+            if others := _listed(instances, known.distractors(i, claims)):
                 yield Finding(row, f"{text!r}, which fits {others} as well", "words that fit one thing")
                 break
 
 
-def _placed(words: _SceneTexts, rows: Rows) -> Iterator[tuple[int, int]]:
+def _placed(known: SceneClaims, rows: Rows) -> Iterator[tuple[int, int]]:
     """Rows whose node is in the mesh, and its index there."""
-    index = words.claims.geometry.index
+    index = known.geometry.index
     yield from ((row, index[str(node)]) for row, node in enumerate(rows.texts("mesh_node")) if node in index)
-
-
-_MADE = "paraphrases"
 
 
 def _made(rows: Rows, row: int) -> list[dict[str, Any]]:
     """The texts that the program made of an object's claims."""
-    return (rows.table[_MADE][row].as_py() or []) if _MADE in rows.table.column_names else []
+    return rows.table["paraphrases"][row].as_py() or []
 
 
 def _texts(rows: Rows, row: int) -> list[tuple[str, str]]:
     """All texts about an object, and their columns."""
     text = rows.texts("description")[row]
-    return [*([("description", text)] if text else []), *((_MADE, one["text"]) for one in _made(rows, row))]
+    made = [("paraphrases", one["text"]) for one in _made(rows, row)]
+    return [("description", text), *made] if text else made
 
 
 def _claims(rows: Rows, row: int) -> list[Claim] | None:
@@ -132,13 +117,13 @@ def _claims(rows: Rows, row: int) -> list[Claim] | None:
         return None
 
 
-def _turned(words: _SceneTexts, i: int, text: str) -> str:
+def _turned(known: SceneClaims, i: int, text: str) -> str:
     """Say which direction from the object's own landmark a text says, where the goal says another."""
-    bearing = words.claims.bearings[i]
+    bearing = known.bearings[i]
     if bearing is None:
         return ""
-    node = words.claims.scene.instances[words.claims.landmarks[bearing.landmark]].node
-    name = next(name for name, own in words.claims.landmark_names.items() if own == node)
+    node = known.scene.instances[known.landmarks[bearing.landmark]].node
+    name = next(name for name, own in known.landmark_names.items() if own == node)
     plain = re.sub(r"\b(north|south)[- ](east|west)", r"\1\2", text.lower())
     said = re.findall(rf"\b({'|'.join(DIRECTIONS)})(?:ern)?(?: side)? of the {re.escape(name)}\b", plain)
     wrong = [direction for direction in said if direction != bearing.direction]
@@ -165,47 +150,42 @@ def text_form(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("landmarks", needs=("mesh",), after=("landmark_node",))
 def landmark_name(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A landmark's name is one of a kind, names its own thing, and says no value that the mesh does not bear out."""
-    words = _scene_texts(data)
+    known, matcher, instances = _scene_claims(data), _matcher(data), data.mesh.instances
     first = dict[str, int]()
-    for row, i in _placed(words, rows):
+    for row, i in _placed(known, rows):
         text = rows.texts("name")[row] or ""
-        wrong = next(iter(words.matcher.faults(i, text)), "") or _recoloured(words.claims.scene.instances[i], text)
-        wrong = wrong or _other_side(words, i, text)
+        wrong = next(iter(matcher.faults(i, text)), "") or _recoloured(instances[i], text)
+        wrong = wrong or _other_side(known, i, text)
         if first.setdefault(text.lower(), row) != row:
             wrong = f"as {rows.key(first[text.lower()])}"
         if wrong:
-            node = words.claims.scene.instances[i].node
-            yield Finding(row, f"name = {text!r}: {wrong}", f"what is so of {node}")
+            yield Finding(row, f"name = {text!r}: {wrong}", f"what is so of {instances[i].node}")
 
 
-def _scene_texts(data: SceneData) -> _SceneTexts:
-    return data.cached("words", lambda: _read_scene_texts(data))
+def _matcher(data: SceneData) -> Matcher:
+    return data.cached("matcher", lambda: Matcher(_scene_claims(data)))
 
 
-def _read_scene_texts(data: SceneData) -> _SceneTexts:
-    scene = scene_mesh(data).scene
-    geometry = data.cached("relations", lambda: SceneGeometry(scene))
+def _scene_claims(data: SceneData) -> SceneClaims:
+    return data.cached("claims", lambda: _read_claims(data))
+
+
+def _read_claims(data: SceneData) -> SceneClaims:
+    scene = data.mesh
     marks = data["landmarks"]
     nodes = [str(node) for node in marks.texts("mesh_node")]
     if not nodes or len(set(nodes)) < len(nodes) or not all(node in scene for node in nodes):
         raise UncheckedError("the landmarks are at fault")
-    catalogue = _catalogue(data.pipeline.scene_assets)
+    catalogue = None
+    if data.pipeline.scene_assets:
+        with contextlib.suppress(AerialDojoError, OSError):
+            catalogue = load_catalogue(data.pipeline.scene_assets)
     if catalogue is None:
         raise UncheckedError("no catalogue of props: the pipeline names no scene_assets")
     named = zip(marks.ints("landmark_id").tolist(), map(str, marks.texts("name")), nodes, strict=True)
-    landmarks = sorted(
-        (Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named), key=lambda mark: mark.id
-    )
-    claims = SceneClaims(Vocabulary(scene, catalogue), landmarks, geometry)
-    return _SceneTexts(claims, Matcher(claims))
-
-
-@lru_cache(maxsize=2)
-def _catalogue(folder: Path | None) -> Catalogue | None:
-    try:
-        return load_catalogue(folder) if folder else None
-    except (AerialDojoError, OSError):
-        return None
+    landmarks = [Landmark.model_construct(id=k, name=name, node=node) for k, name, node in named]
+    landmarks.sort(key=lambda mark: mark.id)
+    return SceneClaims(Vocabulary(scene, catalogue), landmarks, SceneGeometry(scene))
 
 
 def _recoloured(instance: Instance, text: str) -> str:
@@ -230,11 +210,11 @@ def _recoloured(instance: Instance, text: str) -> str:
     return ""
 
 
-def _other_side(words: _SceneTexts, i: int, text: str) -> str:
+def _other_side(known: SceneClaims, i: int, text: str) -> str:
     """Say which side a landmark is said to be on of its like, where it is on another."""
-    geometry, marks = words.claims.geometry, words.claims.landmarks
+    geometry = known.geometry
     category = geometry.scene.instances[i].category
-    alike = [j for j in marks if j != i and geometry.scene.instances[j].category == category]
+    alike = [j for j in known.landmarks if j != i and geometry.scene.instances[j].category == category]
     for side, (dx, dy) in _SIDES.items():
         if alike and side in _split(text):
             offset = geometry.centres[i, :2] - geometry.centres[alike, :2].mean(axis=0)

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import SearchAttempt
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.planning.attempt import costs_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -50,15 +49,14 @@ _SHORTER_M, _SHORTER_SHARE = 1.0, 0.15
 @check("routes", needs=("mesh",), after=_FITS, samples=True)
 def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """No piece of a route is flown for nothing: the straight way between its ends is blocked, or hardly shorter."""
-    world, room = scene_mesh(data).world, data.pipeline.embodiment.radius_m + _ROOM_M
-    paths = data.paths
-    for k, row in data.sampled_routes(*_FITS):
-        positions = paths.xyz[paths.of(k)]
+    world, room = data.world, data.pipeline.embodiment.radius_m + _ROOM_M
+    for row in data.sampled_routes(*_FITS):
+        positions = data.paths.xyz[data.paths.of(row)]
         if not np.isfinite(positions).all():
             continue
         for first, last, flown, straight in _pieces(positions):
             if _straight_is_free(world, positions[first], positions[last], room):
-                if _flown_shorter(data, k) is None:
+                if _flown_shorter(data, row) is None:
                     break
                 found = f"{flown:.2f} m from pose {first} to pose {last}"
                 yield Finding(row, found, f"{straight:.2f} m: the straight way is free")
@@ -69,15 +67,14 @@ def needless_piece(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No route is much longer than a way over a grid of 1 m cells, found anew from every goal."""
     paths = data.paths
-    left_out = data.flagged("routes", (*_FITS, "goal_anchor", "end_position"))[paths.rows]
-    goals = rows.floats("goal_x_m", "goal_y_m", "goal_z_m")[paths.rows]
-    left_out |= ~np.isfinite(goals).all(axis=1) | ~np.isfinite(paths.starts).all(axis=1)
-    fit = np.flatnonzero(~left_out)
+    goals = rows.floats("goal_x_m", "goal_y_m", "goal_z_m")
+    finite = np.isfinite(goals).all(axis=1) & np.isfinite(paths.starts).all(axis=1)
+    fit = np.flatnonzero(finite & ~data.flagged("routes", (*_FITS, "goal_anchor", "end_position")))
     if not len(fit):
         return
     plan, embodiment = data.pipeline.plan, data.pipeline.embodiment
     grid = ClearanceGrid.build(
-        scene_mesh(data).scene, cell_m=_CELL_M, radius_m=embodiment.radius_m, margin_m=plan.margin_m,
+        data.mesh, cell_m=_CELL_M, radius_m=embodiment.radius_m, margin_m=plan.margin_m,
         cap_m=plan.clearance_cap_m,
     )  # fmt: skip
     cost = np.empty(grid.moves.shape, np.float32)
@@ -92,29 +89,26 @@ def long_way_round(data: SceneData, rows: Rows) -> Iterator[Finding]:
         expand_cost(seeds, order, longest, grid.arrays.cell, grid.moves, cost, wide)
         ways = np.asarray(costs_at(np.ascontiguousarray(paths.starts[own, :3]), grid.arrays, cost))
         over = paths.length_m[own] - ways
-        for k in np.flatnonzero(over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)):
-            shorter = _flown_shorter(data, int(own[k]))
-            if shorter is not None:
-                found = f"L = {paths.length_m[own[k]]:.2f} m"
-                yield Finding(int(paths.rows[own[k]]), found, f"{shorter:.2f} m, by a wider search")
+        for row in own[over > np.maximum(_LONGER_M, _LONGER_SHARE * ways)].tolist():
+            if (shorter := _flown_shorter(data, row)) is not None:
+                yield Finding(row, f"L = {paths.length_m[row]:.2f} m", f"{shorter:.2f} m, by a wider search")
 
 
-def _flown_shorter(data: SceneData, k: int) -> float | None:
-    """Metres of a route that the wide search finds, where it is clearly better than path `k`; else None.
+def _flown_shorter(data: SceneData, row: int) -> float | None:
+    """Metres of a route that the wide search finds, where it is clearly better than a row's; else None.
 
     Clearly is by `_SHORTER_M`, and by a share, of what routes are searched for: metres, and what they cost beside for
     surfaces that they come near and an Approach that does not fly ahead (`aerialdojo_gen.planning.preference`).
     """
     config = data.pipeline.plan.model_copy(update={"ladder": (_WIDE,), "min_detour_ratio": 1.0})
     radius_m = data.pipeline.embodiment.radius_m
-    planner = data.cached("wide", lambda: Planner(scene_mesh(data).scene, config, radius_m))
-    paths = data.paths
-    where = paths.of(k)
-    poses = np.column_stack([paths.xyz[where], paths.yaw[where]])
+    planner = data.cached("wide", lambda: Planner(data.mesh, config, radius_m))
+    poses = data.paths.poses(row)
     (route,) = planner.plan_target(poses[-1], [poses[0]])
     if route.outcome != "SOLVED":
         return None
-    own, other = _cost_m(planner, poses, paths.action[where]), _cost_m(planner, route.poses, route.actions)
+    own = _cost_m(planner, poses, data.paths.action[data.paths.of(row)])
+    other = _cost_m(planner, route.poses, route.actions)
     return None if own - other <= max(_SHORTER_M, _SHORTER_SHARE * own) else float(route.length_m)
 
 

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData, UncheckedError, at, pairs_of
 from aerialdojo_gen.geometry.cameras import Camera, project, view_pose
 from aerialdojo_gen.geometry.motion import DISPLACEMENTS, replay
 from aerialdojo_gen.geometry.rays import instance_caster
@@ -45,7 +44,7 @@ _OF_TASK = (
 
 def _known(rows: Rows, *names: str) -> Mask:
     """Which of some columns every row says, (n, columns) bool."""
-    return np.column_stack([rows.column(name).is_valid().to_numpy(zero_copy_only=False) for name in names])
+    return np.column_stack([rows.valid(name) for name in names])
 
 
 @check("routes", after=_OF_ROUTE)
@@ -60,7 +59,7 @@ def difficulty_told(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=(*_OF_ROUTE, "difficulty_told"))
 def free_length(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The shortest length without obstacles is no more than level flight and a climb, and no Approach saves more."""
-    paths, stored = data.paths, rows.floats("free_length_m")[data.paths.rows]
+    paths, stored = data.paths, rows.floats("free_length_m")
     way = paths.ends[:, :3] - paths.starts[:, :3]
     bearing = np.arctan2(way[:, 1], way[:, 0]) - paths.starts[:, 3]
     turn = math.pi / 12
@@ -69,16 +68,16 @@ def free_length(data: SceneData, rows: Rows) -> Iterator[Finding]:
     level = np.hypot(way[:, 0], way[:, 1]) * (np.sin(offset) + np.sin(turn - offset)) / math.sin(turn)
     most = level + np.abs(way[:, 2])
     least = np.maximum(paths.euclidean_m, most - _SAVED_BY_APPROACH * data.pipeline.plan.max_approach_m)
-    for k in np.flatnonzero((stored < least - _LENGTH_M) | (stored > np.minimum(most, paths.length_m) + _LENGTH_M)):
-        yield Finding(int(paths.rows[k]), f"{stored[k]:.9g} m", f"{least[k]:.6g} to {most[k]:.6g} m")
+    off = (stored < least - _LENGTH_M) | (stored > np.minimum(most, paths.length_m) + _LENGTH_M)
+    for row in np.flatnonzero(off).tolist():
+        yield Finding(row, f"{stored[row]:.9g} m", f"{least[row]:.6g} to {most[row]:.6g} m")
 
 
 @check("routes", after=(*_OF_ROUTE, "difficulty_told", "free_length"))
 def plan_detour(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`plan_detour` is L over the shortest length without obstacles, and never less than 1."""
-    paths = data.paths
-    ratio = np.maximum(paths.length_m / np.maximum(rows.floats("free_length_m")[paths.rows], 1e-12), 1.0)
-    yield from _unlike(data, rows, "plan_detour", ratio)
+    ratio = np.maximum(data.paths.length_m / np.maximum(rows.floats("free_length_m"), 1e-12), 1.0)
+    yield from _unlike(rows, "plan_detour", ratio)
 
 
 @check("routes", after=(*_OF_ROUTE, "difficulty_told"))
@@ -88,32 +87,29 @@ def climb(data: SceneData, rows: Rows) -> Iterator[Finding]:
     up = np.maximum(DISPLACEMENTS[np.clip(paths.action, STOP, APPROACH), 2], 0.0)
     rise = np.append(np.diff(paths.xyz[:, 2]), 0.0)
     up = np.where(paths.action == APPROACH, np.maximum(rise, 0.0), up)
-    if len(paths.rows):
-        yield from _unlike(data, rows, "climb_m", np.add.reduceat(up, paths.first[:-1]))
+    yield from _unlike(rows, "climb_m", paths.sums(up))
 
 
-def _unlike(data: SceneData, rows: Rows, name: str, expected: Floats) -> Iterator[Finding]:
-    stored = rows.floats(name)[data.paths.rows]
-    for k in np.flatnonzero(np.abs(stored - expected) > _LENGTH_M):
-        yield Finding(int(data.paths.rows[k]), f"{name} = {stored[k]:.9g}", f"{expected[k]:.9g}")
+def _unlike(rows: Rows, name: str, expected: Floats) -> Iterator[Finding]:
+    stored = rows.floats(name)
+    for row in np.flatnonzero(np.abs(stored - expected) > _LENGTH_M).tolist():
+        yield Finding(row, f"{name} = {stored[row]:.9g}", f"{expected[row]:.9g}")
 
 
 @check("routes", after=(*_OF_ROUTE, "difficulty_told"))
 def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`agent_action` has the 16 actions alone, ends in Stop, and leads to within an Approach of the goal in time."""
     budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
-    paths, settings, known = data.paths, rows.texts("setting"), _known(rows, "agent_action")[:, 0]
+    paths, settings = data.paths, rows.texts("setting")
     lists = rows.column("agent_action")
     ends, actions = lists.offsets.to_numpy(), lists.values.to_numpy(zero_copy_only=False)
     most_m = data.pipeline.plan.max_approach_m + _LENGTH_M
-    for k, row in enumerate(paths.rows.tolist()):
-        if not known[row]:
-            continue
+    for row in np.flatnonzero(paths.fit & rows.valid("agent_action")).tolist():
         flown = np.nan_to_num(actions[ends[row] : ends[row + 1]], nan=-1).astype(np.int64)
         if not len(flown) or flown[-1] != STOP or (flown[:-1] <= STOP).any() or (flown >= APPROACH).any():
             yield Finding(row, f"agent_action = {flown.tolist()[-8:]}", "actions 1 to 15, and Stop (0) at the end")
             continue
-        off = float(np.linalg.norm(replay(paths.starts[k], flown)[-1, :3] - paths.ends[k, :3]))
+        off = float(np.linalg.norm(replay(paths.starts[row], flown)[-1, :3] - paths.ends[row, :3]))
         budget = budgets.get(str(settings[row]), len(flown))
         if off > most_m or len(flown) > budget:
             landed = f"Stop at {off:.3f} m from the goal after {len(flown)} actions"
@@ -123,12 +119,12 @@ def agent_action(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", needs=("mesh",), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
 def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`straight_line_free` is true where the body's sweep from start to goal touches nothing, else false."""
-    world, radius = scene_mesh(data).world, data.pipeline.embodiment.radius_m
+    world, radius = data.world, data.pipeline.embodiment.radius_m
     paths, stored = data.paths, rows.floats("straight_line_free")
-    for k, row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled_routes(*_OF_ROUTE):
         if not np.isfinite(stored[row]):
             continue
-        start, goal = paths.starts[k, :3], paths.ends[k, :3]
+        start, goal = paths.starts[row, :3], paths.ends[row, :3]
         free = bool(stored[row])
         if free == world.segment_in_collision(start, goal, radius + (-_THICKNESS_M if free else _THICKNESS_M)):
             yield Finding(row, f"straight_line_free = {free}", str(not free))
@@ -137,14 +133,14 @@ def straight_line(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", needs=("mesh", "objects"), after=(*_OF_ROUTE, "difficulty_told"), samples=True)
 def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What the start sees of the target is what its pictures would show, and the view is the one that shows most."""
-    mesh, paths, n = scene_mesh(data), data.paths, data.pipeline.pair_objects.surface_points
-    things = {item.node: item for item in mesh.scene.instances}
+    paths, n = data.paths, data.pipeline.pair_objects.surface_points
+    things = {item.node: item for item in data.mesh.instances}
     nodes, ids = data["objects"].texts("mesh_node"), data["objects"].ints("object_id").tolist()
     stored, views = rows.floats("target_visible_at_start"), rows.texts("visible_view_at_start")
     of_target: dict[int, list[int]] = {}
-    for k, row in data.sampled_routes(*_OF_ROUTE):
+    for row in data.sampled_routes(*_OF_ROUTE):
         if np.isfinite(stored[row]):
-            of_target.setdefault(int(data.target_of_route[row]), []).append(k)
+            of_target.setdefault(int(data.target_of_route[row]), []).append(row)
     for target, routes in of_target.items():
         item = things.get(str(nodes[target])) if target >= 0 else None
         if item is None:
@@ -154,17 +150,17 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
         aims = np.tile(points, (len(routes), 1))
         facing = instance_caster(item).unobstructed(starts[:, :3], aims)
         free = np.flatnonzero(facing)
-        free = free[mesh.rays.visible(starts[free, :3], aims[free])]
+        free = free[data.rays.visible(starts[free, :3], aims[free])]
         inside = _in_pictures(starts[free], aims[free])
         by_view = np.stack([np.bincount(free[shown] // n, minlength=len(routes)) for shown in inside])
         in_any = np.bincount(free[inside.any(axis=0)] // n, minlength=len(routes))
-        for k, seen, some, bare in zip(routes, by_view.T, in_any, facing.reshape(-1, n).sum(axis=1), strict=True):
-            row, whole = int(paths.rows[k]), max(int(bare), 1)
+        for row, seen, some, bare in zip(routes, by_view.T, in_any, facing.reshape(-1, n).sum(axis=1), strict=True):
+            whole = max(int(bare), 1)
             share, best = float(some) / whole, {VIEWS[view] for view in np.flatnonzero(seen == seen.max())}
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
             either_way = max(_EITHER_WAY, n // _ONE_IN)
             if not _is_share(stored[row], share, whole, either_way) and not _is_share(
-                stored[row], share, whole, either_way + _edge_on(paths.starts[k, :3], points, normals)
+                stored[row], share, whole, either_way + _edge_on(paths.starts[row, :3], points, normals)
             ):
                 yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
@@ -202,11 +198,9 @@ def _in_pictures(starts: Floats, points: Floats) -> Mask:
 @check("tasks", needs=("routes",), after=_OF_TASK)
 def seen_in_train(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """`target_`, `start_` and `pair_seen_in_train` are true where a training task has that target, start, pair."""
-    train = np.asarray(rows.texts("subset"), dtype=object) == "train"
-    start, target = (
-        np.append(data["routes"].ints(f"{end}_object_id"), -1)[data.route_of_task].tolist()
-        for end in ("start", "target")
-    )
+    train = rows.texts("subset") == "train"
+    ends = (data["routes"].ints(f"{end}_object_id") for end in ("start", "target"))
+    start, target = (at(ids, data.route_of_task).tolist() for ids in ends)
     poses = [tuple(pose) for pose in rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()]
     for what, own in (("target", target), ("start", poses), ("pair", list(zip(start, target, strict=True)))):
         seen = {key for key, trains in zip(own, train, strict=True) if trains}
@@ -227,7 +221,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
     complete = _known(rows, *_SPLITS).all(axis=1)
     split = rows.texts("target_split")
     is_held_out = {end: rows.floats(f"{end}_held_out") for end in ("target", "start")}
-    ends = {end: np.append(routes.ints(f"{end}_object_id"), -1)[data.route_of_task].tolist() for end in is_held_out}
+    ends = {end: at(routes.ints(f"{end}_object_id"), data.route_of_task).tolist() for end in is_held_out}
     known: dict[int, bool] = {}
     for row in np.flatnonzero(complete).tolist():
         side = "test" if is_held_out["target"][row] or is_held_out["start"][row] else "train"
@@ -245,9 +239,7 @@ def split_by_objects(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def _has_salt(data: SceneData, key: bytes) -> bool:
     """Whether the release's ids were made with a key, by one of them."""
     routes = data["routes"]
-    pair = [routes.ints(name)[:1].tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
-    pairs = [f"{s}_{a}__{t}" for s, a, t in zip(*pair, strict=True)]
-    return [nav_id(data.scene, name, key) for name in pairs] == routes.texts("nav_id")[:1]
+    return [nav_id(data.scene, pair, key) for pair in pairs_of(routes)[:1]] == routes.texts("nav_id")[:1].tolist()
 
 
 @check("tasks")

@@ -7,19 +7,29 @@ from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.compute as pc
 
-from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData, pose_text, unequal
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import (
+    ALWAYS_AFTER,
+    START,
+    Ints,
+    Mask,
+    Rows,
+    SceneData,
+    UncheckedError,
+    at,
+    differing,
+    pose_text,
+)
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.pipeline.stages.work.rules import settings_of
 from aerialdojo_gen.store.schemas import SETTINGS, SPLIT_COLUMNS
 
 _SAME_PLACE_M = 1e-6
 _SHARED = (
-    "family", "scene_type", "partition", "subset", "setting", "action_budget", "start_x_m", "start_y_m", "start_z_m",
-    "start_yaw_rad", "target_name", "landmark", "direction", *SPLIT_COLUMNS,
+    "family", "scene_type", "partition", "subset", "setting", "action_budget", *START, "target_name", "landmark",
+    "direction", *SPLIT_COLUMNS,
 )  # fmt: skip
 _SAID_OF_ROUTE = (
     "duplicate_key", "task_in_both_subsets", "task_without_route", "task_instances", "task_scene", "task_setting",
@@ -46,13 +56,12 @@ def landmark_nearest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     landmarks = data["landmarks"]
     if not len(landmarks):
         raise UncheckedError("there is no landmark")
-    own = landmarks.find("landmark_id", rows.column("landmark_id"))
+    ids, own = landmarks.ints("landmark_id"), landmarks.find("landmark_id", rows.column("landmark_id"))
     away = rows.floats("x_m", "y_m")[:, None] - landmarks.floats("x_m", "y_m")[None]
     distance = np.linalg.norm(away, axis=2)
-    nearest = distance.argmin(axis=1)
     for row in np.flatnonzero(distance[np.arange(len(rows)), own] > distance.min(axis=1) + _SAME_PLACE_M):
-        ids = landmarks.ints("landmark_id")
-        yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{ids[nearest[row]]}, which is nearer")
+        nearest = ids[distance[row].argmin()]
+        yield Finding(int(row), f"landmark_id = {ids[own[row]]}", f"{nearest}, which is nearer")
 
 
 @check("objects", needs=("landmarks",), after=("unknown_landmark",))
@@ -60,30 +69,24 @@ def landmark_direction(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object's direction is the one from its landmark."""
     landmarks = data["landmarks"]
     own = landmarks.find("landmark_id", rows.column("landmark_id"))
-    centres = np.vstack([landmarks.floats("x_m", "y_m").reshape(-1, 2), np.full((1, 2), np.nan)])
-    away = rows.floats("x_m", "y_m") - centres[own]
-    for row, stated in enumerate(rows.texts("direction")):
-        dx, dy = away[row].tolist()
-        if (
-            own[row] >= 0
-            and math.isfinite(dx + dy)
-            and (dx or dy)
-            and (actual := compass_direction(dx, dy)) != stated
-        ):
+    away = rows.floats("x_m", "y_m") - at(landmarks.floats("x_m", "y_m").reshape(-1, 2), own)
+    for row, (stated, (dx, dy)) in enumerate(zip(rows.texts("direction"), away.tolist(), strict=True)):
+        known = math.isfinite(dx + dy) and (dx or dy)
+        if known and (actual := compass_direction(dx, dy)) != stated:
             yield Finding(row, str(stated), actual)
 
 
 @check("anchors", needs=("objects",))
 def unknown_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An anchor's object exists."""
-    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+    for row in np.flatnonzero(data.objects_of(rows) < 0):
         yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "an object of the scene")
 
 
 @check("viewpoints", needs=("objects",))
 def viewpoint_object(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A viewpoint is one of an object that there is."""
-    for row in np.flatnonzero(data["objects"].find("object_id", rows.column("object_id")) < 0):
+    for row in np.flatnonzero(data.objects_of(rows) < 0):
         yield Finding(int(row), f"object_id = {rows.ints('object_id')[row]}", "the id of an object")
 
 
@@ -127,8 +130,7 @@ def task_without_route(data: SceneData, rows: Rows) -> Iterator[Finding]:
     routes = data["routes"]
     sides = np.array([part.split("/")[-2] for part in routes.parts], dtype=object)
     side = sides[routes.part_of]
-    for row in range(len(rows)):
-        route = data.route_of_task[row]
+    for row, route in enumerate(data.route_of_task):
         own = rows.part(row).split("/")[-2]
         if route < 0:
             yield Finding(row, "no row of routes", f"one in routes/{own}")
@@ -162,41 +164,34 @@ def task_scene(data: SceneData, rows: Rows) -> Iterator[Finding]:
     if len(scenes) != 1 or data.flagged("scenes", ALWAYS_AFTER).any():
         raise UncheckedError("the scene's row is at fault")
     for name in ("family", "scene_type", "partition"):
-        expected = scenes.texts(name)[0]
-        for row in np.flatnonzero(np.asarray(rows.texts(name), dtype=object) != expected):
-            yield Finding(int(row), f"{name} = {rows.texts(name)[row]!r}", repr(expected))
+        own, expected = rows.texts(name), scenes.texts(name)[0]
+        for row in np.flatnonzero(own != expected):
+            yield Finding(int(row), f"{name} = {own[row]!r}", repr(expected))
 
 
 @check("tasks", needs=("routes",))
 def task_setting(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's setting is its route's."""
-    routes = data["routes"]
-    theirs = routes.column("setting").take(_at(data.route_of_task))
-    fit = comparable(data, "routes", data.route_of_task)
-    for row in np.flatnonzero(unequal(rows.column("setting"), theirs) & fit):
-        yield Finding(int(row), rows.texts("setting")[row] or "", theirs[int(row)].as_py())
+    theirs, fit = data["routes"].take("setting", data.route_of_task), comparable(data, "routes", data.route_of_task)
+    for row, own, expected in differing(rows.column("setting"), theirs, fit):
+        yield Finding(row, own or "", expected)
 
 
 @check("tasks", after=("task_setting",))
 def task_budget(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's action budget is that of its setting."""
     budgets = {s: rule.action_budget for s, rule in zip(SETTINGS, settings_of(data.pipeline.filter), strict=True)}
-    expected = np.array([budgets.get(str(s), -1) for s in rows.texts("setting")])
-    for row in np.flatnonzero(rows.ints("action_budget") != expected):
-        yield Finding(int(row), str(rows.ints("action_budget")[row]), str(expected[row]))
+    own, expected = rows.ints("action_budget"), np.array([budgets.get(str(s), -1) for s in rows.texts("setting")])
+    for row in np.flatnonzero(own != expected):
+        yield Finding(int(row), str(own[row]), str(expected[row]))
 
 
 @check("tasks", needs=("routes",), after=("telling_number",))
 def task_start(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task starts at the first pose of its route."""
-    paths, routes = data.paths, data["routes"]
-    starts = np.full((len(routes) + 1, 4), np.nan)
-    starts[paths.rows] = paths.starts
-    theirs = starts[data.route_of_task]
-    own = rows.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
-    off = np.abs(own - theirs).max(axis=1)
-    fit = comparable(data, "routes", data.route_of_task)
-    for row in np.flatnonzero((off > _SAME_PLACE_M) & fit):
+    own, theirs = rows.floats(*START), at(data.paths.starts, data.route_of_task)
+    off = np.abs(own - theirs).max(axis=1) > _SAME_PLACE_M
+    for row in np.flatnonzero(off & comparable(data, "routes", data.route_of_task)):
         yield Finding(int(row), pose_text(own[row]), pose_text(theirs[row]))
 
 
@@ -214,34 +209,32 @@ def goal_of_modality(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 def task_goal(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What a task says of its goal is what stands of the target in objects."""
     objects, landmarks = data["objects"], data["landmarks"]
-    target = np.append(data.target_of_route, -1)[data.route_of_task]
-    landmark = landmarks.find("landmark_id", objects.column("landmark_id"))
+    target = data.target_of_task
+    landmark = at(landmarks.find("landmark_id", objects.column("landmark_id")), target)
     theirs = {
-        "target_name": objects.column("name"),
-        "landmark": landmarks.column("name").take(_at(landmark)),
-        "direction": objects.column("direction"),
-        "reference_image_id": objects.column("reference_image_id"),
-        "image_distance_m": objects.column("step_back_m"),
-        "shape_seen_in_train": pc.invert(objects.column("shape_held_out")),
+        "target_name": objects.take("name", target),
+        "landmark": landmarks.take("name", landmark),
+        "direction": objects.take("direction", target),
+        "reference_image_id": objects.take("reference_image_id", target),
+        "image_distance_m": objects.take("step_back_m", target),
+        "shape_seen_in_train": pc.invert(objects.take("shape_held_out", target)),
     }
     fit = comparable(data, "objects", target) & comparable(data, "routes", data.route_of_task)
     for name, column in theirs.items():
-        own, expected = rows.column(name), column.take(_at(target))
         # The other modality's goal is null, and `goal_of_modality` sees to that.
-        both = _valid(own) & _valid(expected)
-        if name == "shape_seen_in_train" and own.null_count < len(own):
+        both = rows.valid(name) & column.is_valid().to_numpy(zero_copy_only=False)
+        if name == "shape_seen_in_train" and rows.valid(name).any():
             # A release of an older version has nulls alone, an imported scene has them on both sides.
-            both = np.ones(len(own), np.bool_)
-        for row in np.flatnonzero(unequal(own, expected) & fit & both):
-            yield Finding(int(row), f"{name} = {own[int(row)].as_py()!r}", repr(expected[int(row)].as_py()))
+            both = np.True_
+        for row, own, expected in differing(rows.column(name), column, fit & both):
+            yield Finding(row, f"{name} = {own!r}", repr(expected))
 
 
 @check("tasks", needs=("routes", "objects"), after=("goal_of_modality", "telling_text", "telling_id"))
 def task_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A task's description is one of its target's, and `frame_seen_in_train` says whether that is not held out."""
-    target = np.append(data.target_of_route, -1)[data.route_of_task]
+    objects, target = data["objects"], data.target_of_task
     fit = comparable(data, "objects", target) & comparable(data, "routes", data.route_of_task)
-    objects = data["objects"]
     paraphrases, firsts = objects.column("paraphrases").to_pylist(), objects.texts("description")
     # A release of an older version has one description an object.
     in_training = [
@@ -270,16 +263,5 @@ def instances_agree(data: SceneData, rows: Rows) -> Iterator[Finding]:
     # A task that does not agree with its route has been named: its twin is not to blame.
     fit = ~data.flagged("tasks", (*ALWAYS_AFTER, *_SAID_OF_ROUTE))[first]
     for name in _SHARED:
-        own = rows.column(name)
-        theirs = own.take(_at(first))
-        for row in np.flatnonzero(unequal(own, theirs) & fit):
-            yield Finding(int(row), f"{name} = {own[int(row)].as_py()}", f"{theirs[int(row)].as_py()}, as its twin")
-
-
-def _at(rows: Ints) -> pa.Array:
-    """Row numbers for `take`, null if there is no row."""
-    return pa.array(rows, mask=rows < 0)
-
-
-def _valid(column: pa.Array) -> Mask:
-    return np.asarray(column.is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)
+        for row, own, theirs in differing(rows.column(name), rows.take(name, first), fit):
+            yield Finding(row, f"{name} = {own}", f"{theirs}, as its twin")

@@ -10,16 +10,15 @@ from __future__ import annotations
 import json
 import struct
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import wraps
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import MESH_CHECKS, mesh_path, scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, Function, check
+from aerialdojo_gen.dataset.validate.rows import MESH_CHECKS, Floats, Rows, SceneData, UncheckedError
 
 _SAME = 1e-6
 # glTF's y is up, the world's z is: what a node's own coordinates become, and nothing else.
@@ -29,9 +28,7 @@ _FACTOR, _MEAN = 2e-6, 1.0
 _MOVING = ("animations", "skins")
 
 
-def _whole(
-    function: Callable[[SceneData, Rows], Iterator[Finding]],
-) -> Callable[[SceneData, Rows], Iterator[Finding]]:
+def _whole(function: Function) -> Function:
     """Make a fault of a document that a viewer stumbles over, and this program's reader does not."""
 
     @wraps(function)
@@ -39,9 +36,8 @@ def _whole(
         try:
             yield from function(data, rows)
         except (KeyError, IndexError, TypeError, ValueError) as error:
-            yield Finding(
-                0, f"glTF that does not hold together ({type(error).__name__}: {error})", "a whole document"
-            )
+            found = f"glTF that does not hold together ({type(error).__name__}: {error})"
+            yield Finding(0, found, "a whole document")
 
     return run
 
@@ -64,11 +60,9 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     if off:
         name, world = off[0]
         others = f" and {len(off) - 1:,} more" if len(off) > 1 else ""
-        yield Finding(
-            0, f"node {name}{others} moved by {_describe(world)}", "z up turned into y up, and no other transform"
-        )
-    scene = scene_mesh(data).scene
-    expected = Counter(instance.node for instance in (*scene.instances, *scene.backdrop))
+        found = f"node {name}{others} moved by {_describe(world)}"
+        yield Finding(0, found, "z up turned into y up, and no other transform")
+    expected = Counter(instance.node for instance in (*data.mesh.instances, *data.mesh.backdrop))
     if shown != expected:
         odd = sorted(((shown - expected) + (expected - shown)).elements())
         yield Finding(0, f"{len(odd):,} nodes that a viewer shows otherwise, {odd[0]} first", "each node once")
@@ -78,7 +72,7 @@ def mesh_moved(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 @_whole
 def mesh_colours(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A material's colour is the same by its name, by its extras, by its factor and by its texture."""
-    by_name = scene_mesh(data).scene.materials
+    by_name = data.mesh.materials
     for entry in _document(data)["materials"]:
         material, surface = by_name[entry["name"]], entry["pbrMetallicRoughness"]
         factor = np.array(surface.get("baseColorFactor", (1, 1, 1, 1)), dtype=np.float64)
@@ -111,7 +105,7 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         if elsewhere:
             yield Finding(0, f"{kind} in {elsewhere[0][:60]!r}", "all of the mesh in one file")
             return
-    instances = {instance.node: instance for instance in scene_mesh(data).scene.instances}
+    instances = {instance.node: instance for instance in data.mesh.instances}
     for node in document["nodes"]:
         if "mesh" not in node or node.get("name") not in instances:
             continue
@@ -119,10 +113,8 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
         for primitive, part in zip(primitives, instances[node["name"]].parts, strict=True):
             accessor = document["accessors"][primitive["attributes"]["POSITION"]]
             low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
-            off = max(
-                np.abs(low - accessor.get("min", np.nan)).max(), np.abs(high - accessor.get("max", np.nan)).max()
-            )
-            if not off <= _SAME * max(1.0, float(np.abs([low, high]).max())):
+            off = (np.abs(own - accessor.get(name, np.nan)).max() for own, name in ((low, "min"), (high, "max")))
+            if not max(off) <= _SAME * max(1.0, float(np.abs([low, high]).max())):
                 found = f"node {node['name']} from {_triple(low)} to {_triple(high)}"
                 stated = f"{_triple(accessor.get('min', ()))} to {_triple(accessor.get('max', ()))} m as told"
                 yield Finding(0, found, stated)
@@ -130,9 +122,9 @@ def mesh_extent(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 
 
 def _document(data: SceneData) -> dict[str, Any]:
-    """Return the glTF document, read once; `scene_mesh` raises if there is none."""
-    scene_mesh(data)
-    document = data.cached("gltf", lambda: _parse(mesh_path(data).read_bytes()))
+    """Return the glTF document, read once, of a mesh that can be read."""
+    _ = data.mesh
+    document = data.cached("gltf", lambda: _parse(data.mesh_path().read_bytes()))
     if not isinstance(document, dict):
         raise UncheckedError("no glTF document")
     return document

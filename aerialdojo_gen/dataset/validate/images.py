@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.base.pictures import decode_grey
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, repeated
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData, repeated
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.casters import triangle_caster
 
@@ -36,10 +35,9 @@ _TEXT_CHUNKS = frozenset({"tEXt", "zTXt", "iTXt", "eXIf"})
 def image_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """An object that tasks ask for has a picture."""
     targets = set(data["routes"].ints("target_object_id").tolist())
-    held = rows.column("reference_image").is_valid().to_numpy(zero_copy_only=False)
-    for row, object_id in enumerate(rows.ints("object_id").tolist()):
-        if object_id in targets and not held[row]:
-            yield Finding(row, "no reference_image", "a PNG: tasks ask for the object")
+    wanted = np.isin(rows.ints("object_id"), [*targets])
+    for row in np.flatnonzero(wanted & ~rows.valid("reference_image")):
+        yield Finding(int(row), "no reference_image", "a PNG: tasks ask for the object")
 
 
 @check("objects", after=("image_missing",))
@@ -84,46 +82,35 @@ def image_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def image_pose(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is taken from its object's selected anchor, or from behind it with nothing between the two."""
     places = data["anchors"].floats("x_m", "y_m", "z_m", "yaw_rad").reshape(-1, 4)
-    rays, most = scene_mesh(data).rays, data.pipeline.reference_images.step_back_m
-    backs = rows.floats("step_back_m")
+    rays, most = data.rays, data.pipeline.reference_images.step_back_m
+    backs, ids, held = rows.floats("step_back_m"), rows.ints("object_id").tolist(), rows.valid("reference_image")
     for row, pose in enumerate(rows.floats(*POSE)):
-        anchor = data.selected_of_object.get(int(rows.ints("object_id")[row]))
-        if (
-            anchor is None
-            or not np.isfinite(places[anchor]).all()
-            or not rows.column("reference_image")[row].is_valid
-        ):
+        anchor = data.selected_of_object.get(ids[row])
+        if anchor is None or not np.isfinite(places[anchor]).all() or not held[row]:
             continue
         x, y, z, yaw = places[anchor]
         behind = np.array([x - backs[row] * np.cos(yaw), y - backs[row] * np.sin(yaw), z, yaw])
         if not 0.0 <= backs[row] <= most:
             yield Finding(row, f"step_back_m = {backs[row]:.6g}", f"0 to {most:g}")
         elif not np.abs(pose - behind).max() <= _SAME_PLACE:
-            pose_text = ", ".join(f"{value:.4f}" for value in pose)
+            found = ", ".join(f"{value:.4f}" for value in pose)
             expected = f"{backs[row]:g} m behind the selected anchor, with its yaw"
-            yield Finding(row, f"a camera at ({pose_text})", expected)
+            yield Finding(row, f"a camera at ({found})", expected)
         elif backs[row] > 0.0 and not rays.visible(behind[:3], places[anchor, :3])[0]:
-            yield Finding(
-                row, f"something between the anchor and the camera {backs[row]:g} m behind it", "free sight"
-            )
+            found = f"something between the anchor and the camera {backs[row]:g} m behind it"
+            yield Finding(row, found, "free sight")
 
 
 @check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "image_box", "object_node", "image_pose"))
 def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Box and share of pixels are those of the object as rays from the picture's camera find it."""
-    mesh = scene_mesh(data)
-    index = {node: k for k, node in enumerate(mesh.rays.nodes)}
-    places = rows.floats(*POSE)
+    rays = data.rays
+    index = {node: k for k, node in enumerate(rays.nodes)}
     nodes, boxes, fraction = rows.texts("mesh_node"), rows.floats(*_BOX).reshape(-1, 4), rows.floats("image_fraction")
-    for row, picture in _decoded(data, rows, "image_damaged", "image_box", "object_node", "image_pose"):
-        place = places[row]
-        if not np.isfinite(place).all():
-            continue
-        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
-        pose = view_pose(place[:3], float(place[3]), "front")
-        directions = camera.rays()[::_EVERY, ::_EVERY].reshape(-1, 3) @ pose[:3, :3].T
-        seen = mesh.rays.first_hit(pose[:3, 3], directions)[1] == index[str(nodes[row])]
-        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), picture[::_EVERY, ::_EVERY].shape))
+    for row, place, directions in _cameras(data, rows, "image_damaged", "image_box", "object_node", "image_pose"):
+        some = directions[::_EVERY, ::_EVERY]
+        seen = rays.first_hit(place, some.reshape(-1, 3))[1] == index[str(nodes[row])]
+        v, u = (k * _EVERY for k in np.unravel_index(np.flatnonzero(seen), some.shape[:2]))
         u0, v0, u1, v1 = boxes[row].tolist()
         share = float(seen.mean())
         stored = 0.0 if np.isnan(fraction[row]) else float(fraction[row])
@@ -135,35 +122,26 @@ def image_target(data: SceneData, rows: Rows) -> Iterator[Finding]:
             yield Finding(row, f"box ({u0:g}, {v0:g}) to ({u1:g}, {v1:g})", f"one that holds {box}")
 
 
-@check(
-    "objects",
-    needs=("mesh",),
-    after=("image_missing", "image_damaged", "image_box", "image_target", "object_node", "image_pose"),
-)
+@check("objects", needs=("mesh",), after=("image_missing", "image_damaged", "image_box", "image_target",
+                                         "object_node", "image_pose"))  # fmt: skip
 def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture says which of the parts that make its object's name true it does not show."""
-    mesh = scene_mesh(data)
-    first = dict(zip(mesh.rays.nodes, np.cumsum([0, *(len(i.faces) for i in mesh.scene.instances)]), strict=False))
+    scene = data.mesh
+    first = dict(zip(data.rays.nodes, np.cumsum([0, *(len(i.faces) for i in scene.instances)]), strict=False))
     nodes, shown, missing = rows.texts("mesh_node"), rows.floats("tells_shown"), rows.texts("tells_missing")
-    triangles, places, boxes = triangle_caster(mesh.scene), rows.floats(*POSE), rows.floats(*_BOX).reshape(-1, 4)
-    for row, picture in _decoded(data, rows, "image_box"):
-        place = places[row]
-        anatomy = mesh.scene[str(nodes[row])].anatomy if nodes[row] in mesh.scene else None
+    triangles, boxes = triangle_caster(scene), rows.floats(*_BOX).reshape(-1, 4)
+    for row, place, directions in _cameras(data, rows, "image_box"):
+        anatomy = scene[str(nodes[row])].anatomy if nodes[row] in scene else None
         tells = () if anatomy is None else anatomy.identifying_parts
-        if not np.isfinite(place).all():
-            continue
         if bool(tells) == bool(np.isnan(shown[row])):
             yield Finding(row, f"tells_shown = {shown[row]:g}", f"{'a share' if tells else 'null'}")
             continue
-        camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
-        pose = view_pose(place[:3], float(place[3]), "front")
-        rays = camera.rays()
+        least, near = _MIN_PART_SHARE * directions[..., 0].size, directions
         if np.isfinite(boxes[row]).all():
             u0, v0, u1, v1 = boxes[row].astype(int).tolist()
-            rays = rays[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
-        hit = triangles.first_hit(pose[:3, 3], rays.reshape(-1, 3) @ pose[:3, :3].T)[1] - first[str(nodes[row])]
-        counts = {tell: int(np.isin(hit, mesh.scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
-        least = _MIN_PART_SHARE * picture.size
+            near = directions[max(v0 - _AROUND, 0) : v1 + _AROUND, max(u0 - _AROUND, 0) : u1 + _AROUND]
+        hit = triangles.first_hit(place, near.reshape(-1, 3))[1] - first[str(nodes[row])]
+        counts = {tell: int(np.isin(hit, scene[str(nodes[row])].faces_of(tell)).sum()) for tell in tells}
         stored = [word for word in (missing[row] or "").split(", ") if word]
         wrong = [t for t, n in counts.items() if (t in stored) != (n < least) and abs(n - least) > _EDGE * least + 2]
         if wrong:
@@ -171,9 +149,8 @@ def image_tells(data: SceneData, rows: Rows) -> Iterator[Finding]:
         elif abs(shown[row] - (1.0 - len(stored) / max(len(tells), 1))) > _SHARE and tells:
             yield Finding(row, f"tells_shown = {shown[row]:g}", f"{1.0 - len(stored) / len(tells):g}")
         elif stored:
-            yield Finding(
-                row, f"a picture that does not show {missing[row]}", "all that tells what it is", warning=True
-            )
+            found = f"a picture that does not show {missing[row]}"
+            yield Finding(row, found, "all that tells what it is", warning=True)
 
 
 @check("objects")
@@ -190,6 +167,16 @@ def _decoded(data: SceneData, rows: Rows, *faults: str) -> Iterator[tuple[int, N
     for row, raw in enumerate(rows.column("reference_image")):
         if raw.is_valid and not skip[row] and (picture := decode_grey(raw.as_py())) is not None:
             yield row, picture
+
+
+def _cameras(data: SceneData, rows: Rows, *faults: str) -> Iterator[tuple[int, Floats, Floats]]:
+    """Rows of `_decoded` that say where theirs was taken: that place, and the direction of each pixel, (H, W, 3)."""
+    poses = rows.floats(*POSE)
+    for row, picture in _decoded(data, rows, *faults):
+        if np.isfinite(poses[row]).all():
+            camera = Camera(picture.shape[1], picture.shape[0], data.pipeline.reference_images.fov_deg)
+            pose = view_pose(poses[row, :3], float(poses[row, 3]), "front")
+            yield row, pose[:3, 3], camera.rays() @ pose[:3, :3].T
 
 
 def _chunks(png: bytes) -> list[str]:

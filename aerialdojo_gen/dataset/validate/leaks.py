@@ -11,16 +11,25 @@ from __future__ import annotations
 import hashlib
 import re
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Rows, SceneData, repeated
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import (
+    START,
+    Ints,
+    Rows,
+    SceneData,
+    Texts,
+    UncheckedError,
+    at,
+    pairs_of,
+    repeated,
+)
 from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id, reference_id
 
-_START = ("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad")
 _SAME_M = 1e-9
 # Digits with a decimal point: no description of the project's has any, a coordinate always does.
 _DECIMAL = re.compile(r"\d[.,]\d")
@@ -77,30 +86,21 @@ def telling_text(data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("tasks", needs=("routes", "objects"))
 def telling_number(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """No number of a task's row is a coordinate of its goal or of its target, unless the start shares it."""
-    routes, paths = data["routes"], data.paths
-    secret = np.full((len(routes) + 1, 6), np.nan)
-    secret[:-1, :3] = routes.floats("goal_x_m", "goal_y_m", "goal_z_m")
-    centres = np.vstack([data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3), np.full((1, 3), np.nan)])
-    secret[:-1, 3:] = centres[data.target_of_route]
-    starts = np.full((len(routes) + 1, 4), np.nan)
-    starts[paths.rows] = paths.starts
-    own, theirs = rows.floats(*_START), secret[data.route_of_task]
-    leaked = _leaked(own, theirs, starts[data.route_of_task])
-    for row in np.flatnonzero(leaked.any(axis=1)):
-        name = _START[int(leaked[row].argmax())]
-        yield Finding(int(row), f"{name} = {own[row, int(leaked[row].argmax())]:.9g}", "nothing of the goal")
-
-
-def _leaked(own: Floats, secret: Floats, start: Floats) -> Floats:
-    """Which numbers of a row stand in the goal and are not the start's own."""
+    goals = data["routes"].floats("goal_x_m", "goal_y_m", "goal_z_m").reshape(-1, 3)
+    centres = data["objects"].floats("x_m", "y_m", "z_m").reshape(-1, 3)
+    secret = np.hstack([at(goals, data.route_of_task), at(centres, data.target_of_task)])
+    own, start = rows.floats(*START), at(data.paths.starts, data.route_of_task)
     alike = (np.abs(own[:, :, None] - secret[:, None, :]) <= _SAME_M).any(axis=2)
-    return np.asarray(alike & ~(np.abs(own - start) <= _SAME_M))
+    leaked = alike & ~(np.abs(own - start) <= _SAME_M)
+    for row in np.flatnonzero(leaked.any(axis=1)).tolist():
+        k = int(leaked[row].argmax())
+        yield Finding(row, f"{START[k]} = {own[row, k]:.9g}", "nothing of the goal")
 
 
 @check("routes", after=("duplicate_key", "route_in_both_subsets"))
 def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A start anchor and a target make one navigation task."""
-    pairs, nav_ids = _pairs(rows), rows.texts("nav_id")
+    pairs, nav_ids = pairs_of(rows), rows.texts("nav_id")
     for row, first in repeated(pairs):
         yield Finding(row, f"start and target {pairs[row]} as {nav_ids[first]}", "each pair once")
 
@@ -108,7 +108,7 @@ def duplicate_route(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("routes", after=("duplicate_key", "unknown_target", "unknown_start"))
 def nav_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is no hash of its start and target that anybody could compute."""
-    for row, (pair, digits) in enumerate(zip(_pairs(rows), _digits(data, rows), strict=True)):
+    for row, (pair, digits) in enumerate(zip(pairs_of(rows), _digits(data, rows), strict=True)):
         if _guessed(data.scene, pair, digits):
             yield Finding(row, f"…-{digits}, a plain hash of the pair {pair}", "a hash with a key")
 
@@ -127,7 +127,7 @@ def image_id_guessed(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def nav_id_of_salt(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A nav_id is what the pipeline's salt makes of its start and target."""
     key = key_of(data.pipeline.split.salt, data.pipeline.seed)
-    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in _pairs(rows)])
+    yield from _unlike(rows.texts("nav_id"), [nav_id(data.scene, pair, key) for pair in pairs_of(rows)])
 
 
 @check("objects", after=("image_id_guessed", "image_id_twice"))
@@ -149,13 +149,9 @@ def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
     objects, target = data["objects"], data.target_of_route[fit]
     length = rows.floats("length_m")[fit]
     secrets = {
-        "target_object_id": _codes(rows.ints("target_object_id")[fit].tolist()),
-        "start_object_id": _codes(rows.ints("start_object_id")[fit].tolist()),
-        **{
-            name: _codes(np.asarray(objects.column(name).to_pylist(), dtype=object)[target].tolist())
-            for name in ("landmark_id", "direction", "category")
-        },
-        "setting": _codes(np.asarray(rows.texts("setting"), dtype=object)[fit].tolist()),
+        **{name: _codes(rows.texts(name)[fit]) for name in ("target_object_id", "start_object_id")},
+        **{name: _codes(objects.texts(name)[target]) for name in ("landmark_id", "direction", "category")},
+        "setting": _codes(rows.texts("setting")[fit]),
         "length_m": np.searchsorted(np.quantile(length, np.linspace(0, 1, _LENGTH_BINS + 1)[1:-1]), length),
     }
     order = np.argsort(np.array(digits), kind="stable")
@@ -177,11 +173,6 @@ def telling_digits(data: SceneData, rows: Rows) -> Iterator[Finding]:
                 break
 
 
-def _pairs(rows: Rows) -> list[str]:
-    columns = [rows.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id")]
-    return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
-
-
 def _digits(data: SceneData, rows: Rows) -> list[str]:
     return [str(text).removeprefix(f"{data.scene}-") for text in rows.texts("nav_id")]
 
@@ -191,7 +182,7 @@ def _guessed(scene: str, name: str, digits: str) -> bool:
     return any(make(text.encode()) == digits for text in texts for make in _HASHES)
 
 
-def _unlike(ids: Sequence[str | None], expected: Sequence[str]) -> Iterator[Finding]:
+def _unlike(ids: Texts, expected: Sequence[str]) -> Iterator[Finding]:
     off = [row for row, (own, made) in enumerate(zip(ids, expected, strict=True)) if own != made]
     if 2 * len(off) > len(ids):
         raise UncheckedError("the release was made with another salt than the pipeline's")
@@ -200,7 +191,7 @@ def _unlike(ids: Sequence[str | None], expected: Sequence[str]) -> Iterator[Find
         yield Finding(row, str(ids[row]), expected[row])
 
 
-def _codes(values: Sequence[object]) -> Ints:
+def _codes(values: Iterable[object]) -> Ints:
     """Number the values, equal ones alike, (n,) int64."""
     known: dict[object, int] = {}
     return np.array([known.setdefault(value, len(known)) for value in values], dtype=np.int64)

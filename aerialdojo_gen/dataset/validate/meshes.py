@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import mesh_path, mesh_place, require_meshes, scene_mesh
 from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.store.root import LocalRoot
 
@@ -21,7 +21,7 @@ _SAME_M = 1e-4
 @check("scenes", needs=("mesh",))
 def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's path stays in the data directory."""
-    require_meshes(data)
+    data.require_meshes()
     stored_path = str(rows.texts("mesh_path")[0])
     away = Path(stored_path).is_absolute() or ".." in Path(stored_path).parts
     # A folder that the user names may be a link to anywhere, the release's own path may not.
@@ -33,26 +33,26 @@ def mesh_outside(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 @check("scenes", needs=("mesh",), after=("mesh_outside",))
-def mesh_missing(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+def mesh_missing(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Every scene's mesh is there."""
-    require_meshes(data)
+    data.require_meshes()
     if data.flagged("scenes", ("mesh_outside",)).any():
         return
-    try:
-        there = mesh_path(data).is_file()
-    except FileNotFoundError:
-        there = False
-    if not there:
-        yield Finding(0, f"no file {mesh_place(data)}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
+    with contextlib.suppress(FileNotFoundError):
+        if data.mesh_path().is_file():
+            return
+    name = str(rows.texts("mesh_path")[0])
+    place = data.release.root.at(name) if data.meshes is None else data.meshes / Path(name).name
+    yield Finding(0, f"no file {place}", "the mesh (elsewhere: --meshes DIR; none: --no-meshes)")
 
 
 @check("scenes", needs=("mesh",), after=("mesh_outside", "mesh_missing"))
 def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A mesh's bytes have the SHA-256 of its scene."""
-    require_meshes(data)
+    data.require_meshes()
     if data.flagged("scenes", ("mesh_outside", "mesh_missing")).any():
         return
-    with mesh_path(data).open("rb") as file:
+    with data.mesh_path().open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     if digest != rows.texts("mesh_sha256")[0]:
         yield Finding(0, f"SHA-256 {digest}", str(rows.texts("mesh_sha256")[0]))
@@ -62,7 +62,7 @@ def mesh_digest(data: SceneData, rows: Rows) -> Iterator[Finding]:
 def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """A mesh is a scene file that can be read."""
     try:
-        scene_mesh(data)
+        _ = data.mesh
     except AssetError as error:
         yield Finding(0, str(error), "a scene that build-scenes wrote")
 
@@ -71,7 +71,7 @@ def mesh_damaged(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def scene_of_mesh(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """What the scene's row says is so in its mesh."""
     stored = rows.table.to_pylist()[0]
-    expected = scene_row(scene_mesh(data).scene, stored["mesh_path"], stored["mesh_sha256"])
+    expected = scene_row(data.mesh, stored["mesh_path"], stored["mesh_sha256"])
     for name, value in expected.items():
         own = stored[name]
         same = abs(own - value) <= _SAME_M if isinstance(value, float) else own == value
@@ -116,7 +116,7 @@ def landmark_box(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 
 def _unknown_nodes(data: SceneData, rows: Rows) -> Iterator[Finding]:
-    scene = scene_mesh(data).scene
+    scene = data.mesh
     for row, node in enumerate(rows.texts("mesh_node")):
         if node not in scene:
             yield Finding(row, f"mesh_node = {node!r}", "a node of the mesh")
@@ -124,14 +124,14 @@ def _unknown_nodes(data: SceneData, rows: Rows) -> Iterator[Finding]:
 
 def _unlike_node(data: SceneData, rows: Rows, name: str) -> Iterator[Finding]:
     """Rows whose value of a column is not their node's attribute of that name."""
-    scene = scene_mesh(data).scene
+    scene = data.mesh
     for row, (node, stored) in enumerate(zip(rows.texts("mesh_node"), rows.texts(name), strict=True)):
         if node in scene and stored is not None and (own := getattr(scene[str(node)], name)) != stored:
             yield Finding(row, repr(stored), repr(own))
 
 
 def _other_box(data: SceneData, rows: Rows, size: np.ndarray | None) -> Iterator[Finding]:
-    scene = scene_mesh(data).scene
+    scene = data.mesh
     centre = rows.floats("x_m", "y_m", "z_m")
     for row, node in enumerate(rows.texts("mesh_node")):
         if node not in scene:

@@ -6,15 +6,14 @@ So do the references as an agent can fly them (`agent_action`), which besides en
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from aerialdojo_gen.base.constants import NEAR_GOAL_M, SUCCESS_RADIUS_M
 from aerialdojo_gen.dataset.episode import MIN_SPL, Reference, fly, spl_fault
-from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Ints, Mask, Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import ALWAYS_AFTER, START, Mask, Rows, SceneData
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.rendering.casters import all_in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
@@ -34,16 +33,12 @@ _REPLAY_M = 1e-5
 @check("routes", needs=("tasks", "mesh"), after=_ROUTE_FAULTS)
 def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """An agent that flies the actions, by the environment's motion and collision, succeeds within the budget."""
-    paths = data.paths
-    space = FlightSpace(scene_mesh(data).scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
-    tasks = _TaskData(data, routes)
-    for k in np.flatnonzero(~_left_out(data, _ROUTE_FAULTS)[paths.rows]).tolist():
-        row = int(paths.rows[k])
-        if tasks.task_of_route[row] < 0:
+    space = FlightSpace(data.mesh, data.pipeline.embodiment.radius_m, data.world)
+    left_out = _left_out(data, _ROUTE_FAULTS)
+    for row, reference in _references(data, routes):
+        if left_out[row]:
             continue
-        reference = tasks.reference(row, paths.action[paths.of(k)].tolist())
-        lack = spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M)
-        if lack:
+        if lack := spl_fault(fly(space, reference), reference.length_m, SUCCESS_RADIUS_M):
             yield Finding(row, lack, _EXPECTED)
 
 
@@ -54,67 +49,51 @@ def oracle_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
 )
 def agent_action_fails(data: SceneData, routes: Rows) -> Iterator[Finding]:
     """The list agent_action is an agent's: flown it stops within 1 m of the anchor, the target in sight."""
-    if "agent_action" not in routes.table.column_names:
-        raise UncheckedError("the routes have no agent_action, which an older version did not write")
-    scene, paths = scene_mesh(data).scene, data.paths
-    space = FlightSpace(scene, data.pipeline.embodiment.radius_m, scene_mesh(data).world)
-    tasks, nodes = _TaskData(data, routes), data["objects"].texts("mesh_node")
-    left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target"))
-    lists = routes.column("agent_action").to_pylist()
+    scene, paths = data.mesh, data.paths
+    space = FlightSpace(scene, data.pipeline.embodiment.radius_m, data.world)
+    nodes, lists = data["objects"].texts("mesh_node"), routes.column("agent_action").to_pylist()
+    # An older version wrote null lists.
+    left_out = _left_out(data, (*_ROUTE_FAULTS, "oracle_fails", "unknown_target")) | ~routes.valid("agent_action")
     stops: list[tuple[int, str, tuple[float, float, float]]] = []
-    for k in np.flatnonzero(~left_out[paths.rows]).tolist():
-        row = int(paths.rows[k])
-        target = int(data.target_of_route[row])
-        if tasks.task_of_route[row] < 0 or target < 0:
+    for row, reference in _references(data, routes):
+        if left_out[row] or data.target_of_route[row] < 0:
             continue
-        if lists[row] is None:  # an older version wrote it
-            continue
-        actions = [-1 if action is None else action for action in lists[row] or []]
+        actions = [-1 if action is None else action for action in lists[row]]
         wrong = [action for action in actions if not 0 <= action < APPROACH]
         if wrong or STOP in actions[:-1] or actions[-1:] != [STOP]:
             what = f"action {wrong[0]}" if wrong else "no Stop at its end alone"
             yield Finding(row, what, "actions 0 to 15, of which the last alone is 0 (Stop)")
             continue
-        where, own = paths.of(k), paths.action[paths.of(k)]
+        own = paths.action[paths.of(row)]
         if actions == own[own != APPROACH].tolist():
             # These have been flown by the check above, to where the Approach begins.
-            end = tuple(paths.xyz[where][-2 if own[-2] == APPROACH else -1].tolist())
+            end = tuple(paths.xyz[paths.of(row)][-2 if own[-2] == APPROACH else -1].tolist())
         else:
-            flown = fly(space, tasks.reference(row, actions))
-            lack = spl_fault(flown, 0.0, SUCCESS_RADIUS_M)
-            if lack:
+            flown = fly(space, reference._replace(actions=actions))
+            if lack := spl_fault(flown, 0.0, SUCCESS_RADIUS_M):
                 yield Finding(row, lack, f"a success at {SUCCESS_RADIUS_M:g} m")
                 continue
             end = flown.position
-        away = math.dist(end, tasks.goal[row])
+        away = math.dist(end, reference.goal)
         if away > NEAR_GOAL_M + _REPLAY_M:
             yield Finding(row, f"a Stop {away:.3f} m from the anchor", f"{NEAR_GOAL_M:g} m at most")
-        elif (node := nodes[target]) in scene:
+        elif (node := nodes[data.target_of_route[row]]) in scene:
             stops.append((row, str(node), end))
     ends = np.array([end for _, _, end in stops]).reshape(-1, 3)
     for k in np.flatnonzero(~all_in_sight(scene, [node for _, node, _ in stops], ends)).tolist():
         yield Finding(stops[k][0], "a Stop from where no straight line reaches the target", "the target in sight")
 
 
-class _TaskData:
-    """Start, goal and budget of routes' episodes."""
-
-    def __init__(self, data: SceneData, routes: Rows) -> None:
-        tasks = data["tasks"]
-        # Instances agree in these columns: one suffices.
-        self.task_of_route: Ints = tasks.find("nav_id", routes.column("nav_id"))
-        self._start = tasks.floats("start_x_m", "start_y_m", "start_z_m", "start_yaw_rad").tolist()
-        self._budget = tasks.ints("action_budget").tolist()
-        self._length_m = routes.floats("length_m").tolist()
-        self.goal: list[list[float]] = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist()
-
-    def reference(self, row: int, actions: Sequence[int]) -> Reference:
-        """Make the reference of a route's row, which has a task, of some actions."""
-        task = int(self.task_of_route[row])
-        x, y, z, yaw = self._start[task]
-        goal_x, goal_y, goal_z = self.goal[row]
-        budget, length_m = self._budget[task], self._length_m[row]
-        return Reference((x, y, z, yaw), (goal_x, goal_y, goal_z), budget, length_m, actions)
+def _references(data: SceneData, routes: Rows) -> Iterator[tuple[int, Reference]]:
+    """Routes that can be flown, as they have poses and a task: their rows, and what an episode is made of."""
+    tasks, paths = data["tasks"], data.paths
+    # Instances agree in these columns: one suffices.
+    task_of_route = tasks.find("nav_id", routes.column("nav_id"))
+    starts, budgets = tasks.floats(*START).tolist(), tasks.ints("action_budget").tolist()
+    goals, lengths_m = routes.floats("goal_x_m", "goal_y_m", "goal_z_m").tolist(), routes.floats("length_m").tolist()
+    for row in np.flatnonzero(paths.fit & (task_of_route >= 0)).tolist():
+        task, actions = task_of_route[row], paths.action[paths.of(row)].tolist()
+        yield row, Reference(tuple(starts[task]), tuple(goals[row]), budgets[task], lengths_m[row], actions)
 
 
 def _left_out(data: SceneData, faults: tuple[str, ...]) -> Mask:

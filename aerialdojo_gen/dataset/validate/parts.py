@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import PurePosixPath
 
 import pyarrow as pa
@@ -21,16 +22,9 @@ from aerialdojo_gen.store.tables import content_digest
 
 # Other files of a release: cards, licence, files of a hub's client, pictures.
 _OTHER_FILES = {
-    "README.md",
-    "croissant.json",
-    "pipeline.json",
-    "protocol.json",
-    "LICENSE",
-    "CITATION.cff",
-    ".gitattributes",
-    "figures",
-    "stats",
-}
+    "README.md", "croissant.json", "pipeline.json", "protocol.json", "LICENSE", "CITATION.cff", ".gitattributes",
+    "figures", "stats",
+}  # fmt: skip
 
 # Tables that must not be empty; a split may have none of a scene's tasks.
 _FEW = ("release/scenes", "release/landmarks", "release/objects", "release/anchors")
@@ -86,13 +80,12 @@ def foreign_files(release: Release, scenes: list[str]) -> Outcome:
     names = release.root.list(release.folder, "**/*")
     folders = {str(parent) for name in names for parent in PurePosixPath(name).parents}
     for name in names:
-        relative = PurePosixPath(name).relative_to(release.folder)
         if name in folders or _is_empty_folder(release.root, name):
             continue
         outcome.rows += 1
-        if relative.as_posix() in expected or relative.parts[0] in _OTHER_FILES:
-            continue
-        outcome.fault("a file that is no part of a release", "none", part=relative.as_posix())
+        relative = PurePosixPath(name).relative_to(release.folder)
+        if relative.as_posix() not in expected and relative.parts[0] not in _OTHER_FILES:
+            outcome.fault("a file that is no part of a release", "none", part=relative.as_posix())
     return outcome
 
 
@@ -111,12 +104,12 @@ def read_tables(release: Release, scene: str) -> tuple[dict[str, Rows], list[Out
     tables = {}
     for name, keys in release_tables().items():
         parts = [_read(release, key, scene, found, runs) for key in keys]
-        if any(part is None for part in parts):
-            continue
         whole = [part for part in parts if part is not None]
-        ends = [sum(t.num_rows for t in whole[: k + 1]) for k in range(len(whole))]
+        if len(whole) < len(parts):
+            continue
+        ends = tuple(accumulate(part.num_rows for part in whole))
         paths = tuple(part_path(key, scene) for key in keys)
-        tables[name] = Rows(name, store.LAYOUT[keys[0]].spec, pa.concat_tables(whole), paths, tuple(ends))
+        tables[name] = Rows(name, store.LAYOUT[keys[0]].spec, pa.concat_tables(whole), paths, ends)
     _one_run(scene, runs, found["part_of_other_run"])
     return tables, list(found.values())
 
@@ -165,8 +158,7 @@ def _read(release: Release, key: str, scene: str, found: dict[str, Outcome], run
         if extra:
             fault("leaking_column", f"columns {', '.join(extra)}", "what an agent may know, no more")
             table, extra = table.drop_columns(extra), []
-    wrong = list(_schema_faults(spec, table, extra))
-    if wrong:
+    if wrong := list(_schema_faults(spec, table, extra)):
         fault("part_schema", "; ".join(wrong), f"the columns of {spec.name}")
         return None
     found["part_rows"].rows += 1

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import permutations
+from operator import itemgetter
 
 import cv2
 import numpy as np
@@ -18,11 +19,13 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.validate.images import POSE
-from aerialdojo_gen.dataset.validate.registry import Finding, UncheckedError, check
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
+from aerialdojo_gen.dataset.validate.registry import Finding, check
+from aerialdojo_gen.dataset.validate.rows import Rows, SceneData, UncheckedError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.backend import open_renderer
+
+Picture = NDArray[np.uint8]
+Blocks = NDArray[np.float32]
 
 _RGB, _BITS = 2, 8
 # Blocks along an edge, of 255 levels: the limits are three times what two renderers differ by.
@@ -41,11 +44,8 @@ _HEADER_BYTES = 26
 def image_format(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """A picture is 8-bit RGB of the pipeline's size: no channel beside, in which something might stand."""
     config = data.pipeline.reference_images
-    unreadable = data.flagged("objects", ("image_missing", "image_damaged"))
-    for row, raw in enumerate(rows.column("reference_image")):
-        png = raw.as_py()
-        # What other checks have named may be flagged as no picture or not.
-        if png is None or unreadable[row] or len(png) < _HEADER_BYTES:
+    for row, png in enumerate(rows.column("reference_image").to_pylist()):
+        if png is None or len(png) < _HEADER_BYTES:  # other checks name it
             continue
         size = int.from_bytes(png[16:20], "big"), int.from_bytes(png[20:24], "big")
         if (png[24], png[25]) != (_BITS, _RGB):
@@ -79,19 +79,15 @@ def image_redrawn(data: SceneData, rows: Rows) -> Iterator[Finding]:
             found = f"a picture {off:.1f} of 255 off on average, {share:.1%} of it by more than {_BLOCK:g}"
             yield Finding(row, found, f"less than {_MEAN:g} and {_BLOCK_SHARE:.0%}")
         elif exact and changed[row] > _PIXEL_SHARE * stored[row].shape[0] * stored[row].shape[1]:
-            found = (
-                f"{changed[row]:,} pixels that are drawn otherwise here, where most pictures are the same to the bit"
-            )
-            yield Finding(row, found, "the same pixels")
+            where = "here, where most pictures are the same to the bit"
+            yield Finding(row, f"{changed[row]:,} pixels that are drawn otherwise {where}", "the same pixels")
 
 
-def _drawn(
-    data: SceneData, rows: Rows, stored: dict[int, NDArray[np.uint8]]
-) -> dict[int, NDArray[np.uint8]]:  # fmt: skip
+def _drawn(data: SceneData, rows: Rows, stored: dict[int, Picture]) -> dict[int, Picture]:
     """Pictures of these objects from where theirs were taken, by row; without those that do not say where."""
     places, config = rows.floats(*POSE), data.pipeline.reference_images
     poses = {row: places[row] for row in stored if np.isfinite(places[row]).all()}
-    scene = scene_mesh(data).scene
+    scene = data.mesh
     if not poses:
         return {}
     try:
@@ -107,29 +103,22 @@ def _drawn(
         raise UncheckedError(f"nothing draws here: {error}") from None
 
 
-def _other(
-    row: int, own: NDArray[np.float32], off: float, anew: dict[int, NDArray[np.float32]], rows: Rows
-) -> str:  # fmt: skip
+def _other(row: int, own: Blocks, off: float, anew: dict[int, Blocks], rows: Rows) -> str:
     """A better explanation of a picture than its own anchor's view; empty if there is none."""
     if off <= _NEARER:
         return ""
-    limit = min(_BETTER * off, off - _NEARER)
-    best, description = limit, ""
-    for order in list(permutations(range(3)))[1:]:
-        if (d := _off(own, anew[row][..., list(order)])) < best:
-            best, description = d, f"a picture with channels {''.join(_CHANNELS[k] for k in order)}"
-    for turned, words in ((np.s_[:, ::-1], "mirrored"), (np.s_[::-1], "upside down"), (np.s_[::-1, ::-1], "turned")):
-        if (d := _off(own, anew[row][turned])) < best:
-            best, description = d, f"a picture that is {words}"
-    for other, picture in anew.items():
-        if other != row and (d := _off(own, picture)) < best:
-            best, description = d, f"the picture of {rows.key(other)}"
-    return description
+    swapped = [[*order] for order in permutations(range(3))][1:]
+    others = [(anew[row][..., k], f"a picture with channels {''.join(_CHANNELS[c] for c in k)}") for k in swapped]
+    turns = ((np.s_[:, ::-1], "mirrored"), (np.s_[::-1], "upside down"), (np.s_[::-1, ::-1], "turned"))
+    others += [(anew[row][turn], f"a picture that is {words}") for turn, words in turns]
+    others += [(picture, f"the picture of {rows.key(other)}") for other, picture in anew.items() if other != row]
+    best, description = min(((_off(own, other), words) for other, words in others), key=itemgetter(0))
+    return description if best < min(_BETTER * off, off - _NEARER) else ""
 
 
-def _off(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+def _off(a: Blocks, b: Blocks) -> float:
     return float(np.abs(a - b).mean())
 
 
-def _blocks(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _blocks(picture: Picture) -> Blocks:
     return np.asarray(cv2.resize(picture.astype(np.float32), (_BLOCKS, _BLOCKS), interpolation=cv2.INTER_AREA))

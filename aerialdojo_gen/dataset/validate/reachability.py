@@ -13,7 +13,6 @@ import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Ints, Mask, Rows, SceneData, place_text
-from aerialdojo_gen.dataset.validate.scene_mesh import scene_mesh
 from aerialdojo_gen.geometry.rays import RayCaster
 
 _FAR_M = 10_000.0
@@ -39,9 +38,7 @@ def anchor_shut_in(data: SceneData, rows: Rows) -> Iterator[Finding]:
 )
 def route_shut_in(data: SceneData, _rows: Rows) -> Iterator[Finding]:
     """From a route's start, and so from all of it, there is a free way to the open sky."""
-    paths = data.paths
-    for finding in _shut_in(data, paths.starts[:, :3] if len(paths.rows) else np.empty((0, 3))):
-        yield finding._replace(row=int(paths.rows[finding.row]))
+    yield from _shut_in(data, data.paths.starts[:, :3])
 
 
 def _shut_in(data: SceneData, places: Floats) -> Iterator[Finding]:
@@ -53,12 +50,11 @@ def _shut_in(data: SceneData, places: Floats) -> Iterator[Finding]:
 
 
 def _have_a_way(data: SceneData, places: Floats) -> Mask:
-    rays = scene_mesh(data).rays
-    free = way_aside(rays, places)
-    if not free.all() and len(data.paths.rows):
-        free[~free] = _by_routes(data, rays, places[~free])
+    free = way_aside(data.rays, places)
     if not free.all():
-        free[~free] = over_lattice(rays, scene_mesh(data).scene.bounds, places[~free])
+        free[~free] = _by_routes(data, places[~free])
+    if not free.all():
+        free[~free] = over_lattice(data.rays, data.mesh.bounds, places[~free])
     return free
 
 
@@ -83,14 +79,14 @@ def way_aside(rays: RayCaster, places: Floats) -> Mask:
     return free
 
 
-def _by_routes(data: SceneData, rays: RayCaster, places: Floats) -> Mask:
+def _by_routes(data: SceneData, places: Floats) -> Mask:
     """Whether places lie on routes that somewhere come under the open sky."""
     paths = data.paths
     found = np.zeros(len(places), dtype=np.bool_)
     for ends in (paths.starts, paths.ends):
         for k, place in enumerate(places):
             for route in np.flatnonzero(np.abs(ends[:, :3] - place).max(axis=1) <= 1e-3)[:20]:
-                found[k] = found[k] or bool(open_above(rays, paths.xyz[paths.of(int(route))]).any())
+                found[k] = found[k] or bool(open_above(data.rays, paths.xyz[paths.of(int(route))]).any())
     return found
 
 

@@ -9,12 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from aerialdojo_gen.base.errors import AerialDojoError
-from aerialdojo_gen.dataset.validate.rows import Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import ALWAYS_AFTER, Rows, SceneData, UncheckedError
 
 TABLES = ("scenes", "landmarks", "objects", "anchors", "viewpoints", "routes", "tasks")
 _TABLE_ORDER = ("*", *(table for table in TABLES if table != "routes"), "routes")
-# A row with a missing or impossible value is reported once; checks that depend on the value skip it.
-ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
 
 
 class Fault(NamedTuple):
@@ -107,10 +105,6 @@ def ordered(checks: Iterable[Check]) -> tuple[Check, ...]:
     return tuple(result.values())
 
 
-class UncheckedError(Exception):
-    """Why a check cannot be made."""
-
-
 def run_checks(data: SceneData, checks: Iterable[Check]) -> Iterator[Outcome]:
     """Run checks over a scene in their order."""
     for one in checks:
@@ -139,5 +133,6 @@ def _run(data: SceneData, one: Check, table: str) -> Outcome:
     for f in findings:
         fault = Fault(one.name, data.scene, table, rows.part(f.row), rows.key(f.row), f.found, f.expected)
         faults[f.warning].append(fault)
-    judged = ~left_out[data.sampled_rows(table)] if one.samples else ~left_out
+    sampled = slice(None) if not one.samples else data.sampled if table == "routes" else data.sampled_objects
+    judged = ~left_out[sampled]
     return Outcome(one.name, table, int(judged.sum()), faults[False], warnings=faults[True])

@@ -29,7 +29,7 @@ class CheckTotal:
     tables: dict[str, None] = field(default_factory=dict)
     judged: int = 0
     faults: int = 0
-    skipped: Counter[str] = field(default_factory=Counter)
+    not_made: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Report:
             total.judged += outcome.rows
             total.faults += len(outcome.faults)
             if outcome.skipped:
-                total.skipped[outcome.skipped] += 1
+                total.not_made[outcome.skipped] += 1
         return list(totals.values())
 
     def table_lines(self, width: int | None = None, *, verbose: bool = False) -> list[str]:
@@ -70,13 +70,13 @@ class Report:
         rows = []
         for of, totals in groups.items():
             for part in [[total] for total in totals] if verbose else [totals]:
-                skipped = sum((total.skipped for total in part), Counter[str]())
+                skipped = sum((total.not_made for total in part), Counter[str]())
                 why = "; ".join(f"{why}{f' ({n} times)' if n > 1 else ''}" for why, n in skipped.items())
                 judged, faults = max(total.judged for total in part), sum(total.faults for total in part)
                 first, second = (part[0].check, of) if verbose else (of, f"{len(part)}")
                 rows.append((first, [second, f"{judged:,}", f"{faults:,}", why]))
         columns = [Column("table", words=True) if verbose else Column("checks"), Column("rows"), Column("faults")]
-        if any(total.skipped for total in self.totals()):
+        if any(total.not_made for total in self.totals()):
             columns.append(Column("not checked", words=True))
         return TextTable("check" if verbose else "table", columns, rows).lines(width)
 
@@ -97,16 +97,7 @@ class Report:
 
     def as_json(self) -> dict[str, Any]:
         """Return all of it as plain values: verdict, scenes, checks with their counts, every fault and warning."""
-        checks = [
-            {
-                "check": t.check,
-                "tables": [*t.tables],
-                "judged": t.judged,
-                "faults": t.faults,
-                "not_made": dict(t.skipped),
-            }
-            for t in self.totals()
-        ]
+        checks = [vars(total) | {"tables": [*total.tables]} for total in self.totals()]
         faults, warnings = ([one._asdict() for one in found] for found in (self.faults, self.warnings))
         return {
             "verdict": self.verdict(), "scenes": [*self.scenes], "checks": checks, "faults": faults,
@@ -117,7 +108,7 @@ class Report:
         """One line: what was checked, and whether all was well."""
         totals, faults, n = self.totals(), len(self.faults), len(self.scenes)
         judged = sum(total.judged for total in totals)
-        undone = sum(bool(total.skipped) for total in totals)
+        undone = sum(bool(total.not_made) for total in totals)
         what = f"{len(totals)} checks, {judged:,} rows judged, {n} scene{'s' if n != 1 else ''}"
         rest = f"; {undone} checks were not made everywhere" if undone else ""
         rest += f"; {len(self.warnings):,} warnings" if self.warnings else ""
@@ -147,8 +138,7 @@ def write_report(faults: Sequence[Fault], path: Path) -> Path:
         return path
     with atomic_file(path.parent, path.name) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         if path.suffix == ".csv":
-            writer = csv.writer(file)
-            writer.writerows([Fault._fields, *faults])
+            csv.writer(file).writerows([Fault._fields, *faults])
         else:
             file.writelines(json.dumps(fault._asdict(), ensure_ascii=False) + "\n" for fault in faults)
     return path

@@ -1,4 +1,4 @@
-"""What the checks see of a release: one scene's tables, and the poses of its routes as flat arrays."""
+"""What the checks see of a release: one scene's tables and mesh, and the poses of its routes as flat arrays."""
 
 from __future__ import annotations
 
@@ -15,6 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.base.rng import rank
+from aerialdojo_gen.geometry.rays import RayCaster
+from aerialdojo_gen.planning.collision import CollisionWorld, collision_world
+from aerialdojo_gen.rendering.casters import ray_caster
+from aerialdojo_gen.scenes.context import open_scene
+from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.store.root import LocalRoot
 from aerialdojo_gen.store.schemas import TableSpec
 
 if TYPE_CHECKING:
@@ -23,11 +29,22 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Texts = NDArray[np.object_]
 T = TypeVar("T")
 
-LISTS = ("x_m", "y_m", "z_m", "yaw_rad", "action")
+POSE = ("x_m", "y_m", "z_m", "yaw_rad")
+LISTS = (*POSE, "action")
+START = tuple(f"start_{name}" for name in POSE)  # of `tasks`
+# A row with a missing or impossible value is reported once; checks that depend on the value skip it.
+ALWAYS_AFTER = ("null_value", "not_finite", "unknown_word", "wrong_part")
+# Without these nothing else of the mesh can be checked.
+MESH_CHECKS = ("mesh_outside", "mesh_missing", "mesh_digest", "mesh_damaged")
 # What names a row to a person, where it is not the table's key without the scene.
 _NAMED_BY = {"tasks": ("task_id",), "scenes": ("scene",)}
+
+
+class UncheckedError(Exception):
+    """Why a check cannot be made."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +84,22 @@ class Rows:
         """Return a whole-number column as (n,) int64; null is -1."""
         return pc.fill_null(self.table.column(name), -1).to_numpy(zero_copy_only=False).astype(np.int64)
 
-    def texts(self, name: str) -> list[str | None]:
-        """Return a column of words as a list; null is None."""
-        return list(self.table.column(name).to_pylist())
+    def texts(self, name: str) -> Texts:
+        """Return a column of words, (n,) of str; null is None."""
+        return np.array(self.table.column(name).to_pylist(), dtype=object)
+
+    def valid(self, name: str) -> Mask:
+        """Where a column is not null, (n,) bool."""
+        return np.asarray(self.column(name).is_valid().to_numpy(zero_copy_only=False), dtype=np.bool_)
 
     def column(self, name: str) -> pa.Array:
         """Return a column in one piece."""
         column = self.table.column(name).combine_chunks()
         return column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+
+    def take(self, name: str, rows: Ints) -> pa.Array:
+        """Return a column's values at rows, null where a row is -1."""
+        return self.column(name).take(pa.array(rows, mask=rows < 0))
 
     def find(self, name: str, keys: pa.Array) -> Ints:
         """First row of each wanted value of a column, -1 if there is none; (len(wanted),) int64."""
@@ -93,6 +118,18 @@ def place_text(place: Floats, digits: int = 3) -> str:
     return "(" + ", ".join(f"{value:.{digits}f}" for value in place.tolist()) + ") m"
 
 
+def at(values: NDArray[Any], rows: Ints) -> NDArray[Any]:
+    """Values at rows; NaN, or -1 of whole numbers, where a row is -1."""
+    gap = np.full((1, *values.shape[1:]), np.nan if values.dtype.kind == "f" else -1)
+    return np.concatenate([values, gap])[rows]
+
+
+def pairs_of(routes: Rows) -> list[str]:
+    """Start anchor and target of every route, as ids are made from them."""
+    columns = (routes.ints(name).tolist() for name in ("start_object_id", "start_anchor_id", "target_object_id"))
+    return [f"{start}_{anchor}__{target}" for start, anchor, target in zip(*columns, strict=True)]
+
+
 def repeated(keys: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
     """Rows whose key an earlier row has, each with the first that has it."""
     first: dict[Hashable, int] = {}
@@ -101,46 +138,66 @@ def repeated(keys: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
             yield row, first[key]
 
 
-def unequal(a: pa.Array, b: pa.Array) -> Mask:
-    """Where two columns differ, (n,) bool; null equals null."""
-    equal = pc.fill_null(pc.equal(a, b), False)
-    both_null = pc.and_(pc.is_null(a), pc.is_null(b))
-    return np.asarray(pc.invert(pc.or_(equal, both_null)).to_numpy(zero_copy_only=False), dtype=np.bool_)
+def differing(own: pa.Array, theirs: pa.Array, fit: Mask) -> Iterator[tuple[int, Any, Any]]:
+    """Rows that fit in which two columns differ, with both values; null equals null."""
+    equal = pc.fill_null(pc.equal(own, theirs), False)
+    both_null = pc.and_(pc.is_null(own), pc.is_null(theirs))
+    unequal = pc.invert(pc.or_(equal, both_null)).to_numpy(zero_copy_only=False)
+    for row in np.flatnonzero(unequal & fit).tolist():
+        yield row, own[row].as_py(), theirs[row].as_py()
 
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Poses of the routes whose lists fit together, as flat arrays."""
+    """Poses of a scene's routes as flat arrays, metres, radians; a route whose lists do not fit together has none."""
 
-    rows: Ints  # Rows of `routes` that they belong to; rows with unequal lists or less than two poses are left out
+    fit: Mask  # (n,); whether a route has lists of one length, of two poses or more
     first: Ints  # (n + 1,) int64; where each route's poses begin
-    xyz: Floats  # (m, 3) float64; positions, metres, world frame
-    yaw: Floats  # (m,) float64; radians
+    xyz: Floats  # (m, 3) float64; positions, world frame
+    yaw: Floats  # (m,) float64
     action: Ints  # (m,) int64; what is done at every pose
 
-    def of(self, k: int) -> slice:
-        """Poses of the k-th route."""
-        return slice(int(self.first[k]), int(self.first[k + 1]))
+    def of(self, row: int) -> slice:
+        """Where a route's poses lie."""
+        return slice(int(self.first[row]), int(self.first[row + 1]))
+
+    def poses(self, row: int) -> Floats:
+        """Poses of a route, (k, 4) float64."""
+        return np.column_stack([self.xyz[self.of(row)], self.yaw[self.of(row)]])
+
+    def route_of(self, poses: Ints) -> Ints:
+        """Rows of the routes that poses belong to."""
+        return np.searchsorted(self.first, poses, side="right") - 1
+
+    def _spread(self, values: Floats) -> Floats:
+        """Values of the routes that fit, by row; NaN of the others."""
+        spread = np.full((len(self.fit), *values.shape[1:]), np.nan)
+        spread[self.fit] = values
+        return spread
 
     @cached_property
     def starts(self) -> Floats:
-        """First poses, (n, 4) float64: metres and radians."""
-        return np.column_stack([self.xyz[self.first[:-1]], self.yaw[self.first[:-1]]])
+        """First poses, (n, 4) float64."""
+        first = self.first[:-1][self.fit]
+        return self._spread(np.column_stack([self.xyz[first], self.yaw[first]]))
 
     @cached_property
     def ends(self) -> Floats:
-        """Last poses, (n, 4) float64: metres and radians."""
-        return np.column_stack([self.xyz[self.first[1:] - 1], self.yaw[self.first[1:] - 1]])
+        """Last poses, (n, 4) float64."""
+        last = self.first[1:][self.fit] - 1
+        return self._spread(np.column_stack([self.xyz[last], self.yaw[last]]))
+
+    def sums(self, values: Floats) -> Floats:
+        """Add up what each pose has, (m,), by route, (n,)."""
+        return self._spread(np.add.reduceat(values, self.first[:-1][self.fit]) if len(values) else values)
 
     @cached_property
     def length_m(self) -> Floats:
         """Lengths recomputed from the positions, (n,) float64, metres."""
-        if not len(self.rows):
-            return np.empty(0)
         steps = np.zeros(len(self.xyz))
         steps[:-1] = np.linalg.norm(np.diff(self.xyz, axis=0), axis=1)
-        steps[self.first[1:] - 1] = 0.0  # from one route's end to the next one's start nobody flies
-        return np.asarray(np.add.reduceat(steps, self.first[:-1]))
+        steps[self.first[1:][self.fit] - 1] = 0.0  # from one route's end to the next one's start nobody flies
+        return self.sums(steps)
 
     @cached_property
     def euclidean_m(self) -> Floats:
@@ -148,7 +205,7 @@ class Paths:
         return np.asarray(np.linalg.norm(self.ends[:, :3] - self.starts[:, :3], axis=1))
 
 
-def list_lengths(routes: Rows) -> NDArray[np.int64]:
+def list_lengths(routes: Rows) -> Ints:
     """Count the elements of the five lists, (n, 5) int64; a null list has none."""
     counts = [pc.fill_null(pc.list_value_length(routes.column(name)), 0) for name in LISTS]
     return np.column_stack([np.asarray(c.to_numpy(zero_copy_only=False), dtype=np.int64) for c in counts])
@@ -157,17 +214,16 @@ def list_lengths(routes: Rows) -> NDArray[np.int64]:
 def paths_of(routes: Rows) -> Paths:
     """Lay out the poses of a scene's routes."""
     lengths = list_lengths(routes)
-    comparable = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
-    table = routes.table.filter(pa.array(comparable)) if not comparable.all() else routes.table
+    fit = (lengths == lengths[:, :1]).all(axis=1) & (lengths[:, 0] >= 2)
+    table = routes.table.filter(pa.array(fit)) if not fit.all() else routes.table
     flat = {}
     for name in LISTS:
         values = pc.list_flatten(table.column(name))
         flat[name] = values.to_numpy(zero_copy_only=False) if len(values) else np.empty(0)
-    rows = np.flatnonzero(comparable).astype(np.int64)
-    first = np.concatenate([[0], np.cumsum(lengths[comparable, 0])]).astype(np.int64)
+    first = np.concatenate([[0], np.cumsum(np.where(fit, lengths[:, 0], 0))]).astype(np.int64)
     xyz = np.column_stack([flat[name] for name in LISTS[:3]]).astype(np.float64)
     action = np.nan_to_num(flat["action"], nan=-1).astype(np.int64)
-    return Paths(rows, first, xyz, flat["yaw_rad"].astype(np.float64), action)
+    return Paths(fit, first, xyz, flat["yaw_rad"].astype(np.float64), action)
 
 
 @dataclass(eq=False)
@@ -209,21 +265,54 @@ class SceneData:
         value: T = self.cache[name]
         return value
 
-    def sampled_routes(self, *faults: str) -> Iterator[tuple[int, int]]:
-        """Sampled routes without any of these faults: their places in `paths`, and their rows."""
+    def require_meshes(self) -> None:
+        """Raise `UncheckedError` where meshes are to be left alone, or the scene's row is not one row."""
+        if not self.use_meshes:
+            raise UncheckedError("--no-meshes was given")
+        if "scenes" not in self.tables or len(self["scenes"]) != 1:
+            raise UncheckedError("scenes has not one row of it")
+        if self.flagged("scenes", ALWAYS_AFTER).any():
+            raise UncheckedError("the scene's row is at fault")
+
+    def mesh_path(self) -> Path:
+        """Return the scene's mesh on this machine; FileNotFoundError where it is not there."""
+        stored_path = str(self["scenes"].texts("mesh_path")[0])
+        if self.meshes is None:
+            return self.release.root.local_copy(stored_path)
+        return LocalRoot(self.meshes).local_copy(Path(stored_path).name)
+
+    @property
+    def mesh(self) -> Scene:
+        """The scene's mesh, read once; `UncheckedError` where there is none to check by."""
+        self.require_meshes()
+        if self.flagged("scenes", MESH_CHECKS).any():
+            raise UncheckedError("no mesh")
+        digest = str(self["scenes"].texts("mesh_sha256")[0])
+        return self.cached("mesh", lambda: open_scene(self.mesh_path(), digest).scene)
+
+    @property
+    def world(self) -> CollisionWorld:
+        """The mesh as FCL has it."""
+        return collision_world(self.mesh)
+
+    @property
+    def rays(self) -> RayCaster:
+        """The mesh for first hits."""
+        return ray_caster(self.mesh)
+
+    def sampled_routes(self, *faults: str) -> Iterator[int]:
+        """Sampled routes without any of these faults."""
         skip = self.flagged("routes", faults)
-        for k in self.sampled.tolist():
-            if not skip[row := int(self.paths.rows[k])]:
-                yield k, row
+        yield from (row for row in self.sampled.tolist() if not skip[row])
 
     @cached_property
     def sampled(self) -> Ints:
-        """Places in `paths` of the routes that FCL checks: all, or so many by a draw from their ids."""
-        rows = self.paths.rows
+        """Routes that FCL checks: all whose lists fit together, or so many by a draw from their ids."""
+        rows = np.flatnonzero(self.paths.fit)
         if self.sample is None or self.sample >= len(rows):
-            return np.arange(len(rows))
+            return rows
         nav_ids = self["routes"].texts("nav_id")
-        order = sorted(range(len(rows)), key=lambda k: rank(0, "validate", nav_ids[int(rows[k])]))
+        order = sorted(rows.tolist(), key=lambda row: rank(0, "validate", nav_ids[row]))
         return np.sort(np.array(order[: self.sample], dtype=np.int64))
 
     @cached_property
@@ -232,10 +321,6 @@ class SceneData:
         ids = self["objects"].ints("object_id").tolist()
         order = sorted(range(len(ids)), key=lambda row: rank(0, "validate", self.scene, ids[row]))
         return np.sort(np.array(order[: self.pictures], dtype=np.int64))
-
-    def sampled_rows(self, table: str) -> Ints:
-        """Rows of `routes` or `objects` that a check judges which looks at a sample."""
-        return self.sampled_objects if table == "objects" else self.paths.rows[self.sampled]
 
     @cached_property
     def route_of_task(self) -> Ints:
@@ -246,6 +331,15 @@ class SceneData:
     def target_of_route(self) -> Ints:
         """Row of `objects` of every route's target, -1 if there is none."""
         return self["objects"].find("object_id", self["routes"].column("target_object_id"))
+
+    @cached_property
+    def target_of_task(self) -> Ints:
+        """Row of `objects` of every task's target, -1 if there is none."""
+        return at(self.target_of_route, self.route_of_task)
+
+    def objects_of(self, rows: Rows) -> Ints:
+        """Row of `objects` of every anchor's or viewpoint's object, -1 if there is none."""
+        return self["objects"].find("object_id", rows.column("object_id"))
 
     @cached_property
     def selected_of_object(self) -> dict[int, int]:

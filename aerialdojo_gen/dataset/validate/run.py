@@ -13,15 +13,8 @@ from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.dataset.contents import release_scenes
 from aerialdojo_gen.dataset.validate.counts import SceneCounts, count_scene, scene_counts, whole_counts
-from aerialdojo_gen.dataset.validate.parts import (
-    Release,
-    foreign_files,
-    part_path,
-    read_tables,
-    release_of,
-    release_tables,
-)
-from aerialdojo_gen.dataset.validate.registry import CHECKS, Outcome, ordered, run_checks
+from aerialdojo_gen.dataset.validate.parts import Release, foreign_files, part_path, read_tables, release_of
+from aerialdojo_gen.dataset.validate.registry import CHECKS, TABLES, Outcome, ordered, run_checks
 from aerialdojo_gen.dataset.validate.report import Report
 from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor, on_disk
@@ -103,20 +96,16 @@ def validate(
     return Report(tuple(chosen), tuple(outcomes))
 
 
-def check_scene(options: ValidationOptions, scene: str) -> tuple[list[Outcome], SceneCounts]:
-    """Check one scene of a release."""
+def _check(work: _Work) -> tuple[list[Outcome], SceneCounts]:
+    options, scene = work.options, work.scene
     release = release_of(options.release)
     found, outcomes = read_tables(release, scene)
     data = SceneData(scene, release, options.pipeline, found, options.meshes, options.use_meshes, options.sample,
                      options.pictures)  # fmt: skip
-    counts = count_scene(data, len(found) == len(release_tables()))
+    counts = count_scene(data, len(found) == len(TABLES))
     outcomes += run_checks(data, SCENE_CHECKS)
     outcomes.append(scene_counts(data, counts))
     return outcomes, counts
-
-
-def _check(work: _Work) -> tuple[list[Outcome], SceneCounts]:
-    return check_scene(work.options, work.scene)
 
 
 def _large_first(release: Release, scenes: Sequence[str]) -> list[str]:

@@ -72,12 +72,12 @@ def unknown_word(_data: SceneData, rows: Rows) -> Iterator[Finding]:
 @check("*")
 def wrong_part(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """Rows stand in the part of their own scene, partition and subset."""
-    scene = np.asarray(rows.texts("scene"), dtype=object)
+    scene = rows.texts("scene")
     for row in np.flatnonzero(scene != data.scene):
         yield Finding(int(row), f"scene = {scene[row]!r}", data.scene)
     if rows.name != "tasks":
         return
-    subset = np.asarray(rows.texts("subset"), dtype=object)
+    subset = rows.texts("subset")
     for k, part in enumerate(rows.parts):
         folder = part.split("/")[-2]
         expected = folder.removeprefix(f"{partition(data.scene)}_")

@@ -80,13 +80,8 @@ def composition(tasks: pd.DataFrame) -> Figure:
 
 def _histogram(axes: Axes, tasks: pd.DataFrame, name: str, edges: NDArray[np.float64]) -> None:
     parts = [tasks[name][tasks["setting"] == s].to_numpy(np.float64) for s in SETTINGS]
-    axes.hist(
-        parts,
-        bins=edges.tolist(),
-        stacked=True,
-        color=[SETTING_COLOURS[s] for s in SETTINGS],
-        label=[SETTING_NAMES[s] for s in SETTINGS],
-    )
+    colours, names = ([of[s] for s in SETTINGS] for of in (SETTING_COLOURS, SETTING_NAMES))
+    axes.hist(parts, bins=edges.tolist(), stacked=True, color=colours, label=names)
     axes.yaxis.set_major_formatter(_THOUSANDS)
     axes.grid(axis="y")
     axes.set_xlim(0, float(edges[-1]))
