@@ -16,8 +16,8 @@ from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, make_project
 from aerialdojo_gen.imports.drafting import draft_scene
+from aerialdojo_gen.imports.project import PIPELINE, make_project
 from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor
 from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
