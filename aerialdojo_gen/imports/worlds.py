@@ -104,7 +104,8 @@ def vary(
     try:
         pool_of_run = make_executor(executor, workers, address, SharedPaths(shared=(project,), written=(project,)))
         with open_root(project / DATA).lock(), Interrupts() as interrupts, pool_of_run as pool:
-            for one in pool.map(_write_world, work, memory_mb=_MEMORY_MB):
+            # A process stays with a type, whose things it has measured.
+            for one in pool.map(_write_world, work, lambda one: one.world.type, memory_mb=_MEMORY_MB):
                 interrupts.check()
                 if isinstance(one, AerialDojoError):
                     raise one
