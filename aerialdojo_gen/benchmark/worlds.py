@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import subprocess
 import sys
 import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -70,22 +72,15 @@ class WorldMaker:
         return self._cache.make(name, lambda folder: self._make(world, folder)) / "data"
 
     def _make(self, world: World, folder: Path) -> None:
-        """Write a world's plan and its release into a folder, in processes of their own."""
-        knobs = [word for name, value in world.knobs.items() for word in ("--knob", f"{name}={value:g}")]
-        held_out = ["--held-out"] if world.held_out else []
-        seeds = f"{world.seed}:{world.seed + 1}"
-        objects = ["--objects", str(self._n_objects)]
-        self._run(world, "vary", world.type, "--seeds", seeds, "--out", str(folder), *objects, *knobs, *held_out)
-        self._run(world, "run", str(folder / "pipeline.toml"), "--data", str(folder / "data"), "--quiet")
-
-    def _run(self, world: World, *words: str) -> None:
-        command = [sys.executable, "-m", "aerialdojo_gen.cli", *words, "--workers", "1"]
+        """Write a world's plan and its release into a folder, in a process of its own."""
+        given = json.dumps([asdict(world), self._n_objects, str(folder)])
         with self._lock:
             if self._closed:
                 raise AerialDojoError(f"{world.name}: the worlds were closed while it was made")
             self._child = child = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-            )
+                [sys.executable, "-m", __name__, given],
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            )  # fmt: skip
         _, said = child.communicate()
         if child.returncode:
             last = said.strip().splitlines()[-1:] or [f"it ended with {child.returncode}"]
@@ -99,3 +94,21 @@ def make_worlds(types: str | Sequence[str], **options: Any) -> list[Path]:
         return [maker.root(world) for world in maker.worlds]
     finally:
         maker.close()
+
+
+def _write_release(world: World, n_objects: int, folder: Path) -> None:
+    """Write a world's plan and its release; the stages find what drafting has built on the scene."""
+    from aerialdojo_gen.dataset.build import run_pipeline
+    from aerialdojo_gen.imports.worlds import VaryOptions, vary
+
+    options = VaryOptions(world.knobs, world.held_out, n_objects)
+    vary([world.type], range(world.seed, world.seed + 1), folder, options)
+    run_pipeline(folder / "pipeline.toml", data=folder / "data", workers=1)
+
+
+if __name__ == "__main__":
+    made_of, most, into = json.loads(sys.argv[1])
+    try:
+        _write_release(World(**made_of), most, Path(into))
+    except AerialDojoError as failure:
+        raise SystemExit(str(failure)) from None

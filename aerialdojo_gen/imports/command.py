@@ -28,13 +28,11 @@ from aerialdojo_gen.imports.import_mesh import (
 )
 from aerialdojo_gen.imports.listing import describe_mesh
 from aerialdojo_gen.imports.naming import Naming
-from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.imports.project import PIPELINE, make_project
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Scene
-from aerialdojo_gen.store.atomic import atomic_file, make_folder
+from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.layout import check_scene_name
-
-PIPELINE = "pipeline.toml"
 
 
 @dataclass(frozen=True)
@@ -219,24 +217,3 @@ def _recipe(
         f"sun = {list(scene.sun)}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def make_project(project: Path) -> None:
-    """Make a project's folders and its pipeline file, where it has none."""
-    for folder in ("scenes", "annotations"):
-        make_folder(project / folder)
-    if (project / PIPELINE).exists():
-        return
-    name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
-    stages = [stage.name for stage in STAGES if stage.name != "render"]
-    lines = [
-        "# Scenes of our own.",
-        f'name = "{name}"',
-        "seed = 0",
-        'scenes = ["*"]',
-        'recipes = "scenes"',
-        'annotations = "annotations"',
-        f"stages = {json.dumps(stages)}",
-    ]
-    with atomic_file(project, PIPELINE) as path:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")

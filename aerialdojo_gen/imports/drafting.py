@@ -70,7 +70,7 @@ def draft_scene(
     most = n_objects if isinstance(n_objects, int) else counts[1] if counts and exact else _AUTO_OBJECTS
     catalogue = load_catalogue(roots.scene_assets)
     scene = scene or build_scene(roots.recipes / f"{name}.toml", catalogue)
-    vocabulary = Vocabulary(scene, catalogue)
+    vocabulary = Vocabulary.of(scene, catalogue)
     targets = Counter(i.category for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target)
     if not targets:
         raise _nothing_to_draft(name, f"; not taken: {len(scene.instances):,} {SCENERY}")

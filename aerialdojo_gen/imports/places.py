@@ -9,11 +9,12 @@ from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, check_free, make_project
+from aerialdojo_gen.imports.command import check_free
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
 from aerialdojo_gen.imports.map_plan import TownOptions, TownPlan, town_plan
 from aerialdojo_gen.imports.osm import read_maps
+from aerialdojo_gen.imports.project import PIPELINE, make_project
 from aerialdojo_gen.imports.relief import ReliefOptions, ReliefPlan, ground_sampler, relief_plan
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene

@@ -11,24 +11,31 @@ import pyarrow as pa
 import pyarrow.csv
 
 from aerialdojo_gen.annotations.draft import DraftOptions
-from aerialdojo_gen.base.config.pipeline import load_pipeline
+from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, AssetError, UsageError
 from aerialdojo_gen.base.names import choose_scenes
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.base.shipped import home
-from aerialdojo_gen.imports.command import PIPELINE, make_project
 from aerialdojo_gen.imports.drafting import draft_scene
+from aerialdojo_gen.imports.project import PIPELINE, make_project
+from aerialdojo_gen.pipeline.code_digest import stage_code
 from aerialdojo_gen.pipeline.executors import SharedPaths, make_executor
+from aerialdojo_gen.pipeline.fingerprint import scene_fingerprint
 from aerialdojo_gen.pipeline.interrupt import Interrupts
-from aerialdojo_gen.pipeline.stage import ProjectPaths
+from aerialdojo_gen.pipeline.registry import BY_NAME
+from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
+from aerialdojo_gen.pipeline.task import Task, compute
 from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.worlds.kinds import type_names
 from aerialdojo_gen.scenes.worlds.make import make_world
 from aerialdojo_gen.scenes.worlds.world import MAX_SEED, World
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.store.root import open_root
 
+DATA = "data"
 DRAWS = "draws.csv"
+_BUILD = BY_NAME["build-scenes"]
 _MAX_WORLDS = 100_000
 _MEMORY_MB = 1500
 _COLUMNS = ("world", "draw", "reason", "what")
@@ -65,7 +72,8 @@ def vary(
         Names of types, or globs: ``"U_*"``.
     seeds : range
     project : Path
-        Folder for ``scenes/``, ``annotations/``, ``pipeline.toml`` and ``draws.csv``, the table of refused draws.
+        Folder for ``scenes/``, ``annotations/``, ``pipeline.toml`` and ``draws.csv``, the table of refused draws;
+        ``data/`` in it gets the meshes, as `build-scenes` writes them.
     options : VaryOptions, optional
     workers : int, optional
         Processes; all of a Ray cluster's cores where None.
@@ -80,6 +88,8 @@ def vary(
         No such type, no seed, or too many worlds.
     AssetError
         A knob is unknown or out of its range, or no draw of a seed makes a sound scene.
+    StoreError
+        A run is writing to ``data/``.
     """
     options = options or VaryOptions({})
     names = choose_scenes(list(types), type_names(home() / "scene_assets"), "type")
@@ -93,8 +103,9 @@ def vary(
     work = [_Work(world, project, options) for world in worlds]
     try:
         pool_of_run = make_executor(executor, workers, address, SharedPaths(shared=(project,), written=(project,)))
-        with Interrupts() as interrupts, pool_of_run as pool:
-            for one in pool.map(_write_world, work, memory_mb=_MEMORY_MB):
+        with open_root(project / DATA).lock(), Interrupts() as interrupts, pool_of_run as pool:
+            # A process stays with a type, whose things it has measured.
+            for one in pool.map(_write_world, work, lambda one: one.world.type, memory_mb=_MEMORY_MB):
                 interrupts.check()
                 if isinstance(one, AerialDojoError):
                     raise one
@@ -132,15 +143,24 @@ def _write_world(work: _Work) -> VariedWorld:
     if plan.exists() and annotations.exists():
         _check_same(world, plan)
         return VariedWorld(world.name, made=False)
+    # Digest the code now, as loaded: edits while the world is made make its mesh stale.
+    stage_code(_BUILD.name)
     made = make_world(world, home() / "scene_assets", _catalogue())
     with atomic_file(project, f"scenes/{world.name}.toml") as path:
         path.write_text(made.text, encoding="utf-8")
     pipeline = _pipeline(project / PIPELINE)
     folders = (home() / "scene_assets", project / "scenes", project / "annotations")
-    paths = ProjectPaths(open_root(project / "data"), *folders)
+    paths = ProjectPaths(open_root(project / DATA), *folders)
+    _write_mesh(made.scene, pipeline, paths)
     draft = DraftOptions(n_objects=options.n_objects, seed=world.seed)
     draft_scene(world.name, pipeline, paths, draft, force=True, scene=made.scene)
     return VariedWorld(world.name, made=True, refused=made.refused)
+
+
+def _write_mesh(scene: Scene, pipeline: Pipeline, paths: ProjectPaths) -> None:
+    """Do the work of `build-scenes` on a scene that is built: a run finds it fresh while the plan stays as it is."""
+    job = Job(_BUILD.name, scene.name, 0, 1, pipeline.seed, pipeline.embodiment, paths, built=scene)
+    compute(Task(job, pipeline.section(_BUILD.name), scene_fingerprint(_BUILD, pipeline, paths, scene.name)))
 
 
 def _check_same(world: World, plan: Path) -> None:

@@ -68,6 +68,7 @@ class Job:
     force: bool = False  # Whether the stage recomputes its finished files
     code: str = ""  # Digest of the stage's code, for stages that check finished files themselves
     verify: bool = False  # Whether the digests of finished files are compared
+    built: Scene | None = field(default=None, compare=False)  # What `build-scenes` would build, if somebody did so
 
     def read(self, table: str) -> pa.Table:
         """Read all of this scene's rows of a table; StoreError names a missing or damaged shard."""

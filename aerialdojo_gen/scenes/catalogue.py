@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
@@ -284,9 +286,22 @@ def _load(folder: Path, files: tuple[tuple[str, int, int, int], ...]) -> Catalog
     materials = load_materials(folder / _MATERIALS)
     sets = load_sets(folder / _DESIGNS)
     categories: dict[str, Category] = {}
-    for path in catalogue_files(folder):
-        for name, body in read_toml(path).items():
-            if name in categories:
-                raise AssetError(f"{path}: [{name}] is already in {categories[name].source.partition(':')[0]}")
-            categories[name] = parse_category(path, name, body, materials, sets, path.parent.name == TARGETS)
+    with _uncollected():
+        for path in catalogue_files(folder):
+            for name, body in read_toml(path).items():
+                if name in categories:
+                    raise AssetError(f"{path}: [{name}] is already in {categories[name].source.partition(':')[0]}")
+                categories[name] = parse_category(path, name, body, materials, sets, path.parent.name == TARGETS)
     return Catalogue(categories, materials)
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Look for no garbage: there is none in what is read, and looking takes two fifths of the time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

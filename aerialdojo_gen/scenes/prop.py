@@ -271,7 +271,7 @@ def _roles(body: Any, known: Mapping[str, str] | None, materials: MaterialLibrar
 
 
 def _check_material(spec: str, roles: Mapping[str, str] | tuple[()], materials: MaterialLibrary, where: str) -> None:
-    near = nearest(spec, roles)
-    if near and spec.partition(":")[0] not in materials.names and not spec.startswith("#"):
+    known = spec.startswith("#") or spec.partition(":")[0] in materials.names
+    if not known and (near := nearest(spec, roles)):
         raise AssetError(f"{where}: unknown role {spec!r}{near}")
     materials.check(spec, where)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
@@ -60,11 +61,8 @@ class Terrain:
 
     def corners(self) -> Floats:
         """Grid corners as (n, 3) float64 in rows running north, metres."""
-        rows, columns = self.heights_m.shape
-        x = self.x0_m + np.arange(columns) * self.cell_m
-        y = self.y0_m + np.arange(rows) * self.cell_m
-        grid_x, grid_y = np.meshgrid(x, y)
-        return np.column_stack([grid_x.ravel(), grid_y.ravel(), self.heights_m.ravel()])
+        xy = _corners_xy(self.x0_m, self.y0_m, self.cell_m, *self.heights_m.shape)
+        return np.column_stack([xy, self.heights_m.ravel()])
 
     def triangles(self) -> Ints:
         """Triangles as (m, 3) int32 indices into `corners`, counter-clockwise from above."""
@@ -116,7 +114,9 @@ class Terrain:
     def distance(self, area: BaseGeometry) -> Floats:
         """Distance of the corners from an area, in rows, metres."""
         shapely.prepare(area)
-        return np.asarray(shapely.distance(area, shapely.points(self.corners()[:, :2])).reshape(self.heights_m.shape))
+        shape = self.heights_m.shape
+        points = _corner_points(self.x0_m, self.y0_m, self.cell_m, *shape)
+        return np.asarray(shapely.distance(area, points).reshape(shape))
 
     def inside(self, area: BaseGeometry) -> Floats:
         """How deep in an area the corners lie, in rows, metres: 0 outside."""
@@ -126,6 +126,17 @@ class Terrain:
     def _sloped(self, target: Floats, distance: Floats, blend_m: float) -> Terrain:
         t = smooth((distance - self.cell_m * 1.5) / max(blend_m, 1e-9))
         return replace(self, heights_m=target * (1.0 - t) + self.heights_m * t)
+
+
+def _corners_xy(x0_m: float, y0_m: float, cell_m: float, rows: int, columns: int) -> Floats:
+    grid = np.meshgrid(x0_m + np.arange(columns) * cell_m, y0_m + np.arange(rows) * cell_m)
+    return np.column_stack([axis.ravel() for axis in grid])
+
+
+@lru_cache(maxsize=2)
+def _corner_points(x0_m: float, y0_m: float, cell_m: float, rows: int, columns: int) -> NDArray[np.object_]:
+    # A scene's ground is levelled under one thing after the other, on one grid.
+    return np.asarray(shapely.points(_corners_xy(x0_m, y0_m, cell_m, rows, columns)))
 
 
 def rolling_terrain(

@@ -1,13 +1,15 @@
 """`vary` writes worlds that run through the stages, and makes none twice."""
 
+import shutil
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.worlds import VaryOptions, vary
+from aerialdojo_gen.store.root import open_root
 
 
 @pytest.mark.pipeline
@@ -22,9 +24,50 @@ def test_a_world_runs_through_the_stages_and_tests_by_its_seed(tmp_path: Path) -
     assert {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")} == before
     with pytest.raises(UsageError, match="occupancy"):
         vary(["U_ParkingLot"], range(7, 8), out, VaryOptions({"occupancy": 0.5}))
-    run_pipeline(out / "pipeline.toml", data=out / "data", workers=1)
+    built, *others = run_pipeline(out / "pipeline.toml", data=out / "data", workers=1)
+    assert (built.stage, built.computed, built.shards) == ("build-scenes", 0, 1)
+    assert all(stage.computed for stage in others)
     tables = [pq.read_table(p) for p in (out / "data/release/tasks").rglob("part-U_ParkingLot-7.parquet")]
     assert {s for t in tables for s in t.column("subset").to_pylist()} == {"test"}
+
+
+def files_of(data: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(data)): p.read_bytes() for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
+
+
+@pytest.mark.slow
+def test_the_mesh_is_what_build_scenes_writes_until_the_plan_is_edited(tmp_path: Path) -> None:
+    out = tmp_path / "worlds"
+    vary(["U_ParkingLot"], range(8, 9), out, VaryOptions({}, n_objects=3))
+    data, name = out / "data", "U_ParkingLot-8"
+    mesh, shard, plan = data / f"meshes/{name}.glb", data / f"scenes/{name}/part-00000.parquet", out / "scenes"
+
+    def computed(where: Path = data) -> int:
+        (built,) = run_pipeline(out / "pipeline.toml", data=where, stages=["build-scenes"], workers=1)
+        return built.computed
+
+    handed_over = files_of(data)
+    assert set(handed_over) == {str(file.relative_to(data)) for file in (mesh, shard)}
+    assert computed(tmp_path / "other") == 1
+    assert files_of(tmp_path / "other") == handed_over
+
+    assert computed() == 0
+    mesh.write_bytes(mesh.read_bytes()[:-1])
+    assert computed() == 1
+    shard.unlink()
+    mesh.write_bytes(b"half of a mesh")
+    assert computed() == 1
+    assert files_of(data) == handed_over
+
+    text = (plan / f"{name}.toml").read_text()
+    (plan / f"{name}.toml").write_text(text.replace("\nceiling_m = ", "\nceiling_m = 1", 1))
+    assert computed() == 1
+    assert pq.read_table(shard).column("ceiling_m").to_pylist()[0] > 100
+
+    shutil.rmtree(plan)
+    with open_root(data).lock(), pytest.raises(StoreError, match="another run is writing"):
+        vary(["U_ParkingLot"], range(8, 9), out)
+    assert list(plan.iterdir()) == []
 
 
 @pytest.mark.parametrize("seeds", [range(0), range(-1, 1)])

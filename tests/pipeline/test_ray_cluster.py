@@ -170,7 +170,7 @@ def test_worlds_are_made_on_a_cluster_as_they_are_here(nodes, tmp_path):
     for folder, where in ((here, {}), (there, {"executor": "ray", "address": nodes.address, "workers": None})):
         made = vary(*asked, folder, VaryOptions({}, n_objects=4), **where)
         assert [one.made for one in made] == [True, True]
-    assert len(snapshot(here)) == 6
+    assert len(snapshot(here)) == 10  # plan, annotations, mesh and its row of each; pipeline and draws
     assert snapshot(there) == snapshot(here)
 
 

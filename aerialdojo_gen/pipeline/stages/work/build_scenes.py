@@ -23,8 +23,8 @@ _NAME = re.compile(r"([UNID])_([A-Za-z0-9]+)(?:_[01]|-h?\d+)")
 
 def run(job: Job, config: BuildScenesConfig) -> Output:
     """Build one scene (paper, section on scene preparation)."""
-    catalogue = load_catalogue(job.roots.scene_assets)
-    scene = build_scene(job.roots.recipes / f"{job.scene}.toml", catalogue)
+    plan = job.roots.recipes / f"{job.scene}.toml"
+    scene = job.built or build_scene(plan, load_catalogue(job.roots.scene_assets))
     relative = f"meshes/{job.scene}.glb"
     with job.output_file(relative) as path:
         write_glb(scene, path)

@@ -1,0 +1,32 @@
+"""A project folder: scenes, annotations and the pipeline file of both."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from aerialdojo_gen.pipeline.registry import STAGES
+from aerialdojo_gen.store.atomic import atomic_file, make_folder
+
+PIPELINE = "pipeline.toml"
+
+
+def make_project(project: Path) -> None:
+    """Make a project's folders and its pipeline file, where it has none."""
+    for folder in ("scenes", "annotations"):
+        make_folder(project / folder)
+    if (project / PIPELINE).exists():
+        return
+    name = "".join(c if c.isalnum() or c in "._-" else "-" for c in project.resolve().name).strip("._-") or "scenes"
+    stages = [stage.name for stage in STAGES if stage.name != "render"]
+    lines = [
+        "# Scenes of our own.",
+        f'name = "{name}"',
+        "seed = 0",
+        'scenes = ["*"]',
+        'recipes = "scenes"',
+        'annotations = "annotations"',
+        f"stages = {json.dumps(stages)}",
+    ]
+    with atomic_file(project, PIPELINE) as path:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
