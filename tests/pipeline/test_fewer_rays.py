@@ -97,7 +97,7 @@ def test_all_candidates_at_once_step_back_as_far_as_each_by_the_definition(found
 def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(found):
     which = np.arange(0, len(found.positions_m), 2)
     places = found.positions_m[which] + np.where(which[:, None] % 4, [0.3, -0.2, 0.1], 0.0)
-    moved = found.moved(which, places, CONFIG.fov_deg)
+    moved = found.moved(which, places)
     anew = Candidates.of(found.world, found.instance, found.points, places, found.yaw_rad[which], RADIUS, CONFIG)
     for name in (
         "positions_m",

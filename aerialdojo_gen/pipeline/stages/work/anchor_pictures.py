@@ -45,7 +45,7 @@ class CandidateViews:
         most = np.minimum(config.step_back_m, limits_m)
         backs = steps_back_m(found.world, found.instance, found.points, places, yaws, config.fov_deg, most)
         away = np.column_stack([np.cos(yaws), np.sin(yaws), np.zeros(len(yaws))]) * backs[:, None]
-        behind = found.moved(which, places - away, config.fov_deg)
+        behind = found.moved(which, places - away)
         views, elevation = behind.views, found.elevation_deg[which]
         clear = clarity_score(views.visible_fraction, views.framed, np.zeros(len(which)), level_marks(elevation))
         rank = (found.rank[which] + behind.rank) / 2.0 * clear

@@ -51,20 +51,18 @@ class World:
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Viewpoints of one object with their ray-cast measurements."""
+    """Viewpoints of one object with their ray-cast measurements, some of them taken when they are first needed."""
 
     world: World
     instance: int  # The object's index in the scene
     alone: TriangleRayCaster  # The object by itself
     positions_m: Floats  # (n, 3) float64; the body's centres, world frame
     yaw_rad: Floats  # (n,) float64
-    clearance_m: Floats  # (n,) float64; distance to the nearest surface
     sight: PointVisibility  # Which points of the object's surface they see
     points: Floats  # (m, 3) float64; on the object's surface, metres, world frame
-    patches: tuple[Patch, ...]  # Points of each of the object's identifying parts
-    seen: Floats  # Share that they see of each of those parts (`part_visibility.visible_shares`)
     radius_m: float  # Of the body
     standoff_m: float
+    fov_deg: float
 
     @classmethod
     def of(
@@ -74,13 +72,24 @@ class Candidates:
         """Look from viewpoints (n, 3), world metres, with yaws at an object's points (m, 3) by ray casts."""
         alone = instance_caster(world.scene.instances[instance])
         sight = PointVisibility.of(positions_m, yaw_rad, points, alone, world.rays, instance, config.fov_deg)
-        clearance = world.free.distance_m(positions_m)
-        patches = patches_of(world, instance, points)
-        seen = visible_shares(positions_m, yaw_rad, patches, world.rays, config.fov_deg)
         return cls(
-            world, instance, alone, positions_m, yaw_rad, clearance, sight, points, patches, seen, radius_m,
-            config.standoff_m,
-        )  # fmt: skip
+            world, instance, alone, positions_m, yaw_rad, sight, points, radius_m, config.standoff_m, config.fov_deg
+        )
+
+    @cached_property
+    def clearance_m(self) -> Floats:
+        """Their distance to the nearest surface, (n,) float64."""
+        return self.world.free.distance_m(self.positions_m)
+
+    @cached_property
+    def patches(self) -> tuple[Patch, ...]:
+        """Points of each of the object's identifying parts."""
+        return patches_of(self.world, self.instance, self.points)
+
+    @cached_property
+    def seen(self) -> Floats:
+        """Share that they see of each of those parts, (n, t) float64 (`part_visibility.visible_shares`)."""
+        return visible_shares(self.positions_m, self.yaw_rad, self.patches, self.world.rays, self.fov_deg)
 
     @cached_property
     def views(self) -> Views:
@@ -113,17 +122,19 @@ class Candidates:
         parts = part_score(self.part_visibility) if self.part_visibility.shape[1] else None
         return recognisability(rank, parts, front_score(self.off_front_rad))
 
-    def moved(self, which: NDArray[np.int64], positions_m: Floats, fov_deg: float) -> Candidates:
+    def moved(self, which: NDArray[np.int64], positions_m: Floats) -> Candidates:
         """Look from other places (k, 3), facing the same way; places that stay are not looked from again."""
         world, yaws = self.world, self.yaw_rad[which]
         new = np.flatnonzero((positions_m != self.positions_m[which]).any(axis=1))
         places, turned = positions_m[new], yaws[new]
-        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, fov_deg)
+        sight = PointVisibility.of(places, turned, self.points, self.alone, world.rays, self.instance, self.fov_deg)
         clearance, seen = self.clearance_m[which], self.seen[which]
         clearance[new] = world.free.distance_m(places)
-        seen[new] = visible_shares(places, turned, self.patches, world.rays, fov_deg)
-        sight = self.sight.with_rows(which, new, sight)
-        return replace(self, positions_m=positions_m, yaw_rad=yaws, clearance_m=clearance, sight=sight, seen=seen)
+        seen[new] = visible_shares(places, turned, self.patches, world.rays, self.fov_deg)
+        found = replace(self, positions_m=positions_m, yaw_rad=yaws, sight=self.sight.with_rows(which, new, sight))
+        # What is measured already need not be when it is first needed.
+        vars(found).update(clearance_m=clearance, patches=self.patches, seen=seen)
+        return found
 
     def seeing(self, least: float) -> NDArray[np.int64]:
         """Numbers of the viewpoints that see at least so large a fraction of what faces them, and anything at all."""
