@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.gl_occlusion import BodyCulling
 from aerialdojo_gen.rendering.gl_target import read_instances, read_pixels
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Renderer
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import NO_CLOUDS, HeightMap, Lighting, ShadowMap, light_of
-from aerialdojo_gen.rendering.picture import Closable, Picture
+from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.texels import Backdrop, masked_caster, scene_texels
 from aerialdojo_gen.scenes.context import context_of
@@ -29,11 +29,10 @@ Ints = NDArray[np.int32]
 _WIDE_M = 4.0
 
 
-class RayRenderer(Closable):
-    """A renderer by ray casts, of both sides of triangles; see `aerialdojo_gen.rendering.backend.Renderer`."""
+class RayRenderer(Renderer):
+    """A renderer by ray casts, of both sides of triangles."""
 
-    name = "rays"
-    device = "Embree"
+    name, device = "rays", "Embree"
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         materials = sorted(scene.materials)

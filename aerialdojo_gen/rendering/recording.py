@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
-from aerialdojo_gen.rendering.picture import Picture
+from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
 from aerialdojo_gen.rendering.video import Video
