@@ -67,7 +67,7 @@ class RayRenderer(Renderer):
         far_below = np.eye(4)
         far_below[2, 3] = -1e6
         self._open_sky = HeightMap.nowhere()
-        self._no_shadow = ShadowMap(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
+        self._no_shadow = ShadowMap.of(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = True) -> Picture:
         """Take a picture, always with its instance id map."""
@@ -84,19 +84,12 @@ class RayRenderer(Renderer):
             along = distance[hit] / length[hit]
             points = world_from_camera[:3, 3] + along[:, None] * directions[hit]
             albedo[hit] = self._has_vertex_colours.with_vertex_colours(face[hit], points, albedo[hit])
-        depth = depth.reshape(shape)
+        depth, surface = depth.reshape(shape), surface.reshape(shape)
         rgb = shade(
-            camera,
-            world_from_camera,
-            albedo.reshape(*shape, 3),
-            depth,
-            surface.reshape(shape),
-            self._light,
-            self._no_shadow,
-            NO_CLOUDS,
-            self._open_sky,
-        )
-        self._backdrop.paint(rgb, surface.reshape(shape) < 0, camera, world_from_camera)
+            camera, world_from_camera, albedo.reshape(*shape, 3), depth, surface, self._light, self._no_shadow,
+            NO_CLOUDS, self._open_sky,
+        )  # fmt: skip
+        self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         return Picture(rgb, depth, owner.reshape(shape))
 
 

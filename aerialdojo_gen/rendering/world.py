@@ -88,7 +88,7 @@ class PyBulletRenderer(Renderer):
         self._light: Lighting = light_of(self._scene, self._materials, light)
         self._backdrop = Backdrop(self._scene, self._light)
         camera, pose, near_m, far_m = sun_view(self._scene, light=light)
-        self._shadow = ShadowMap(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
+        self._shadow = ShadowMap.of(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
 
     def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
         client = self._client
