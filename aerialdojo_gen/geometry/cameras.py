@@ -33,19 +33,11 @@ _BODY_FROM_CAMERA = {
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with square pixels.
+    """A pinhole camera with square pixels."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    fov_deg : float
-        Horizontal field of view, degrees, in (0, 180).
-    """
-
-    width: int = 640
+    width: int = 640  # Pixels
     height: int = 640
-    fov_deg: float = FOV_DEG
+    fov_deg: float = FOV_DEG  # Horizontal field of view, in (0, 180)
 
     def __post_init__(self) -> None:
         """Refuse what is no picture."""

@@ -56,13 +56,8 @@ class RayRenderer(Renderer):
         flat = [np.array([[scene.materials[name].colour]], np.uint8) for name in materials]
         tiles = [f if t is None else t for t, f in zip(textures, flat, strict=True)]
         self._texels = np.concatenate([t.reshape(-1, 3) for t in tiles])
-        self._tiles = np.column_stack(
-            [
-                np.cumsum([0, *(t.shape[0] * t.shape[1] for t in tiles[:-1])]),
-                [t.shape[0] for t in tiles],
-                [t.shape[1] for t in tiles],
-            ]
-        ).astype(np.int64)
+        sizes = np.array([t.shape[:2] for t in tiles], np.int64)
+        self._tiles = np.column_stack([np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1), sizes])
         # One texel without an occluder, far below all points: none may lie in the sun camera's plane.
         far_below = np.eye(4)
         far_below[2, 3] = -1e6

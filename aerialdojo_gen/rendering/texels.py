@@ -90,11 +90,8 @@ class SurfaceTexels:
         if not self._has_vertex_colours:
             return colours
         rows = np.flatnonzero(self._is_coloured[face])
-        mixed = np.einsum(
-            "nk,nkc->nc",
-            self.barycentric(face[rows], points[rows]),
-            self._colours[self.faces[face[rows]]].astype(float),
-        )
+        corners = self._colours[self.faces[face[rows]]].astype(float)
+        mixed = np.einsum("nk,nkc->nc", self.barycentric(face[rows], points[rows]), corners)
         out = colours.copy()
         out[rows] = np.clip(np.rint(mixed), 0, 255)
         return out
