@@ -38,8 +38,8 @@ class SurfaceTexels:
         self.material = np.repeat(np.array([names.index(p.material) for p in parts], dtype=np.int64), counts)
         self.vertices, self.faces = soup(parts)
         self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
-        self._has_vertex_colours = any(part.colours is not None for part in parts)
-        if self._has_vertex_colours:
+        self.has_vertex_colours = any(part.colours is not None for part in parts)
+        if self.has_vertex_colours:
             self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
             self._is_coloured = np.repeat([part.colours is not None for part in parts], counts)
 
@@ -87,7 +87,7 @@ class SurfaceTexels:
 
     def with_vertex_colours(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
         """Replace colours (n, 3) by interpolated vertex colours where a part has them."""
-        if not self._has_vertex_colours:
+        if not self.has_vertex_colours:
             return colours
         rows = np.flatnonzero(self._is_coloured[face])
         corners = self._colours[self.faces[face[rows]]].astype(float)
