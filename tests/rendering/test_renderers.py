@@ -186,6 +186,16 @@ def test_views_drawn_together_are_what_each_is_by_itself(opened, name):
 
 
 @every_renderer
+def test_a_picture_s_arrays_are_its_own(opened, name):
+    pose = view_pose((1, 1, 3), 2.0, "front")
+    first = opened(name).render(CAMERA, pose)
+    kept = first.rgb.copy(), first.depth_m.copy()
+    opened(name).render(CAMERA, view_pose((1, 1, 3), 0.5, "down"))
+    assert np.array_equal(first.rgb, kept[0])
+    assert np.array_equal(first.depth_m, kept[1])
+
+
+@every_renderer
 def test_a_sound_renderer_passes_the_check_at_start(name):
     choice = choose_renderer(name)
     assert choice.name == name
