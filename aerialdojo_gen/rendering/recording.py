@@ -68,16 +68,19 @@ def _writers(
     """Open the writers; return the function that encodes the pictures of a pose, by view."""
     comments = {view: camera_comment(camera, view, config) for view in views}
     own = [place for place in places(config) if place.view in comments]
-    writers: list[tuple[str, VideoWriter | PngWriter]]
-    if config.layout == "files":
-        writers = [(place.view, stack.enter_context(_writer(folder, place, comments, config))) for place in own]
-    else:
+    writers: list[tuple[str, VideoWriter | PngWriter]] = []
+    if config.layout == "tiled":
         size = config.width * columns(config), config.height * -(-len(config.views) // columns(config))
-        comment = tiles_comment(own, comments)
         one = VideoWriter(
-            folder / TILED, modalities(config), *size, config.fps, config.crf, config.preset, comment
+            folder / TILED, modalities(config), *size, config.fps, config.crf, config.preset,
+            tiles_comment(own, comments),
         )  # fmt: skip
-        writers = [(TILED, stack.enter_context(one))]
+        writers.append((TILED, stack.enter_context(one)))
+    else:
+        for place in own:
+            writer = _writer(folder, place, comments, config)
+            stack.enter_context(writer)
+            writers.append((place.view, writer))
 
     def write(pictures: dict[str, Picture]) -> None:
         stored = {view: _encodable(picture, config) for view, picture in pictures.items()}

@@ -180,7 +180,7 @@ class Backdrop:
         if self.light is not None:
             # Its textures are finer than a pixel almost everywhere: their mean stands for them.
             lit = self._lit[face]
-            base, normal = self._texels.mean_colours(face[lit]), self._texels.normals(face[lit])
+            base, normal = self._texels.mean_colours(face[lit]).astype(np.float64), self._texels.normals(face[lit])
             colours[lit] = lit_in_haze(base, normal, unit[lit], distance[lit], self.light)
         rgb[rows, columns] = np.clip(colours + 0.5, 0.0, 255.0).astype(np.uint8)
 
