@@ -182,7 +182,7 @@ def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, c
             following[last[slot]] = i
         last[slot] = i
     for start in first:
-        i = start
+        i = int(start)
         while i >= 0:
             x = y = z = np.float32(0.0)
             j = start
