@@ -15,8 +15,9 @@ from aerialdojo_gen.base.constants import MODALITIES
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.benchmark.agents.goal import Goal, Sensors
 from aerialdojo_gen.planning.flight_space import Point
-from aerialdojo_gen.rendering.backend import Renderer, choose_renderer, scene_renderer
+from aerialdojo_gen.rendering.backend import choose_renderer, scene_renderer
 from aerialdojo_gen.rendering.bodies import draw_bodies
+from aerialdojo_gen.rendering.picture import Renderer
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import DIRECTIONS

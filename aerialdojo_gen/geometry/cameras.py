@@ -33,19 +33,11 @@ _BODY_FROM_CAMERA = {
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with square pixels.
+    """A pinhole camera with square pixels."""
 
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    fov_deg : float
-        Horizontal field of view, degrees, in (0, 180).
-    """
-
-    width: int = 640
+    width: int = 640  # Pixels
     height: int = 640
-    fov_deg: float = FOV_DEG
+    fov_deg: float = FOV_DEG  # Horizontal field of view, in (0, 180)
 
     def __post_init__(self) -> None:
         """Refuse what is no picture."""
@@ -64,37 +56,14 @@ class Camera:
         return np.array([[f, 0.0, self.width / 2.0], [0.0, f, self.height / 2.0], [0.0, 0.0, 1.0]])
 
     def rays(self) -> Floats:
-        """Directions through the pixel centres in the camera frame, (height, width, 3) float64, z = 1.
-
-        A ray's parameter is therefore planar depth, not distance.
-        """
+        """Directions through the pixel centres, camera frame, (height, width, 3) float64, z = 1: scaled by depth."""
         u, v = np.meshgrid(np.arange(self.width) + 0.5, np.arange(self.height) + 0.5)
         f = self.focal_px
         return np.stack([(u - self.width / 2.0) / f, (v - self.height / 2.0) / f, np.ones_like(u)], axis=-1)
 
 
 def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
-    """Pose of one of the body's cameras.
-
-    Parameters
-    ----------
-    position : (3,) array_like
-        The body's centre, metres, world frame.
-    yaw_rad : float
-        The body's yaw, counter-clockwise from +x.
-    view : str
-        One of `aerialdojo_gen.store.schemas.VIEWS`.
-
-    Returns
-    -------
-    (4, 4) float64
-        world_from_camera.
-
-    Raises
-    ------
-    KeyError
-        If there is no such view.
-    """
+    """Pose of a body's camera, world_from_camera (4, 4) float64; `view` is one of `VIEWS`."""
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     world_from_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pose = np.eye(4)
@@ -104,23 +73,7 @@ def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
 
 
 def look_at_pose(eye: ArrayLike, target: ArrayLike) -> Floats:
-    """Pose of a camera that looks from one point at another, its picture upright.
-
-    Parameters
-    ----------
-    eye, target : (3,) array_like
-        Metres, world frame; distinct.
-
-    Returns
-    -------
-    (4, 4) float64
-        world_from_camera; looking straight up or down, north (+y) is at the image's top.
-
-    Raises
-    ------
-    ValueError
-        If the two points coincide.
-    """
+    """Pose (4, 4) of an upright camera that looks at a point; straight up or down, north is at the image's top."""
     e, t = np.asarray(eye, dtype=np.float64), np.asarray(target, dtype=np.float64)
     distance = float(norm(t - e))
     if distance < 1e-9:
@@ -140,22 +93,7 @@ def look_at_pose(eye: ArrayLike, target: ArrayLike) -> Floats:
 
 
 def project(camera: Camera, world_from_camera: Floats, points: ArrayLike) -> tuple[Floats, Floats]:
-    """Project world points into a picture.
-
-    Parameters
-    ----------
-    camera : Camera
-    world_from_camera : (4, 4) float64
-    points : (..., 3) array_like
-        Metres, world frame.
-
-    Returns
-    -------
-    uv : (..., 2) float64
-        Pixels; meaningless where the depth is not positive, outside the picture where it is not in view.
-    depth_m : (...) float64
-        Planar depth.
-    """
+    """Project world points (..., 3): pixels (..., 2), meaningless where depth is not positive, and planar depth."""
     p = np.asarray(points, dtype=np.float64)
     local = product(p - world_from_camera[:3, 3], world_from_camera[:3, :3])
     depth = local[..., 2]

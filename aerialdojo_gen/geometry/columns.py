@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ _BIN_M = 2.0
 _MOST_BINS = 1000
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(NamedTuple):
     """A lattice of columns over a rectangle."""
 
     low: Floats  # (2,) float64; its corner, metres, world frame
@@ -44,7 +43,7 @@ class Plan:
 def lowest_of(triangles: Floats, plan: Plan) -> Floats:
     """Find the lowest point of triangles, (n, 9), in every column of a plan: float64 metres, NaN where is none."""
     found = np.full(plan.shape, np.inf)
-    _lower(np.ascontiguousarray(triangles), plan.low[0], plan.low[1], plan.step_m, found)
+    _lower(np.ascontiguousarray(triangles), plan, found)
     found[np.isinf(found)] = np.nan
     return found
 
@@ -52,12 +51,11 @@ def lowest_of(triangles: Floats, plan: Plan) -> Floats:
 def shares_of(triangles: Floats, body: Ints, n: int, lowest: Floats, plan: Plan) -> tuple[Ints, Ints, Ints]:
     """Count, for n bodies of triangles (k, 9), the columns they cover, cover once, and are lowest in; (n,) each."""
     counts = np.zeros((3, n), np.int64)
-    _count(np.ascontiguousarray(triangles), body, plan.low[0], plan.low[1], plan.step_m, lowest, counts)
+    _count(np.ascontiguousarray(triangles), body, plan, lowest, counts)
     return counts[0], counts[1], counts[2]
 
 
-@dataclass(frozen=True, eq=False)
-class ColumnIndex:
+class ColumnIndex(NamedTuple):
     """Triangles by the squares of the plan that they lie over."""
 
     triangles: Floats  # (n, 9) float64
@@ -76,32 +74,19 @@ class ColumnIndex:
         bin_m = max(_BIN_M, float((high - low).max()) / _MOST_BINS)
         nx, ny = (int(v / bin_m) + 1 for v in high - low)
         first = np.zeros(nx * ny + 1, np.int64)
-        _fill(t, low[0], low[1], bin_m, nx, ny, first[1:], np.empty(0, np.int64))
+        _fill(t, low, bin_m, (nx, ny), first[1:], np.empty(0, np.int64))
         first = np.cumsum(first)
         member = np.empty(int(first[-1]), np.int64)
-        _fill(t, low[0], low[1], bin_m, nx, ny, first[:-1].copy(), member)
+        _fill(t, low, bin_m, (nx, ny), first[:-1].copy(), member)
         return cls(t, low, bin_m, (nx, ny), first, member)
 
     def lowest_m(self, xy: Floats) -> Floats:
         """Height of the lowest triangle at points in plan, (n, 2) float64; (n,) float64 metres, NaN where is none."""
-        return np.asarray(
-            _lowest_at(
-                np.ascontiguousarray(xy), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
-                self.shape[1], self.first, self.member,
-            )
-        )  # fmt: skip
+        return np.asarray(_lowest_at(np.ascontiguousarray(xy), self))
 
     def layers(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """For points (n, 3).
-
-        Layers lower by more than 5 cm, height of the highest of them, height of the nearest one above.
-        """
-        n = len(points)
-        below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)
-        _find_layers(
-            np.ascontiguousarray(points), self.triangles, self.low[0], self.low[1], self.bin_m, self.shape[0],
-            self.shape[1], self.first, self.member, below, next_m, away_m,
-        )  # fmt: skip
+        """Layers over 5 cm below points (n, 3), height of the highest of these, how far up the nearest layer is."""
+        below, next_m, away_m = _layers_at(np.ascontiguousarray(points), self)
         return below, next_m, away_m
 
     def gaps_m(self, points: Floats, own: int, owner: Ints, deep_m: float) -> Floats:
@@ -109,12 +94,7 @@ class ColumnIndex:
 
         Zero where a point is sunk: where one that faces up is above it, no higher than `deep_m`.
         """
-        return np.asarray(
-            _gaps_below(
-                np.ascontiguousarray(points), own, owner, deep_m, self.triangles, self.low[0], self.low[1],
-                self.bin_m, self.shape[0], self.shape[1], self.first, self.member,
-            )
-        )  # fmt: skip
+        return np.asarray(_gaps_below(np.ascontiguousarray(points), own, owner, deep_m, self))
 
 
 @njit(cache=True, inline="always")
@@ -133,37 +113,42 @@ def _height(x: float, y: float, t: Floats, k: int) -> float:
 
 
 @njit(cache=True, inline="always")
-def _span(a: float, b: float, c: float, low: float, step: float, at: float, n: int) -> tuple[int, int]:
+def _span(a: float, b: float, c: float, plan: Plan, axis: int) -> tuple[int, int]:
     """First and last column along an axis that a triangle can meet."""
-    first = math.ceil((min(a, b, c) - low) / step - at)
-    last = math.floor((max(a, b, c) - low) / step - at)
-    return max(0, first), min(n - 1, last)
+    first = math.ceil((min(a, b, c) - plan.low[axis]) / plan.step_m - _CELL_OFFSET[axis])
+    last = math.floor((max(a, b, c) - plan.low[axis]) / plan.step_m - _CELL_OFFSET[axis])
+    return max(0, first), min(plan.shape[axis] - 1, last)
+
+
+@njit(cache=True, inline="always")
+def _height_in(plan: Plan, i: int, j: int, t: Floats, k: int) -> float:
+    """Height of triangle k in a column of a plan."""
+    x = plan.low[0] + (i + _CELL_OFFSET[0]) * plan.step_m
+    return _height(x, plan.low[1] + (j + _CELL_OFFSET[1]) * plan.step_m, t, k)
 
 
 @njit(cache=True)
-def _lower(t: Floats, x0: float, y0: float, step: float, found: Floats) -> None:
-    nx, ny = found.shape
+def _lower(t: Floats, plan: Plan, found: Floats) -> None:
     for k in range(t.shape[0]):
-        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _CELL_OFFSET[0], nx)
-        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _CELL_OFFSET[1], ny)
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], plan, 0)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], plan, 1)
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                z = _height(x0 + (i + _CELL_OFFSET[0]) * step, y0 + (j + _CELL_OFFSET[1]) * step, t, k)
+                z = _height_in(plan, i, j, t, k)
                 if z < found[i, j]:
                     found[i, j] = z
 
 
 @njit(cache=True)
-def _count(t: Floats, body: Ints, x0: float, y0: float, step: float, lowest: Floats, counts: Ints) -> None:
-    nx, ny = lowest.shape
-    seen, twice, low = np.full((nx, ny), -1), np.full((nx, ny), -1), np.full((nx, ny), -1)
+def _count(t: Floats, body: Ints, plan: Plan, lowest: Floats, counts: Ints) -> None:
+    seen, twice, low = np.full(lowest.shape, -1), np.full(lowest.shape, -1), np.full(lowest.shape, -1)
     for k in range(t.shape[0]):
         own = body[k]
-        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], x0, step, _CELL_OFFSET[0], nx)
-        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], y0, step, _CELL_OFFSET[1], ny)
+        i0, i1 = _span(t[k, 0], t[k, 3], t[k, 6], plan, 0)
+        j0, j1 = _span(t[k, 1], t[k, 4], t[k, 7], plan, 1)
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
-                z = _height(x0 + (i + _CELL_OFFSET[0]) * step, y0 + (j + _CELL_OFFSET[1]) * step, t, k)
+                z = _height_in(plan, i, j, t, k)
                 if math.isnan(z):
                     continue
                 if seen[i, j] != own:
@@ -179,37 +164,41 @@ def _count(t: Floats, body: Ints, x0: float, y0: float, step: float, lowest: Flo
 
 
 @njit(cache=True)
-def _fill(t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, place: Ints, member: Ints) -> None:
+def _fill(t: Floats, low: Floats, edge: float, shape: tuple[int, int], place: Ints, member: Ints) -> None:
     """Count the triangles of every square into `place`, or, given room in `member`, put them there."""
     counting = len(member) == 0
     for k in range(t.shape[0]):
-        i0 = max(0, int((min(t[k, 0], t[k, 3], t[k, 6]) - x0) / edge))
-        i1 = min(nx - 1, int((max(t[k, 0], t[k, 3], t[k, 6]) - x0) / edge))
-        j0 = max(0, int((min(t[k, 1], t[k, 4], t[k, 7]) - y0) / edge))
-        j1 = min(ny - 1, int((max(t[k, 1], t[k, 4], t[k, 7]) - y0) / edge))
+        i0 = max(0, int((min(t[k, 0], t[k, 3], t[k, 6]) - low[0]) / edge))
+        i1 = min(shape[0] - 1, int((max(t[k, 0], t[k, 3], t[k, 6]) - low[0]) / edge))
+        j0 = max(0, int((min(t[k, 1], t[k, 4], t[k, 7]) - low[1]) / edge))
+        j1 = min(shape[1] - 1, int((max(t[k, 1], t[k, 4], t[k, 7]) - low[1]) / edge))
         for i in range(i0, i1 + 1):
             for j in range(j0, j1 + 1):
                 if not counting:
-                    member[place[i * ny + j]] = k
-                place[i * ny + j] += 1
+                    member[place[i * shape[1] + j]] = k
+                place[i * shape[1] + j] += 1
+
+
+@njit(cache=True, inline="always")
+def _over(x: float, y: float, index: ColumnIndex) -> NDArray[np.int64]:
+    """Triangles of the square of a point in plan; none outside of the squares."""
+    # Below 0 int() rounds up, and a NaN has no place at all.
+    if not (x >= index.low[0] and y >= index.low[1]):
+        return index.member[:0]
+    i, j = int((x - index.low[0]) / index.bin_m), int((y - index.low[1]) / index.bin_m)
+    if i >= index.shape[0] or j >= index.shape[1]:
+        return index.member[:0]
+    square = i * index.shape[1] + j
+    return index.member[index.first[square] : index.first[square + 1]]
 
 
 @njit(cache=True)
-def _lowest_at(
-    xy: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints
-) -> Floats:  # fmt: skip
+def _lowest_at(xy: Floats, index: ColumnIndex) -> Floats:
     out = np.full(len(xy), np.nan)
     for p in range(len(xy)):
-        x, y = xy[p, 0], xy[p, 1]
-        # Below 0 int() rounds up, and a NaN has no place at all.
-        if not (x >= x0 and y >= y0):
-            continue
-        i, j = int((x - x0) / edge), int((y - y0) / edge)
-        if i >= nx or j >= ny:
-            continue
         best = np.inf
-        for m in range(first[i * ny + j], first[i * ny + j + 1]):
-            z = _height(x, y, t, member[m])
+        for k in _over(xy[p, 0], xy[p, 1], index):
+            z = _height(xy[p, 0], xy[p, 1], index.triangles, k)
             if z < best:
                 best = z
         if best < np.inf:
@@ -218,26 +207,17 @@ def _lowest_at(
 
 
 @njit(cache=True)
-def _find_layers(
-    points: Floats, t: Floats, x0: float, y0: float, edge: float, nx: int, ny: int, first: Ints, member: Ints,
-    below: Ints, next_m: Floats, away_m: Floats,
-) -> None:  # fmt: skip
-    heights = np.empty(t.shape[0])
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        if not (x >= x0 and y >= y0):
-            continue
-        i, j = int((x - x0) / edge), int((y - y0) / edge)
-        if i >= nx or j >= ny:
-            continue
-        n = 0
-        for m in range(first[i * ny + j], first[i * ny + j + 1]):
-            h = _height(x, y, t, member[m])
-            if not math.isnan(h):
-                heights[n] = h
-                n += 1
+def _layers_at(points: Floats, index: ColumnIndex) -> tuple[Ints, Floats, Floats]:
+    n = len(points)
+    below, next_m, away_m = np.zeros(n, np.int64), np.full(n, np.nan), np.full(n, np.inf)
+    for p in range(n):
+        x, y, z = points[p]
+        over = _over(x, y, index)
+        heights = np.empty(len(over))
+        for m in range(len(over)):
+            heights[m] = _height(x, y, index.triangles, over[m])
         last = -np.inf
-        for h in np.sort(heights[:n]):
+        for h in np.sort(heights[~np.isnan(heights)]):
             # An edge that two triangles share is met twice.
             if h < z - _OWN_LAYER_M and h > last + _SAME_LAYER_M:
                 below[p] += 1
@@ -245,23 +225,15 @@ def _find_layers(
             last = h
             if abs(h - z) < abs(away_m[p]):
                 away_m[p] = h - z
+    return below, next_m, away_m
 
 
 @njit(cache=True)
-def _gaps_below(
-    points: Floats, own: int, owner: Ints, deep: float, t: Floats, x0: float, y0: float, edge: float, nx: int,
-    ny: int, first: Ints, member: Ints,
-) -> Floats:  # fmt: skip
-    out = np.full(len(points), np.inf)
+def _gaps_below(points: Floats, own: int, owner: Ints, deep: float, index: ColumnIndex) -> Floats:
+    out, t = np.full(len(points), np.inf), index.triangles
     for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        if not (x >= x0 and y >= y0):
-            continue
-        i, j = int((x - x0) / edge), int((y - y0) / edge)
-        if i >= nx or j >= ny:
-            continue
-        for m in range(first[i * ny + j], first[i * ny + j + 1]):
-            k = member[m]
+        x, y, z = points[p]
+        for k in _over(x, y, index):
             if owner[k] == own:
                 continue
             h = _height(x, y, t, k)

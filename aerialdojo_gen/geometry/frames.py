@@ -17,10 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def compass_direction(dx_m: float, dy_m: float) -> str:
-    """Name the compass direction of a displacement in metres.
-
-    North is +y, a border belongs to the counter-clockwise sector.
-    """
+    """Name the compass direction of a displacement; a border belongs to the counter-clockwise sector."""
     if dx_m == 0.0 and dy_m == 0.0:
         raise ValueError("no compass direction between two places that coincide in the plane")
     sector = math.floor((math.degrees(math.atan2(dy_m, dx_m)) + 22.5) / 45.0)
@@ -59,10 +56,7 @@ def wrap_angle_rad(angle_rad: ArrayLike) -> Floats:
 
 
 def yaw_towards(position: ArrayLike, target: ArrayLike) -> Floats:
-    """Yaw in radians, in (-π, π], that faces a target in the world's plane.
-
-    0 where the two stand on one vertical line.
-    """
+    """Yaw in radians, in (-π, π], that faces a target in the plane; 0 where the two stand on one vertical line."""
     p, q = np.asarray(position, dtype=np.float64), np.asarray(target, dtype=np.float64)
     yaw = atan2(q[..., 1] - p[..., 1], q[..., 0] - p[..., 0])
     # A difference of -0.0 makes arctan2 answer -π for due west.

@@ -50,10 +50,7 @@ class Ground:
 
     @classmethod
     def of(cls, scene: SceneLike, radius_m: float | None = None) -> Ground | None:
-        """Find a scene's ground by form alone: open, level, mostly single-layered, lowest bodies.
-
-        None where it is a solid.
-        """
+        """Find a scene's ground by form alone: open, level, mostly one layer, lowest bodies; None for a solid."""
         low, high = np.asarray(scene.bounds, np.float64)
         plan = Plan.over(low[:2], high[:2], _COLUMN_M)
         inside = [i for i in scene.instances if _reaches(i.bounds, low, high)]
@@ -83,24 +80,20 @@ class Ground:
         faces, body, owner = faces[order], body[order], owner[order]
         triangles = corners[faces].reshape(-1, 9)
         n = int(body[-1]) + 1 if len(body) else 0
-        covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
-        up, area = _areas(triangles)
-        if labelled:
-            known = _has_rim(faces, body, n)[body]
-            names = frozenset(inside[k].node for k in np.unique(owner[known]))
-            return cls(triangles[known], _rim(faces[known], corners), bare, names) if known.any() else None
-        level = np.bincount(body, up, n) >= _LEVEL * np.bincount(body, area, n)
-        all_columns = int(np.isfinite(lowest).sum())
-        is_ground = (
-            _has_rim(faces, body, n)
-            & (covered * plan.step_m**2 >= _LEAST_AREA_M2)
-            & (single >= _SINGLE_LAYER * covered)
-            & (bottom >= _LOWEST * covered)
-            & (level | (covered >= _COVER * all_columns))
-        )
+        is_ground = _has_rim(faces, body, n)
+        if not labelled:
+            covered, single, bottom = shares_of(triangles, body, n, lowest, plan)
+            up, area = _areas(triangles)
+            level = np.bincount(body, up, n) >= _LEVEL * np.bincount(body, area, n)
+            all_columns = int(np.isfinite(lowest).sum())
+            is_ground &= covered * plan.step_m**2 >= _LEAST_AREA_M2
+            is_ground &= (single >= _SINGLE_LAYER * covered) & (bottom >= _LOWEST * covered)
+            is_ground &= level | (covered >= _COVER * all_columns)
         chosen = is_ground[body]
         sheet = triangles[chosen]
-        if not len(sheet) or np.isfinite(lowest_of(sheet, plan)).sum() < _COVER * all_columns:
+        if not len(sheet):
+            return None
+        if not labelled and np.isfinite(lowest_of(sheet, plan)).sum() < _COVER * all_columns:
             return None
         names = frozenset(inside[k].node for k in np.unique(owner[chosen]))
         return cls(sheet, _rim(faces[chosen], corners), bare, names)
@@ -120,10 +113,7 @@ class Ground:
         return np.asarray(p[:, 2] < self.lowest_m(p[:, :2]))
 
     def curtain(self, low: Floats, high: Floats, radius_m: float) -> Floats:
-        """Walls (n, 9) from the ground's rim straight down.
-
-        Which close its underside to a body of `radius_m` in the volume.
-        """
+        """Walls (n, 9) straight down from the ground's rim, which close its underside to a body of `radius_m`."""
         if not _within(self.bare, low, high, radius_m):
             return np.empty((0, 9))
         inner_low, inner_high = low[:2] + radius_m, high[:2] - radius_m

@@ -42,10 +42,7 @@ _wrapped = njit(cache=True, inline="always")(wrap_one_rad)
 
 
 def replay(start: ArrayLike, actions: ArrayLike) -> NDArray[np.float64]:
-    """Replay actions (n,) from a start pose (metres, radians, world) without collisions.
-
-    Poses (n + 1, 4), yaw in (-π, π].
-    """
+    """Replay actions (n,) from a start pose (world) without collisions: poses (n + 1, 4), yaw in (-π, π]."""
     a = np.asarray(actions, np.int64).reshape(-1)
     if ((a < STOP) | (a > APPROACH)).any():
         raise ValueError(f"actions are numbers from {STOP} to {APPROACH}")

@@ -64,10 +64,7 @@ class Patch:
 def visible_shares(
     positions: Floats, yaw_rad: Floats, patches: Sequence[Patch], scene: RayCaster, fov_deg: float
 ) -> Floats:
-    """Share (n, parts), 0 to 1, of each part that viewpoints see.
-
-    Unhidden, in the picture, by incidence, less in the shade.
-    """
+    """Share (n, parts), 0 to 1, of each part that viewpoints see, by incidence, less in the shade."""
     out = np.zeros((len(positions), len(patches)))
     for k, patch in enumerate(patches):
         pose, point = np.nonzero(in_picture(positions, yaw_rad, patch.points, fov_deg))

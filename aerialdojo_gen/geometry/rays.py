@@ -129,10 +129,7 @@ class TriangleRayCaster:
         return self._corners, self._normals / np.where(length > 0.0, length, 1.0)
 
     def first_hit(self, origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Ints]:
-        """First hit along rays (origins and directions (n, 3), world metres).
-
-        Distance (inf for none) and face (-1 for none).
-        """
+        """First hit along rays, (n, 3) world metres: distance (inf for none) and face (-1 for none), (n,) each."""
         d = np.asarray(directions, dtype=np.float64)
         if not len(d):
             return np.zeros(0), np.zeros(0, np.int32)
@@ -164,10 +161,7 @@ class TriangleRayCaster:
     def first_between(
         self, origins: ArrayLike, points: ArrayLike, least_m: float
     ) -> tuple[NDArray[np.int64], Floats, Floats, Ints]:
-        """First hit towards points further than `least_m` from their origins.
-
-        Which (k,), length, distance and face of the hit.
-        """
+        """First hit towards points further than `least_m`: which (k,), and length, distance and face of the hit."""
         o, p = _pairs(origins, points)
         far, length, unit, start, aim = _towards(o, p, self._centre, least_m)
         if not len(far):
@@ -198,10 +192,7 @@ class RayCaster:
     def visible(
         self, origins: ArrayLike, points: ArrayLike, own_instance: int | Ints | None = None, tolerance_m: float = 5e-3
     ) -> NDArray[np.bool_]:
-        """Whether points (n, 3) are seen from origins: the first hit is the point, its own instance, or nothing.
-
-        (n,) bool.
-        """
+        """Whether points (n, 3) are seen from origins: nothing is hit before the point but its own instance."""
         shape = np.broadcast_shapes(np.shape(origins), np.shape(points))
         seen = np.ones(1 if len(shape) == 1 else shape[0], dtype=np.bool_)
         far, length, distance, face = self._triangles.first_between(origins, points, tolerance_m)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.constants import VIEWS
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
+from aerialdojo_gen.geometry.triangles import morton_codes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -30,10 +31,7 @@ _FRONT, _LEFT, _RIGHT, _DOWN = (VIEWS.index(view) for view in ("front", "left", 
 
 @njit(cache=True)
 def view_towards(x: float, y: float, z: float, cos: float, sin: float) -> int:
-    """Index into `VIEWS` of the 90° view that holds a direction, world frame, at a yaw with this cosine and sine.
-
-    The first one where two meet; -1 behind and above.
-    """
+    """Index into `VIEWS` of the first 90° view that holds a direction (world) at a yaw; -1 behind and above."""
     forward, left = cos * x + sin * y, cos * y - sin * x
     ahead, across, up = abs(forward), abs(left), abs(z)
     if forward > 0 and across <= ahead and up <= ahead:
@@ -175,18 +173,6 @@ def _in_view(points: Floats, poses: Floats, uncovered: Flags) -> tuple[Ints, Int
     return row[:count], column[:count], view[:count]
 
 
-@njit(cache=True)
-def _pairs(mask: Flags) -> tuple[Ints, Ints]:
-    """Rows and columns of what is set in a mask (n, m)."""
-    n, m = mask.shape
-    row, column, count = np.empty(n * m, np.int32), np.empty(n * m, np.int32), 0
-    for i in range(n):
-        for k in range(m):
-            row[count], column[count] = i, k
-            count += mask[i, k]
-    return row[:count], column[:count]
-
-
 @lru_cache(maxsize=4)
 def _ranges(n: int) -> Ints:
     """First and end of each part of n points that is tested together, and the next range outside it; (k, 3)."""
@@ -222,28 +208,12 @@ def _balls(points: Floats, ranges: Ints) -> Floats:
     return out
 
 
-@njit(cache=True)
-def _codes(points: Floats, low: Floats, cell_m: float) -> NDArray[np.int64]:
-    """Morton's codes of points, (n,): those of neighbours differ little."""
-    out = np.zeros(len(points), np.int64)
-    for k in range(len(points)):
-        for a in range(3):
-            cell = int((points[k, a] - low[a]) / cell_m)
-            for bit in range(10):
-                out[k] |= (cell >> bit & 1) << (3 * bit + a)
-    return out
-
-
 def start_visibility(
     scene: TriangleRayCaster, own: TriangleRayCaster, points: ArrayLike, poses: ArrayLike
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Share of an object's points (m, 3) seen from each pose (n, 4).
-
-    And the view that sees most of them (-1 for none).
-    """
+    """Share of an object's points (m, 3) seen from each pose (n, 4), and the view that sees most (-1 for none)."""
     p, q = np.asarray(points, dtype=np.float64), np.asarray(poses, dtype=np.float64)
-    low, high = p.min(axis=0), p.max(axis=0)
-    p = p[np.argsort(_codes(p, low, max(float((high - low).max()), 1e-6) / 1023.0), kind="stable")]
+    p = p[np.argsort(morton_codes(p, 10), kind="stable")]
     pose, point, view = _in_view(p, q, _left_to_cast(scene, p, q))
     free = scene.unobstructed(q[:, :3], p, ends=(pose, point))
     pose, point, view = pose[free], point[free], view[free]
@@ -253,7 +223,7 @@ def start_visibility(
     # What the target itself hides matters only where something is seen.
     unseen = np.ones((len(q), len(p)), dtype=np.bool_)
     unseen[pose, point] = False
-    rest, hidden = _pairs(unseen[some] & _left_to_cast(own, p, q[some]))
+    rest, hidden = (k.astype(np.int32) for k in np.nonzero(unseen[some] & _left_to_cast(own, p, q[some])))
     facing = own.unobstructed(q[some, :3], p, ends=(rest, hidden))
     seen = votes[some].sum(axis=1)
     share[some] = seen / (seen + np.bincount(rest[facing], minlength=len(some)))

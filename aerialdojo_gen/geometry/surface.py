@@ -115,10 +115,7 @@ class Surface:
         return np.asarray((1 - r) * a + r * (1 - s) * b + r * s * c), np.asarray(normals)
 
     def standoff(self, aims: ArrayLike, directions: ArrayLike, offset_m: float, tolerance_m: float = 1e-4) -> Floats:
-        """First point on each line from outside towards its aim whose distance to the surface is `offset_m`.
-
-        NaN where none.
-        """
+        """First point on each line from outside towards its aim at `offset_m` from the surface; NaN where none."""
         d = np.ascontiguousarray(directions, dtype=np.float64)
         aim = np.broadcast_to(np.asarray(aims, dtype=np.float64), d.shape)
         corners = self._triangles.reshape(-1, 3)

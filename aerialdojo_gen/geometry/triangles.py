@@ -166,10 +166,7 @@ def segment_triangle_d2(
 def split_triangles(
     triangles: NDArray[np.float64], max_edge_m: float, lower: NDArray[np.float64], upper: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Halve triangles (n, 9) until no edge exceeds `max_edge_m`, dropping those outside a box.
-
-    Pieces and their rows.
-    """
+    """Halve triangles (n, 9) until no edge exceeds `max_edge_m`, dropping those outside a box: pieces, their rows."""
     todo = triangles.reshape(-1, 3, 3)
     near, small = _within(triangles, lower, upper, max_edge_m)
     rows = np.flatnonzero(near & ~small)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from aerialdojo_gen.geometry.rays import RayCaster, TriangleRayCaster
 from aerialdojo_gen.geometry.surface import Surface
 
 Floats = NDArray[np.float64]
-_T = TypeVar("_T", bound=np.generic)
 
 _LEAST_POINTS = 3
 _FULL_SIZE = 0.5
@@ -27,32 +25,19 @@ WEIGHTS = {"visible": 0.30, "shown": 0.30, "size": 0.10, "centred": 0.10, "level
 
 
 def ring(
-    surface: Surface,
-    box: Floats,
-    standoff_m: float,
-    azimuths: int,
-    elevations_deg: Sequence[float],
+    surface: Surface, box: Floats, standoff_m: float, azimuths: int, elevations_deg: Sequence[float],
     level_heights: Sequence[float],
-) -> Floats:
-    """Candidates (n, 3), world metres.
-
-    At `standoff_m` from the surface on lines towards the centroid from all sides; NaN for none.
-    """
+) -> Floats:  # fmt: skip
+    """Candidates (n, 3), world metres, at the standoff on lines towards the centroid from all sides; NaN for none."""
     centroid = box.mean(axis=0)
     rows = [(centroid[2], e) for e in elevations_deg]
     if box[1, 2] - box[0, 2] > 2.0 * standoff_m:
         rows += [(box[0, 2] + h * (box[1, 2] - box[0, 2]), 0.0) for h in level_heights]
     turn = np.arange(azimuths) * (2.0 * math.pi / azimuths)
-    aims, directions = [], []
-    for height, elevation in rows:
-        up = math.radians(elevation)
-        aims.append(np.tile([centroid[0], centroid[1], height], (azimuths, 1)))
-        directions.append(
-            np.column_stack(
-                [math.cos(up) * np.cos(turn), math.cos(up) * np.sin(turn), np.full(azimuths, math.sin(up))]
-            )
-        )
-    aim, direction = np.concatenate(aims), np.concatenate(directions)
+    height, up = np.repeat([(height, math.radians(elevation)) for height, elevation in rows], azimuths, axis=0).T
+    turn = np.tile(turn, len(rows))
+    aim = np.column_stack([np.tile(centroid[:2], (len(turn), 1)), height])
+    direction = np.column_stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
     positions = surface.standoff(aim, direction, standoff_m)
     missed = np.isnan(positions[:, 0])
     if missed.any():
@@ -90,10 +75,7 @@ class PointVisibility:
         cls, positions: Floats, yaw_rad: Floats, points: Floats, alone: TriangleRayCaster, scene: RayCaster,
         own_instance: int, fov_deg: float,
     ) -> PointVisibility:  # fmt: skip
-        """Ray casts from viewpoints (n, 3) with yaws to an object's points (m, 3).
-
-        The camera is level, square, at the body's centre.
-        """
+        """Cast rays from viewpoints (n, 3) with yaws to an object's points (m, 3)."""
         ray = points[None] - positions[:, None]
         cos, sin = np.cos(yaw_rad)[:, None], np.sin(yaw_rad)[:, None]
         ahead = ray[..., 0] * cos + ray[..., 1] * sin
@@ -114,19 +96,10 @@ class PointVisibility:
         self, rows: NDArray[np.int64], where: NDArray[np.int64], others: PointVisibility
     ) -> PointVisibility:
         """Take some viewpoints, (k,), and put others in the place of those of them that `where` says."""
-
-        def mixed(own: NDArray[_T], other: NDArray[_T]) -> NDArray[_T]:
-            taken = own[rows]
-            taken[where] = other
-            return taken
-
-        return PointVisibility(
-            mixed(self.u, others.u),
-            mixed(self.v, others.v),
-            mixed(self.roomy, others.roomy),
-            mixed(self.facing, others.facing),
-            mixed(self.seen, others.seen),
-        )
+        taken = {field.name: getattr(self, field.name)[rows] for field in fields(self)}
+        for name, values in taken.items():
+            values[where] = getattr(others, name)
+        return PointVisibility(**taken)
 
     def views(self) -> Views:
         """Sum up what each of the viewpoints sees, and compare them."""
@@ -152,26 +125,10 @@ class PointVisibility:
         )
 
 
-def look(
-    positions: Floats,
-    yaw_rad: Floats,
-    points: Floats,
-    alone: TriangleRayCaster,
-    scene: RayCaster,
-    own_instance: int,
-    fov_deg: float,
-) -> Views:
-    """Look at an object from viewpoints: the `Views` of their `Sight`, whose parameters these are."""
-    return PointVisibility.of(positions, yaw_rad, points, alone, scene, own_instance, fov_deg).views()
-
-
 def informativeness(
     views: Views, elevation_deg: Floats, clearance_m: Floats, radius_m: float, ample_m: float
 ) -> Floats:
-    """Visual informativeness (paper) in [0, 1], (n,).
-
-    Weighted mean of visible, shown, size, centred, level and clear.
-    """
+    """Visual informativeness (paper) in [0, 1], (n,): a weighted mean of the terms in `WEIGHTS`."""
     terms = {
         "visible": views.visible_fraction,
         "shown": views.shown,
@@ -194,10 +151,7 @@ def level_marks(elevation_deg: Floats | float) -> Floats:
 def shortlist(
     score: Floats, azimuth_rad: Floats, count: int, separation_rad: float, required: NDArray[np.bool_] | None = None
 ) -> NDArray[np.int64]:
-    """Greedy choice of the best scores at least `separation_rad` apart in azimuth.
-
-    Indices, the highest score first.
-    """
+    """Choose greedily the best scores at least `separation_rad` apart in azimuth: indices, highest score first."""
     chosen: list[int] = []
     separation = np.full(len(score), math.inf)
     for _ in range(min(count, len(score))):

@@ -12,11 +12,8 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from types import TracebackType
-from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,100 +21,14 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.config.sections import RENDERERS, RendererName
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import RayCaster
-from aerialdojo_gen.rendering.casters import ray_caster
-from aerialdojo_gen.rendering.picture import Closable, Picture
+from aerialdojo_gen.rendering.picture import Renderer
 from aerialdojo_gen.scenes.context import context_of, open_contexts
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
-Floats = NDArray[np.float64]
-
 _TOLERANCE_M, _MIN_SHARE, _EDGE_SHARE = 0.01, 0.999, 0.1
 _thread = threading.local()
-
-
-class Renderer(Protocol):
-    """A scene ready to be rendered; a context manager that frees its memory at its end."""
-
-    @property
-    def name(self) -> str:
-        """One of `RENDERERS`."""
-        ...
-
-    @property
-    def device(self) -> str:
-        """Name of the device, as the driver gives it."""
-        ...
-
-    @property
-    def light(self) -> Light:
-        """The light that it draws by: at first the scene's own."""
-        ...
-
-    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
-        """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
-        ...
-
-    def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
-        """Take several pictures; cheaper than one by one where they share their eye."""
-        ...
-
-    def relight(self, light: Light) -> None:
-        """Draw by another light from now on."""
-        ...
-
-    def close(self) -> None:
-        """Free the memory; a second call does nothing."""
-        ...
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Free the memory."""
-        ...
-
-
-class PyBulletRenderer(Closable):
-    """A scene in PyBullet's TinyRenderer; see `Renderer`."""
-
-    name = "pybullet"
-    device = "TinyRenderer"
-
-    def __init__(self, scene: Scene) -> None:
-        # Imported here, so that other renderers do not load PyBullet.
-        from aerialdojo_gen.rendering.world import RenderWorld
-
-        self._scene = scene
-        self._world = RenderWorld(scene)
-        self.light = scene.light
-
-    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
-        """Take a picture; the instance id map is ray-cast."""
-        picture = self._world.render(camera, world_from_camera)
-        if not instances:
-            return picture
-        rays = product(camera.rays().reshape(-1, 3), world_from_camera[:3, :3].T)
-        owner = ray_caster(self._scene).first_hit(world_from_camera[:3, 3], rays)[1]
-        return Picture(picture.rgb, picture.depth_m, owner.reshape(camera.height, camera.width))
-
-    def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
-        """Take the pictures one by one."""
-        return [self.render(camera, pose, instances) for pose in poses]
-
-    def relight(self, light: Light) -> None:
-        """Draw by another light from now on."""
-        self.light = light
-        self._world.relight(light)
-
-    def close(self) -> None:
-        """Free the memory."""
-        self._world.close()
 
 
 @dataclass(frozen=True)
@@ -133,6 +44,9 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
     if name == "auto":
         name = choose_renderer().name
     if name == "pybullet":
+        # Imported here, so that other renderers do not load PyBullet.
+        from aerialdojo_gen.rendering.world import PyBulletRenderer
+
         return PyBulletRenderer(scene)
     if name == "gl":
         from aerialdojo_gen.rendering.gl import GlRenderer
@@ -142,10 +56,7 @@ def open_renderer(scene: Scene, name: str = "auto") -> Renderer:
 
 
 def scene_renderer(scene: Scene, name: str, light: Light | None = None, reopen: bool = False) -> Renderer:
-    """Return the renderer of the scene's context, replaced when another name is requested; do not close it.
-
-    It draws by the scene's own light without another.
-    """
+    """Return the renderer of the scene's context, by the scene's own light without another; do not close it."""
     context = context_of(scene)
     if reopen:
         context.drop("renderer")

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.gl_occlusion import BodyCulling
 from aerialdojo_gen.rendering.gl_target import read_instances, read_pixels
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Renderer
 
 Floats = NDArray[np.float64]
 
@@ -52,14 +51,9 @@ class GlBodies:
         self._cullings = [BodyCulling(d.kind.chunks, d.kind.hides) for d in renderer._sets]
 
     def draw(
-        self,
-        camera: Camera,
-        poses: Floats,
-        views: Sequence[str],
-        rgb: NDArray[np.uint8],
-        depth_m: NDArray[np.float32],
-        instance: NDArray[np.int32] | None = None,
-    ) -> None:
+        self, camera: Camera, poses: Floats, views: Sequence[str], rgb: NDArray[np.uint8],
+        depth_m: NDArray[np.float32], instance: NDArray[np.int32] | None = None,
+    ) -> None:  # fmt: skip
         """Fill ``rgb`` (n, views, H, W, 3), ``depth_m`` and ``instance`` (n, views, H, W); see `draw_bodies`."""
         from aerialdojo_gen.rendering.gl import clip_from_world
 

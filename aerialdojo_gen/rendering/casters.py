@@ -47,10 +47,7 @@ def all_in_sight(scene: Scene, nodes: Sequence[str], positions: Floats) -> NDArr
         return seen
     names, which = np.unique(np.asarray(nodes), return_inverse=True)
     targets = [_target_points(scene, str(name)) for name in names]
-    points, owners = (
-        np.stack([drawn for drawn, _ in targets]),
-        np.array([index for _, index in targets], dtype=np.int32),
-    )
+    points, owners = np.stack([drawn for drawn, _ in targets]), np.array([k for _, k in targets], dtype=np.int32)
     rays = ray_caster(scene)
     # Sort rays by object, for memory locality.
     order = np.argsort(which, kind="stable")

@@ -86,12 +86,8 @@ class VideoWriter:
         preset: str = "ultrafast", comment: str = "",
     ) -> None:  # fmt: skip
         # Without bitexact the Matroska muxer writes a random id, and both muxers the library's version.
-        self._container = av.open(
-            str(path),
-            "w",
-            format="mp4" if list(modalities) == ["rgb"] else "matroska",
-            options={"fflags": "+bitexact"},
-        )
+        form = "mp4" if list(modalities) == ["rgb"] else "matroska"
+        self._container = av.open(str(path), "w", format=form, options={"fflags": "+bitexact"})
         if comment:
             self._container.metadata["comment"] = comment
         rate = Fraction(fps).limit_denominator(1000)

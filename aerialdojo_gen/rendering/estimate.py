@@ -15,7 +15,7 @@ from aerialdojo_gen.rendering.backend import choose_renderer, open_renderer
 from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.placement import places
 from aerialdojo_gen.rendering.recording import frame_poses, record_views
-from aerialdojo_gen.rendering.sample import choose_trajectories, tables
+from aerialdojo_gen.rendering.sample import choose_trajectories, routes
 from aerialdojo_gen.scenes.stored import read_scene_mesh
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.files import size_of
@@ -65,8 +65,7 @@ def estimate(
     # Scenes differ threefold: weight each measured scene by its poses in the selection.
     weight: dict[str, int] = {}
     for scene in scenes:
-        keys = [row for table in tables(config, scene) for row in _rows(data, table, scene, ["nav_id", "setting"])]
-        chosen = choose_trajectories(keys, config.limit, seed)
+        chosen = choose_trajectories(routes(data, scene, config, ["nav_id", "setting"]), config.limit, seed)
         if chosen:
             frames = _frames(data, scene, config)
             trajectories += len(chosen)
@@ -80,48 +79,25 @@ def estimate(
     seconds = opening = bytes_ = 0.0
     share = {scene: weight[scene] / sum(weight[name] for name in drawn) for scene in drawn}
     for scene in drawn:
-        every = (row for table in tables(config, scene) for row in _rows(data, table, scene))
-        route = next(row for row in every if row["nav_id"] == selected[scene])
+        route = next(row for row in routes(data, scene, config) if row["nav_id"] == selected[scene])
         n, cpu, opening_s, size = _measure(data, scene, route, config, choice.name)
         measured, opening = measured + n, opening + opening_s
         seconds, bytes_ = seconds + share[scene] * cpu / n, bytes_ + share[scene] * size / n
     cpu_s = poses * seconds + len(selected) * workers * opening / len(drawn)
     # Kilobytes on Linux, bytes on macOS.
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    videos = trajectories * len({place.file for place in places(config)})
     return Estimate(
-        trajectories,
-        poses,
-        trajectories * len({place.file for place in places(config)}),
-        cpu_s,
-        cpu_s / workers / machines,
-        poses * bytes_ / machines,
-        float(resident * workers),
-        workers,
-        machines,
-        measured,
-        choice.why,
-    )
-
-
-def _rows(data: Where, table: str, scene: str, columns: list[str] | None = None) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = store.read_scene(data, table, scene, columns).to_pylist()
-    return rows
+        trajectories, poses, videos, cpu_s, cpu_s / workers / machines, poses * bytes_ / machines,
+        float(resident * workers), workers, machines, measured, choice.why,
+    )  # fmt: skip
 
 
 def _frames(data: Where, scene: str, config: RenderConfig) -> dict[str, int]:
     """Count the frames of every trajectory of a scene."""
     if config.sampling == "steps":
-        columns = ["nav_id", "n_actions"]
-        return {
-            row["nav_id"]: row["n_actions"]
-            for table in tables(config, scene)
-            for row in _rows(data, table, scene, columns)
-        }
-    return {
-        row["nav_id"]: len(frame_poses(row, config).time_s)
-        for table in tables(config, scene)
-        for row in _rows(data, table, scene)
-    }
+        return {row["nav_id"]: row["n_actions"] for row in routes(data, scene, config, ["nav_id", "n_actions"])}
+    return {row["nav_id"]: len(frame_poses(row, config).time_s) for row in routes(data, scene, config)}
 
 
 def _measure(

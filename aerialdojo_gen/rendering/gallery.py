@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,9 +72,7 @@ def prop_picture(
     reach = float(np.linalg.norm(high - low)) / 2
     floor = to_part(extrude(rectangle(-6 * reach, -6 * reach, 6 * reach, 6 * reach), 0.02), "paving", 1.2)
     down = np.array([0, 0, min(float(low[2]), 0.0) - 0.02])
-    ground = Instance(
-        "ground", "ground", "", {}, (type(floor)(floor.vertices + down, floor.faces, floor.uv, "paving"),)
-    )
+    ground = Instance("ground", "ground", "", {}, (replace(floor, vertices=floor.vertices + down),))
     materials = {name: catalogue.materials[name] for name in {p.material for p in (*prop.parts, *ground.parts)}}
     bounds = np.array([[-8 * reach] * 3, [8 * reach] * 3])
     scene = Scene(category, (ground, prop), materials, bounds)
@@ -134,16 +133,11 @@ def _scene_pictures(
     # Slightly to the south, so that north is up in the picture.
     above = centre + np.array([0, -1e-3 * up, up])
     views = [(above, centre, fov, "from above")]
-    for name, (dx, dy) in {
-        "south-west": (-1, -1),
-        "south-east": (1, -1),
-        "north-east": (1, 1),
-        "north-west": (-1, 1),
-    }.items():
+    corners = {"south-west": (-1, -1), "south-east": (1, -1), "north-east": (1, 1), "north-west": (-1, 1)}
+    for name, (dx, dy) in corners.items():
         eye = centre + np.array([dx * 0.48 * span[0], dy * 0.48 * span[1], 0.38 * reach])
         views.append((eye, centre - [dx * 0.04 * reach, dy * 0.04 * reach, 0], fov, f"from the {name}"))
-    for k, (eye, target) in enumerate(_flying_views(scene)):
-        views.append((eye, target, 80.0, f"flying, {k + 1}"))
+    views += [(eye, target, 80.0, f"flying, {k + 1}") for k, (eye, target) in enumerate(_flying_views(scene))]
     return [
         (look_at(scene, eye, target, width, height, angle), f"{scene.name}, {label}")
         for eye, target, angle, label in (views[k] for k in chosen)
@@ -156,9 +150,8 @@ def _flying_views(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.fl
     caster = RayCaster(scene)
     n = 9
     fractions = (np.arange(n) + 0.5) / n
-    places = np.stack(np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij"), -1).reshape(
-        -1, 2
-    )
+    x, y = np.meshgrid(*(low[:2, None] + (high - low)[:2, None] * fractions), indexing="ij")
+    places = np.column_stack([x.ravel(), y.ravel()])
     down = np.tile([0.0, 0.0, -1.0], (len(places), 1))
     drop, _ = caster.first_hit(np.column_stack([places, np.full(len(places), high[2])]), down)
     eyes = np.column_stack([places, high[2] - drop + _FLYING_HEIGHT_M])

@@ -24,7 +24,7 @@ from aerialdojo_gen.rendering.gl_geometry import Kind, own_kinds
 from aerialdojo_gen.rendering.gl_target import clear_depth, read_picture
 from aerialdojo_gen.rendering.gl_tiles import Tiles
 from aerialdojo_gen.rendering.lighting import cloud_map, height_map, light_of, sun_view
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Closable, Picture
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture, Renderer
 from aerialdojo_gen.rendering.shading import SIDE
 from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
@@ -42,17 +42,7 @@ _thread = threading.local()
 
 
 def context() -> Any:
-    """Return this thread's OpenGL context.
-
-    Returns
-    -------
-    moderngl.Context
-
-    Raises
-    ------
-    RenderError
-        moderngl or EGL is missing; the message says what to install.
-    """
+    """Return this thread's OpenGL context, a `moderngl.Context`."""
     if (current := getattr(_thread, "context", None)) is not None:
         return current
     # No threads of llvmpipe's own: several processes share the cores.
@@ -80,12 +70,7 @@ def release_context() -> None:
         current.release()
 
 
-def device() -> str:
-    """Name of the OpenGL device; RenderError where there is no OpenGL."""
-    return str(context().info["GL_RENDERER"])
-
-
-class GlRenderer(Closable):
+class GlRenderer(Renderer):
     """A scene ready to be rendered by OpenGL; a context manager that frees its memory at its end.
 
     Parameters
@@ -104,7 +89,7 @@ class GlRenderer(Closable):
 
     def __init__(self, scene: Scene) -> None:
         self._gl = context()
-        self.device = device()
+        self.device = str(self._gl.info["GL_RENDERER"])
         self._owned: list[Any] = []
         self._arrays: dict[tuple[tuple[str, ...], int], tuple[Any, dict[str, Any]]] = {}
         self._targets: dict[tuple[int, int, bool, int], Any] = {}
@@ -193,11 +178,11 @@ class GlRenderer(Closable):
         target.use()
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
-        """Take a picture; see `aerialdojo_gen.rendering.backend.Renderer`."""
+        """Take a picture; see `Renderer`."""
         return self.render_views(camera, [world_from_camera], instances)[0]
 
     def render_views(self, camera: Camera, poses: Sequence[Floats], instances: bool = False) -> list[Picture]:
-        """Take several pictures; see `aerialdojo_gen.rendering.backend.Renderer`."""
+        """Take several pictures; cheaper than one by one where they share their eye."""
         clips = np.stack([clip_from_world(camera, pose, NEAR_M, FAR_M) for pose in poses])
         eyes: dict[bytes, list[int]] = {}
         for v, pose in enumerate(poses):
@@ -223,34 +208,10 @@ class GlRenderer(Closable):
         return self._bodies
 
     def draw_triangles(
-        self,
-        camera: Camera,
-        world_from_camera: Floats,
-        clip: Floats,
-        visible: Sequence[NDArray[np.uint32]],
-        instances: bool = False,
-        slot: int = 0,
-    ) -> Any:
-        """Draw culled triangles, and the sky behind them.
-
-        Parameters
-        ----------
-        camera : Camera
-        world_from_camera : (4, 4) float64
-        clip : (4, 4) float64
-            Of `clip_from_world`.
-        visible : sequence of (3 k,) uint32
-            Indices into the vertices of each kind of surface.
-        instances : bool
-            Whether the picture has an instance id map.
-        slot : int
-            Which of several targets of this size.
-
-        Returns
-        -------
-        moderngl.Framebuffer
-            The target; reading it waits until it is drawn.
-        """
+        self, camera: Camera, world_from_camera: Floats, clip: Floats, visible: Sequence[NDArray[np.uint32]],
+        instances: bool = False, slot: int = 0,
+    ) -> Any:  # fmt: skip
+        """Draw what is visible, indices of each kind's vertices, and the sky into a target of this size and slot."""
         target = self._target(camera.width, camera.height, instances, slot)
         eye = world_from_camera[:3, 3].astype(np.float32).tobytes()
         self._begin(target, 1 + instances)

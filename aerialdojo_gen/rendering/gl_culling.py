@@ -60,22 +60,10 @@ def _boxes_in_view(low: Floats, high: Floats, clips: Floats) -> NDArray[np.bool_
 
 @njit(cache=True, fastmath={"contract", "arcp", "nsz"})
 def triangles_in_view(
-    order: NDArray[np.int64],
-    in_view: NDArray[np.bool_],
-    starts: NDArray[np.int64],
-    planes: Floats,
-    corners: NDArray[np.float32],
-    clips: Floats,
-    eye: Floats,
-    low: Floats,
-    high: Floats,
-    hides: bool,
-    width: int,
-    height: int,
-    whole: NDArray[np.float32],
-    part: NDArray[np.float32],
-    covered: NDArray[np.uint64],
-) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
+    order: NDArray[np.int64], in_view: NDArray[np.bool_], starts: NDArray[np.int64], planes: Floats,
+    corners: NDArray[np.float32], clips: Floats, eye: Floats, low: Floats, high: Floats, hides: bool, width: int,
+    height: int, whole: NDArray[np.float32], part: NDArray[np.float32], covered: NDArray[np.uint64],
+) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:  # fmt: skip
     """Cull the triangles of every view: vertex indices (v, 3 max_triangles) uint32, by chunk, and their counts."""
     views = len(clips)
     max_triangles = 0
@@ -146,10 +134,7 @@ def _pixel(place: float, half: float) -> float:
 @njit(cache=True, inline="always")
 def _centres(a: float, b: float, c: float, size: int) -> tuple[int, int]:
     """First and last pixel whose centre may lie between three places; the first is the larger where none does."""
-    return (
-        max(math.ceil(min(a, b, c) - ROUNDING_PX), 0),
-        min(math.floor(max(a, b, c) + ROUNDING_PX), size - 1),
-    )
+    return max(math.ceil(min(a, b, c) - ROUNDING_PX), 0), min(math.floor(max(a, b, c) + ROUNDING_PX), size - 1)
 
 
 @njit(cache=True, error_model="numpy")

@@ -47,17 +47,10 @@ _ORDER: tuple[tuple[str, ...], ...] = (
 )  # fmt: skip
 
 # Three vertices a triangle, none shared: normal, colour and instance are those of the face.
-VERTEX = np.dtype(
-    [
-        ("position", "<f4", 3),
-        ("uv", "<f4", 2),
-        ("normal", "<f4", 3),
-        ("colour", "u1", 4),
-        ("texel_m", "<f4"),
-        ("layer", "<f4"),
-        ("instance", "<f4"),
-    ]
-)
+VERTEX = np.dtype([
+    ("position", "<f4", 3), ("uv", "<f4", 2), ("normal", "<f4", 3), ("colour", "u1", 4), ("texel_m", "<f4"),
+    ("layer", "<f4"), ("instance", "<f4"),
+])  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +182,7 @@ def _mean_normals(points: NDArray[np.uint32], normal: Singles, group: Indices, c
             following[last[slot]] = i
         last[slot] = i
     for start in first:
-        i = start
+        i = int(start)
         while i >= 0:
             x = y = z = np.float32(0.0)
             j = start
@@ -279,19 +272,16 @@ def _layers(scene: Scene, names: list[str]) -> NDArray[np.uint8] | None:
     textures = [t for name in names if (t := scene.materials[name].texture) is not None]
     if not textures:
         return None
-    edge = 1
-    while edge < min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures)):
-        edge *= 2
+    largest = min(_LARGEST_TEXTURE, max(max(t.shape[:2]) for t in textures))
+    edge = 1 << (largest - 1).bit_length()
     layers: list[NDArray[np.uint8]] = []
     for texture, base in zip(textures, _bases(names), strict=True):
         larger = max(texture.shape[:2]) > edge
         sized = cv2.resize(texture[::-1], (edge, edge), interpolation=cv2.INTER_AREA if larger else cv2.INTER_NEAREST)
         layers.append(cv2.transform(sized, MUTE))
         if base in _GRAINED:
-            mean, spread = (
-                layers[-1].mean(axis=(0, 1)),
-                np.minimum(_GRAIN_SPREAD * layers[-1].std(axis=(0, 1)), _GRAIN_MOST),
-            )
+            mean = layers[-1].mean(axis=(0, 1))
+            spread = np.minimum(_GRAIN_SPREAD * layers[-1].std(axis=(0, 1)), _GRAIN_MOST)
             layers.append(np.clip(mean + spread * _grain(edge)[..., None], 0, 255).astype(np.uint8))
     return np.stack(layers)
 

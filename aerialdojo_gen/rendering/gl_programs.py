@@ -46,7 +46,5 @@ def set_all(program: Any, **values: Any) -> None:
 
 def content(program: Any, buffer: Any) -> tuple[Any, ...]:
     """Vertex layout of the buffer: the fields that the program reads, and padding for the others."""
-    fields = [(name, name in program) for name in _FORMATS]
-    sizes = {name: VERTEX.fields[name][0].itemsize for name in _FORMATS} if VERTEX.fields else {}
-    layout = " ".join(_FORMATS[name] if used else f"{sizes[name]}x" for name, used in fields)
-    return (buffer, layout, *(name for name, used in fields if used))
+    layout = " ".join(form if name in program else f"{VERTEX[name].itemsize}x" for name, form in _FORMATS.items())
+    return (buffer, layout, *(name for name in _FORMATS if name in program))

@@ -47,11 +47,8 @@ def read_pixels(target: Any, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32
     shape = depth_m.shape
     if getattr(_thread, "shape", None) != shape:
         # Colours as raw bytes, and depths.
-        _thread.shape, _thread.pixels, _thread.rgba = (
-            shape,
-            np.empty((*shape, 2), np.float32),
-            np.empty(shape, np.float32),
-        )
+        _thread.shape, _thread.pixels = shape, np.empty((*shape, 2), np.float32)
+        _thread.rgba = np.empty(shape, np.float32)
     target.read_into(_thread.pixels, components=2, dtype="u4")
     cv2.split(_thread.pixels, [_thread.rgba, depth_m])
     cv2.cvtColor(_thread.rgba.view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB, dst=rgb)

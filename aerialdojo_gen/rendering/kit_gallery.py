@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -31,42 +33,24 @@ class Use:
     """A table of a plan that calls a builder."""
 
     plan: str
-    tables: Mapping[str, Any]  # The plan with this one entry, and what it needs
+    tables: Any  # The plan with this one entry, and what it needs
     entry: str  # Its name there, as `build_tables` has it; empty for a step of the ground
     path: tuple[str | int, ...]  # From there to the table
 
     @property
     def call(self) -> dict[str, Any]:
         """The builder's table."""
-        found: Any = self.tables
-        for key in self.path:
-            found = found[key]
-        return dict(found)
+        return dict(reduce(getitem, self.path, self.tables))
 
     def varied(self, key: str, value: Any) -> Use:
         """Change one argument."""
-        tables = copy.deepcopy(dict(self.tables))
-        found: Any = tables
-        for step in self.path:
-            found = found[step]
-        found[key] = value
-        return Use(self.plan, tables, self.entry, self.path)
+        tables = copy.deepcopy(self.tables)
+        reduce(getitem, self.path, tables)[key] = value
+        return replace(self, tables=tables)
 
 
 def kit_sheets(catalogue: Catalogue, plans: Sequence[Path]) -> Iterator[tuple[str, Image]]:
-    """Yield a sheet a module of the kit, its builders below each other; names as ``kit-houses``.
-
-    Parameters
-    ----------
-    catalogue : Catalogue
-    plans : sequence of Path
-        Plans that use the kit.
-
-    Yields
-    ------
-    tuple of str and (H, W, 3) uint8
-        sRGB.
-    """
+    """Yield a sheet a module of the kit, named as ``kit-houses``, its builders below each other as plans use them."""
     uses = uses_of(plans)
     modules: dict[str, list[str]] = {}
     for name, one in kit().items():

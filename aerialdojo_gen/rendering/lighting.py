@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,8 +145,7 @@ def cloud_map(scene: str) -> NDArray[np.uint8]:
 NO_CLOUDS: NDArray[np.uint8] = np.zeros((1, 1), np.uint8)
 
 
-@dataclass(frozen=True, eq=False)
-class HeightMap:
+class HeightMap(NamedTuple):
     """Height of the highest surface about each place, blurred: what is below it sees less of the sky."""
 
     west_m: float
@@ -181,19 +181,20 @@ def _height_map(scene: Scene) -> HeightMap:
     return HeightMap(float(low[0]), float(low[1]), cell, float(low[2]), above)
 
 
-@dataclass(frozen=True, eq=False)
-class ShadowMap:
+class ShadowMap(NamedTuple):
     """Depth as seen from the sun."""
 
-    camera: Camera
+    focal_px: float
     world_from_camera: Floats  # (4, 4) float64
     depth_m: NDArray[np.float32]  # (n, n) float32; planar depth of the lit surfaces; inf where there is none
+    bias_m: float  # How far from a surface its light is looked up, against self-shadowing: more than a texel
 
-    @cached_property
-    def texel_m(self) -> float:
-        """Edge of a texel at the distance of the scene's centre, metres, to within a tenth."""
-        hit = self.depth_m[np.isfinite(self.depth_m)]
-        return float(hit.mean()) / self.camera.focal_px if len(hit) else 0.0
+    @classmethod
+    def of(cls, camera: Camera, world_from_camera: Floats, depth_m: NDArray[np.float32]) -> ShadowMap:
+        """Take a depth picture from the sun."""
+        hit = depth_m[np.isfinite(depth_m)]
+        texel = float(hit.mean()) / camera.focal_px if len(hit) else 0.0
+        return cls(camera.focal_px, np.ascontiguousarray(world_from_camera), depth_m, 0.03 + 1.5 * texel)
 
 
 def sun_view(scene: Scene, size_px: int = 2048, light: Light | None = None) -> tuple[Camera, Floats, float, float]:

@@ -54,20 +54,16 @@ class OrthographicPictures:
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
         parts = [part for instance in scene.instances for part in instance.parts]
-        names = sorted({part.material for part in parts})
-        index = {name: k for k, name in enumerate(names)}
-        self._vertices, self._faces = soup(parts)
-        self._material = np.repeat([index[part.material] for part in parts], [len(part.faces) for part in parts])
-        self._materials = [scene.materials[name] for name in names]
-        self._rays = masked_caster(scene, caster or TriangleRayCaster(self._vertices, self._faces))
         self._texels = SurfaceTexels(parts, scene.materials)
-        self._double_sided = np.array([m.double_sided for m in self._materials])[self._material]
-        self._unlit = np.array([m.unlit for m in self._materials])[self._material]
+        vertices, materials = self._texels.vertices, self._texels.materials
+        self._rays = masked_caster(scene, caster or TriangleRayCaster(vertices, self._texels.faces))
+        self._double_sided = np.array([m.double_sided for m in materials])[self._texels.material]
+        self._unlit = np.array([m.unlit for m in materials])[self._texels.material]
         self._sun = np.array(scene.sun, dtype=np.float64) / np.linalg.norm(scene.sun)
         sky = np.array(scene.sky, dtype=np.float64)
         ground = [instance for instance in scene.instances if instance.category == "ground"]
         self._ground = TriangleRayCaster(*soup(ground)) if ground else None
-        self._floor_m, self._ceiling_m = float(self._vertices[:, 2].min()), float(self._vertices[:, 2].max())
+        self._floor_m, self._ceiling_m = float(vertices[:, 2].min()), float(vertices[:, 2].max())
         self._sky = sky + (np.array([236.0, 238.0, 240.0]) - sky) * 0.6
 
     def from_above(self, extent_m: tuple[float, float, float, float], pixel_m: float) -> NDArray[np.uint8]:
@@ -88,12 +84,12 @@ class OrthographicPictures:
         out = np.tile(self._sky, (len(origins), 1))
         hit = np.flatnonzero(face >= 0)
         face, points = face[hit], origins[hit] + distance[hit, None] * forward
-        normal = self._normals(face)
+        normal = self._texels.normals(face)
         away = normal @ forward > 0.0
         double_sided = self._double_sided[face]
         normal[away & double_sided] *= -1.0
         cut = away & ~double_sided
-        colour = self._colours(face, points, pixel_m)
+        colour = self._texels.colours(face, points, lambda material: _downscaled(material, pixel_m))
         level = _AMBIENT + normal @ np.array([*(_FROM_SIDE * self._sun[:2]), _FROM_ABOVE])
         level += _SUN * self._sunlit(points, normal)
         level[self._unlit[face]] = 1.0
@@ -117,11 +113,6 @@ class OrthographicPictures:
         distance, _ = self._rays.first_hit(points, np.tile([0.0, 0.0, -1.0], (len(points), 1)))
         return np.where(np.isfinite(distance), points[:, 2] - distance, np.nan)
 
-    def _normals(self, face: NDArray[np.int32]) -> Floats:
-        corners = self._vertices[self._faces[face]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30))
-
     def _sunlit(self, points: Floats, normal: Floats) -> Floats:
         """Cosine of the sun's light on each point, 0 in shadow."""
         lit = np.maximum(normal @ self._sun, 0.0)
@@ -130,20 +121,6 @@ class OrthographicPictures:
         distance, _ = self._rays.first_hit(start, np.broadcast_to(self._sun, start.shape))
         lit[towards[np.isfinite(distance)]] = 0.0
         return lit
-
-    def _colours(self, face: NDArray[np.int32], points: Floats, pixel_m: float) -> Floats:
-        material = self._material[face]
-        colour = np.array([m.colour for m in self._materials], dtype=np.float64)[material]
-        order = np.argsort(material, kind="stable")
-        starts = np.flatnonzero(np.diff(material[order], prepend=-1))
-        for first, rows in zip(starts, np.split(order, starts[1:]), strict=True):
-            tile = _downscaled(self._materials[material[order[first]]], pixel_m)
-            if tile is not None:
-                uv = self._texels.uv_at(face[rows], points[rows])
-                column = np.floor(uv[:, 0] % 1.0 * tile.shape[1]).astype(np.int64) % tile.shape[1]
-                row = np.floor(-uv[:, 1] % 1.0 * tile.shape[0]).astype(np.int64) % tile.shape[0]
-                colour[rows] = tile[row, column]
-        return self._texels.with_vertex_colours(face, points, colour)
 
 
 def _downscaled(material: Material, pixel_m: float) -> NDArray[np.uint8] | None:

@@ -1,13 +1,17 @@
-"""What all renderers have: their output, their depth range, and that they are closed."""
+"""What all renderers have: their interface, their output, their depth range."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.scenes.light import Light
 
 # Planar depths between which surfaces are drawn, metres.
 NEAR_M, FAR_M = 0.1, 2000.0
@@ -22,8 +26,26 @@ class Picture:
     instance: NDArray[np.int32] | None = None  # (H, W) int32 or None
 
 
-class Closable:
-    """What holds memory until it is closed: a context manager."""
+class Renderer:
+    """A scene ready to be rendered; a context manager that frees its memory at its end."""
+
+    name: str
+    device: str  # As the driver names it
+    light: Light  # That it draws by: at first the scene's own
+
+    def render(self, camera: Camera, world_from_camera: NDArray[np.float64], instances: bool = False) -> Picture:
+        """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
+        raise NotImplementedError
+
+    def render_views(
+        self, camera: Camera, poses: Sequence[NDArray[np.float64]], instances: bool = False
+    ) -> list[Picture]:
+        """Take several pictures."""
+        return [self.render(camera, pose, instances) for pose in poses]
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
+        raise NotImplementedError
 
     def close(self) -> None:
         """Free the memory; a second call does nothing."""

@@ -15,12 +15,11 @@ from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.cameras import Camera
 from aerialdojo_gen.geometry.portable import product
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
-from aerialdojo_gen.geometry.soup import soup
 from aerialdojo_gen.rendering.casters import triangle_caster
 from aerialdojo_gen.rendering.lighting import NO_CLOUDS, HeightMap, Lighting, ShadowMap, light_of
-from aerialdojo_gen.rendering.picture import Closable, Picture
+from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.shading import shade
-from aerialdojo_gen.rendering.texels import Backdrop, masked_caster, scene_texels
+from aerialdojo_gen.rendering.texels import Backdrop, SurfaceTexels, masked_caster
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
@@ -29,46 +28,33 @@ Ints = NDArray[np.int32]
 _WIDE_M = 4.0
 
 
-class RayRenderer(Closable):
-    """A renderer by ray casts, of both sides of triangles; see `aerialdojo_gen.rendering.backend.Renderer`."""
+class RayRenderer(Renderer):
+    """A renderer by ray casts, of both sides of triangles."""
 
-    name = "rays"
-    device = "Embree"
+    name, device = "rays", "Embree"
 
     def __init__(self, scene: Scene, caster: TriangleRayCaster | None = None) -> None:
-        materials = sorted(scene.materials)
-        number = {name: k for k, name in enumerate(materials)}
-        parts = [(k, part) for k, instance in enumerate(scene.instances) for part in instance.parts]
-        counts = [len(part.faces) for _, part in parts]
-        vertices, faces = soup([part for _, part in parts])
-        self._owner = np.repeat(np.array([k for k, _ in parts], np.int32), counts)
-        self._material = np.repeat(np.array([number[part.material] for _, part in parts], np.int32), counts)
-        self._corners = vertices[faces]
-        self._uv = np.concatenate([part.uv for _, part in parts]).astype(np.float64)[faces]
+        texels = SurfaceTexels([part for instance in scene.instances for part in instance.parts], scene.materials)
+        counts = [len(instance.faces) for instance in scene.instances]
+        self._owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+        self._material = texels.material.astype(np.int32)
+        self._corners, self._uv = texels.vertices[texels.faces], texels.uv[texels.faces]
         # Instances that wide both ways are ground, roads, floors or roofs.
         bounds = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
         self.wide: NDArray[np.bool_] = (bounds[:, 1, :2] - bounds[:, 0, :2]).min(axis=1) > _WIDE_M
-        self._rays = masked_caster(scene, caster or TriangleRayCaster(vertices, faces))
-        with_vertex_colours = any(part.colours is not None for _, part in parts)
-        self._has_vertex_colours = scene_texels(scene) if with_vertex_colours else None
+        self._rays = masked_caster(scene, caster or TriangleRayCaster(texels.vertices, texels.faces))
+        self._vertex_colours = texels if texels.has_vertex_colours else None
         self._backdrop = Backdrop(scene)
-        self._light: Lighting = light_of(scene, materials)
-        textures = [scene.materials[name].texture for name in materials]
-        flat = [np.array([[scene.materials[name].colour]], np.uint8) for name in materials]
-        tiles = [f if t is None else t for t, f in zip(textures, flat, strict=True)]
+        self._light: Lighting = light_of(scene, [material.name for material in texels.materials])
+        tiles = [np.array([[m.colour]], np.uint8) if m.texture is None else m.texture for m in texels.materials]
         self._texels = np.concatenate([t.reshape(-1, 3) for t in tiles])
-        self._tiles = np.column_stack(
-            [
-                np.cumsum([0, *(t.shape[0] * t.shape[1] for t in tiles[:-1])]),
-                [t.shape[0] for t in tiles],
-                [t.shape[1] for t in tiles],
-            ]
-        ).astype(np.int64)
+        sizes = np.array([t.shape[:2] for t in tiles], np.int64)
+        self._tiles = np.column_stack([np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1), sizes])
         # One texel without an occluder, far below all points: none may lie in the sun camera's plane.
         far_below = np.eye(4)
         far_below[2, 3] = -1e6
         self._open_sky = HeightMap.nowhere()
-        self._no_shadow = ShadowMap(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
+        self._no_shadow = ShadowMap.of(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = True) -> Picture:
         """Take a picture, always with its instance id map."""
@@ -80,24 +66,16 @@ class RayRenderer(Closable):
             np.ascontiguousarray(world_from_camera[:3, 3]), directions, distance, length, face, self._corners,
             self._uv, self._material, self._owner, self._tiles, self._texels,
         )  # fmt: skip
-        if self._has_vertex_colours is not None:
+        if self._vertex_colours is not None:
             hit = np.flatnonzero(face >= 0)
-            along = distance[hit] / length[hit]
-            points = world_from_camera[:3, 3] + along[:, None] * directions[hit]
-            albedo[hit] = self._has_vertex_colours.with_vertex_colours(face[hit], points, albedo[hit])
-        depth = depth.reshape(shape)
+            points = world_from_camera[:3, 3] + (distance[hit] / length[hit])[:, None] * directions[hit]
+            albedo[hit] = self._vertex_colours.with_vertex_colours(face[hit], points, albedo[hit])
+        depth, surface = depth.reshape(shape), surface.reshape(shape)
         rgb = shade(
-            camera,
-            world_from_camera,
-            albedo.reshape(*shape, 3),
-            depth,
-            surface.reshape(shape),
-            self._light,
-            self._no_shadow,
-            NO_CLOUDS,
-            self._open_sky,
-        )
-        self._backdrop.paint(rgb, surface.reshape(shape) < 0, camera, world_from_camera)
+            camera, world_from_camera, albedo.reshape(*shape, 3), depth, surface, self._light, self._no_shadow,
+            NO_CLOUDS, self._open_sky,
+        )  # fmt: skip
+        self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         return Picture(rgb, depth, owner.reshape(shape))
 
 

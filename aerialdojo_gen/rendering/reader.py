@@ -10,10 +10,9 @@ Other readers work too: `docs/recordings.md` has examples for PyAV and OpenCV.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,75 +22,40 @@ from aerialdojo_gen.base.errors import Malformed, RenderError
 from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.rendering.codecs import SUFFIX, to_metres
 from aerialdojo_gen.rendering.placement import TILED
-from aerialdojo_gen.rendering.video import Tile, Video
+from aerialdojo_gen.rendering.video import Frames, Tile, Video
 
 
-class DepthVideo(Sequence[NDArray[np.float32]]):
-    """Depth in metres, over a `Video` of the stored values.
-
-    Attributes
-    ----------
-    stored : Video
-        The stored values, (H, W) uint16; 0 where nothing lies within range.
-    step : float
-        0 where these are millimetres, else the share by which they grow (`codecs.to_stored`).
-    """
+class DepthVideo(Frames):
+    """Depth in metres, (H, W) float32, inf where nothing lies within range, over a `Video` of the stored values."""
 
     def __init__(self, video: Video, step: float = 0.0) -> None:
-        self.stored, self.step = video, step
+        self.path, self.stored = video.path, video
+        self.step = step  # 0 where the stored values are millimetres, else the share by which they grow
 
     @property
     def millimetres(self) -> Video:
-        """The stored values, where they are millimetres.
-
-        Raises
-        ------
-        RenderError
-            They are not.
-        """
+        """The stored values, where they are millimetres; RenderError where they are not."""
         if self.step:
-            raise RenderError(f"{self.stored.path} stores relative steps of {self.step:g}, not millimetres")
+            raise RenderError(f"{self.path} stores relative steps of {self.step:g}, not millimetres")
         return self.stored
 
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.stored)
 
-    @overload
-    def __getitem__(self, k: int) -> NDArray[np.float32]: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[NDArray[np.float32]]: ...
-    def __getitem__(self, k: int | slice) -> NDArray[np.float32] | list[NDArray[np.float32]]:
-        """Decode frame k: (H, W) float32, metres; inf where nothing lies within range."""
-        if isinstance(k, slice):
-            return [to_metres(frame, self.step) for frame in self.stored[k]]
+    def _decode(self, k: int) -> NDArray[np.float32]:
         return to_metres(self.stored[k], self.step)
 
 
 @dataclass(frozen=True)
 class Recording:
-    """All videos of one trajectory.
+    """All videos of one trajectory, by view."""
 
-    Attributes
-    ----------
-    rgb : dict of str to Video
-        By view; frames are (H, W, 3) uint8.
-    depth_m : dict of str to DepthVideo
-        By view; frames are (H, W) float32, planar depth in metres, inf where nothing lies within range.
-    cameras : dict of str to dict
-        By view: ``K`` (3 x 3, pixels), ``body_from_camera`` (4 x 4; body x forward, y left, z up), ``fov_deg``,
-        ``pixel_centre``.
-    fps : float
-        Frames a second; 0 for PNG files, whose frames' times stand in the table ``frames``.
-    instance : dict of str to Video
-        By view, where they were recorded; frames are (H, W) uint16: number of the node in the scene's mesh, plus 1.
-    """
-
-    rgb: dict[str, Video]
-    depth_m: dict[str, DepthVideo]
-    cameras: dict[str, dict[str, Any]]
-    fps: float
-    instance: dict[str, Video]
+    rgb: dict[str, Video]  # Frames are (H, W, 3) uint8
+    depth_m: dict[str, DepthVideo]  # Frames are (H, W) float32: planar depth in metres
+    cameras: dict[str, dict[str, Any]]  # ``K``, ``body_from_camera``, ``fov_deg``, ``pixel_centre``, …
+    fps: float  # 0 for PNG files, whose frames' times stand in the table ``frames``
+    instance: dict[str, Video]  # Where recorded; (H, W) uint16: number of the node in the scene's mesh, plus 1
 
     def __len__(self) -> int:
         """Return the number of frames, the same in every video."""
@@ -99,66 +63,36 @@ class Recording:
 
 
 def read_recording(folder: str | Path) -> Recording:
-    """Open a recording.
-
-    Parameters
-    ----------
-    folder : str or Path
-        ``<data>/media/<scene>/<nav_id>``.
-
-    Returns
-    -------
-    Recording
-        Nothing is decoded yet.
-
-    Raises
-    ------
-    RenderError
-        There is no recording, a video is missing or damaged, or the videos differ in length.
-    """
+    """Open a recording, ``<data>/media/<scene>/<nav_id>``; nothing is decoded yet."""
     folder = Path(folder)
     if (folder / TILED).is_file():
-        return _read_tiled(folder / TILED)
-    rgb, depth, instance = (_videos(folder, modality) for modality in ("rgb", "depth", "instance"))
-    if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
-        raise RenderError(f"no complete recording in {folder}: run {command('render')}")
-    if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
-        raise RenderError(f"the videos in {folder} differ in length: render them again")
-    cameras = {view: _camera(video) for view, video in rgb.items()}
-    metres = {view: DepthVideo(video, _step(_camera(video), video)) for view, video in depth.items()}
-    return Recording(rgb, metres, cameras, next(iter(rgb.values())).fps, instance)
+        videos = _tiles(folder / TILED)
+    else:
+        videos = {modality: _videos(folder, modality) for modality in SUFFIX}
+        rgb, depth, instance = videos.values()
+        if not rgb or rgb.keys() != depth.keys() or (instance and instance.keys() != rgb.keys()):
+            raise RenderError(f"no complete recording in {folder}: run {command('render')}")
+        if len({len(v) for v in (*rgb.values(), *depth.values(), *instance.values())}) != 1:
+            raise RenderError(f"the videos in {folder} differ in length: render them again")
+    cameras = {view: _camera(video) for view, video in videos["rgb"].items()}
+    depth_m = {view: DepthVideo(video, _step(video)) for view, video in videos["depth"].items()}
+    fps = next(iter(videos["rgb"].values())).fps
+    return Recording(videos["rgb"], depth_m, cameras, fps, videos.get("instance", {}))
 
 
 def open_view(path: str | Path, view: str, modality: str) -> Video:
-    """Open the video of one view, whichever way its file holds it.
-
-    Parameters
-    ----------
-    path : str or Path
-        As a row of `recordings` names it.
-    view, modality : str
-        As that row has them.
-
-    Returns
-    -------
-    Video
-
-    Raises
-    ------
-    RenderError
-        The file cannot be read, or has no such view.
-    """
+    """Open the video of one view and modality in a file that a row of `recordings` names."""
     path = Path(path)
     if path.name != TILED:
         return Video(path)
-    found = _tiles(path)[0].get(modality, {}).get(view)
+    found = _tiles(path).get(modality, {}).get(view)
     if found is None:
         raise RenderError(f"{path} has no {modality} of the view {view}: render it again")
     return found
 
 
-def _tiles(path: Path) -> tuple[dict[str, dict[str, Video]], dict[str, dict[str, Any]]]:
-    """Open the views of a tiled file, by modality and view, and return their cameras."""
+def _tiles(path: Path) -> dict[str, dict[str, Video]]:
+    """Open the views of a tiled file, by modality and view."""
     first = Video(path)
     metadata = _camera(first)
     cameras, names = metadata.get("tiles"), metadata.get("streams")
@@ -170,20 +104,12 @@ def _tiles(path: Path) -> tuple[dict[str, dict[str, Video]], dict[str, dict[str,
     videos = {name: first if k == 0 else Video(path, k) for k, name in enumerate(names)}
     if len({len(whole) for whole in videos.values()}) != 1:
         raise RenderError(f"the videos in {path} differ in length: render them again")
-    tiles = {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in videos.items()}
-    return {name: dict(views) for name, views in tiles.items()}, cameras
+    return {name: {view: Tile(whole, camera) for view, camera in cameras.items()} for name, whole in videos.items()}
 
 
-def _read_tiled(path: Path) -> Recording:
-    videos, cameras = _tiles(path)
-    depth = {view: DepthVideo(video, _step(cameras[view], video)) for view, video in videos["depth"].items()}
-    fps = next(iter(videos["rgb"].values())).fps
-    return Recording(videos["rgb"], depth, cameras, fps, videos.get("instance", {}))
-
-
-def _step(camera: dict[str, Any], video: Video) -> float:
+def _step(video: Video) -> float:
     """Return the step of stored depth; old recordings have none: millimetres."""
-    step = camera.get("depth_step", 0.0)
+    step = _camera(video).get("depth_step", 0.0)
     if type(step) not in (int, float) or not 0.0 <= step <= 0.1:
         raise RenderError(f"{video.path}: its camera comment has no depth_step from 0 to 0.1")
     return float(step)

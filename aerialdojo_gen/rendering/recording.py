@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from aerialdojo_gen.base.config.sections import RenderConfig
 from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import Renderer
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks
 from aerialdojo_gen.rendering.codecs import PngWriter, VideoWriter, to_stored
-from aerialdojo_gen.rendering.picture import Picture
+from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.placement import TILED, Place, columns, modalities, places, tiled
 from aerialdojo_gen.rendering.trajectory import FramePoses, by_steps, by_time
 from aerialdojo_gen.rendering.video import Video
@@ -32,9 +31,7 @@ def frame_poses(route: dict[str, Any], config: RenderConfig) -> FramePoses:
     position = np.stack([route["x_m"], route["y_m"], route["z_m"]], axis=1)
     if config.sampling == "steps":
         return by_steps(position, route["yaw_rad"], route["action"], config.fps)
-    return by_time(
-        position, route["yaw_rad"], route["action"], config.fps, config.cruise_m_s, config.yaw_rate_deg_s
-    )  # fmt: skip
+    return by_time(position, route["yaw_rad"], route["action"], config.fps, config.cruise_m_s, config.yaw_rate_deg_s)
 
 
 def record_views(
@@ -71,34 +68,29 @@ def _writers(
     """Open the writers; return the function that encodes the pictures of a pose, by view."""
     comments = {view: camera_comment(camera, view, config) for view in views}
     own = [place for place in places(config) if place.view in comments]
-    if config.layout == "files":
-        writers: list[tuple[Place, VideoWriter | PngWriter]] = []
+    writers: list[tuple[str, VideoWriter | PngWriter]] = []
+    if config.layout == "tiled":
+        size = config.width * columns(config), config.height * -(-len(config.views) // columns(config))
+        one = VideoWriter(
+            folder / TILED, modalities(config), *size, config.fps, config.crf, config.preset,
+            tiles_comment(own, comments),
+        )  # fmt: skip
+        writers.append((TILED, stack.enter_context(one)))
+    else:
         for place in own:
             writer = _writer(folder, place, comments, config)
             stack.enter_context(writer)
-            writers.append((place, writer))
+            writers.append((place.view, writer))
 
-        def write(pictures: dict[str, Picture]) -> None:
-            stored = {view: _encodable(picture, config) for view, picture in pictures.items()}
-            for place, writer in writers:
-                writer.write(stored[place.view])
-
-        return write
-    height = config.height * -(-len(config.views) // columns(config))
-    one = stack.enter_context(
-        VideoWriter(
-            folder / TILED, modalities(config), config.width * columns(config), height, config.fps, config.crf,
-            config.preset, tiles_comment(own, comments),
-        )
-    )  # fmt: skip
-
-    def write_tiles(pictures: dict[str, Picture]) -> None:
+    def write(pictures: dict[str, Picture]) -> None:
         stored = {view: _encodable(picture, config) for view, picture in pictures.items()}
-        one.write(
-            {m: tiled({view: frames[m] for view, frames in stored.items()}, config) for m in modalities(config)}
-        )
+        if config.layout == "tiled":
+            of = {m: {view: frames[m] for view, frames in stored.items()} for m in modalities(config)}
+            stored = {TILED: {m: tiled(frames, config) for m, frames in of.items()}}
+        for key, writer in writers:
+            writer.write(stored[key])
 
-    return write_tiles
+    return write
 
 
 def _writer(folder: Path, place: Place, comments: dict[str, str], config: RenderConfig) -> VideoWriter | PngWriter:

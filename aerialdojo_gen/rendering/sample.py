@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from aerialdojo_gen.base import rng
@@ -33,12 +33,14 @@ def choose_trajectories(rows: Iterable[Mapping[str, Any]], limit: int, seed: int
     )
 
 
+def routes(data: Where, scene: str, config: RenderConfig, columns: list[str] | None = None) -> Iterator[Any]:
+    """Yield the rows of the route tables to record of a scene."""
+    for table in tables(config, scene):
+        yield from store.read_scene(data, table, scene, columns).to_pylist()
+
+
 def n_parts(data: Where, scene: str, config: RenderConfig) -> int:
     """Count the shards of a scene: `trajectories_per_part` recordings each, at least one shard."""
-    rows = [
-        row
-        for table in tables(config, scene)
-        for row in store.read_scene(data, table, scene, ["nav_id", "setting"]).to_pylist()
-    ]
+    rows = routes(data, scene, config, ["nav_id", "setting"])
     # Their number does not depend on the seed.
     return max(1, -(-len(choose_trajectories(rows, config.limit, 0)) // config.trajectories_per_part))

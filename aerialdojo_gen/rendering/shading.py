@@ -40,38 +40,15 @@ _CLOUD_FLAT, _CLOUD_SCALE = 0.12, 0.11
 
 
 def shade(
-    camera: Camera,
-    world_from_camera: Floats,
-    albedo: NDArray[np.uint8],
-    depth_m: NDArray[np.float32],
-    surface: NDArray[np.int32],
-    light: Lighting,
-    shadow: ShadowMap,
-    clouds: NDArray[np.uint8],
-    heights: HeightMap,
-) -> NDArray[np.uint8]:
+    camera: Camera, world_from_camera: Floats, albedo: NDArray[np.uint8], depth_m: NDArray[np.float32],
+    surface: NDArray[np.int32], light: Lighting, shadow: ShadowMap, clouds: NDArray[np.uint8], heights: HeightMap,
+) -> NDArray[np.uint8]:  # fmt: skip
     """Light a picture: albedo (H, W, 3) uint8, planar depth and surface (H, W) give sRGB (H, W, 3) uint8."""
     out = np.empty_like(albedo)
     _shade(
-        albedo,
-        depth_m,
-        surface,
-        camera.focal_px,
-        np.ascontiguousarray(world_from_camera),
-        light.colour,
-        light.texel_m,
-        light.unlit,
-        light.shiny,
-        light.rows,
-        shadow.depth_m,
-        np.ascontiguousarray(shadow.world_from_camera),
-        shadow.camera.focal_px,
-        0.03 + 1.5 * shadow.texel_m,
-        clouds,
-        heights.above,
-        np.array([heights.west_m, heights.south_m, heights.cell_m, heights.lowest_m, REACH_M / 255.0]),
-        out,
-    )
+        albedo, depth_m, surface, camera.focal_px, np.ascontiguousarray(world_from_camera), light.colour,
+        light.texel_m, light.unlit, light.shiny, light.rows, shadow, clouds, heights, out,
+    )  # fmt: skip
     return out
 
 
@@ -145,13 +122,14 @@ def _sky(x: float, y: float, z: float, rows: Floats, clouds: NDArray[np.uint8], 
 
 
 @njit(cache=True)
-def _sunlit(x: float, y: float, z: float, shadow: NDArray[np.float32], pose: Floats, focal: float) -> float:
+def _sunlit(x: float, y: float, z: float, sun: ShadowMap) -> float:
     """Share of the sun that reaches a point: 0 in shadow, 1 in the light, between them at a shadow's edge."""
+    pose, shadow = sun.world_from_camera, sun.depth_m
     x, y, z = x - pose[0, 3], y - pose[1, 3], z - pose[2, 3]
     depth = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
     n = shadow.shape[0]
-    u = focal * (pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z) / depth + n / 2.0 - 0.5
-    v = focal * (pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z) / depth + n / 2.0 - 0.5
+    u = sun.focal_px * (pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z) / depth + n / 2.0 - 0.5
+    v = sun.focal_px * (pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z) / depth + n / 2.0 - 0.5
     col, row = math.floor(u), math.floor(v)
     if col < 0 or row < 0 or col > n - 2 or row > n - 2:
         return 1.0
@@ -211,12 +189,12 @@ def _fade(base: Floats, albedo: NDArray[np.uint8], across_texels: float, facing:
 
 
 @njit(cache=True)
-def _depth_below(x: float, y: float, z: float, heights: NDArray[np.uint8], place: Floats) -> float:
+def _depth_below(x: float, y: float, z: float, heights: HeightMap) -> float:
     """How far a place lies below the mean height about it, as a share of `_DEEP_M`."""
-    if heights.shape[0] <= 1:
+    if heights.above.shape[0] <= 1:
         return 0.0
-    u, v = (x - place[0]) / place[2], (y - place[1]) / place[2]
-    return (place[3] + _bilinear(heights, u, v) * place[4] - z - _BEFORE_M) / _DEEP_M
+    u, v = (x - heights.west_m) / heights.cell_m, (y - heights.south_m) / heights.cell_m
+    return (heights.lowest_m + _bilinear(heights.above, u, v) * (REACH_M / 255.0) - z - _BEFORE_M) / _DEEP_M
 
 
 @njit(cache=True)
@@ -232,25 +210,10 @@ def _light(base: Floats, rows: Floats, up: float, open_sky: float, lit: float, d
 
 @njit(cache=True)
 def _shade(
-    albedo: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    surface: NDArray[np.int32],
-    focal: float,
-    pose: Floats,
-    colour: Floats,
-    texel: Floats,
-    unlit: NDArray[np.bool_],
-    shiny: Floats,
-    rows: Floats,
-    shadow: NDArray[np.float32],
-    sun_pose: Floats,
-    sun_focal: float,
-    bias_m: float,
-    clouds: NDArray[np.uint8],
-    heights: NDArray[np.uint8],
-    place: Floats,
-    out: NDArray[np.uint8],
-) -> None:
+    albedo: NDArray[np.uint8], depth: NDArray[np.float32], surface: NDArray[np.int32], focal: float, pose: Floats,
+    colour: Floats, texel: Floats, unlit: NDArray[np.bool_], shiny: Floats, rows: Floats, shadow: ShadowMap,
+    clouds: NDArray[np.uint8], heights: HeightMap, out: NDArray[np.uint8],
+) -> None:  # fmt: skip
     height, width = depth.shape
     sun = rows[0]
     flat = math.sqrt(sun[0] * sun[0] + sun[1] * sun[1]) + 1e-9
@@ -285,10 +248,9 @@ def _shade(
             if lit <= 0.0:
                 lit = 0.0
             else:
-                # Offset by more than a texel of the map, against self-shadowing.
-                at = px + nx * bias_m, py + ny * bias_m, pz + nz * bias_m
-                lit *= _sunlit(at[0], at[1], at[2], shadow, sun_pose, sun_focal)
-            deep = _depth_below(px + nx * _BEFORE_M, py + ny * _BEFORE_M, pz, heights, place)
+                bias = shadow.bias_m
+                lit *= _sunlit(px + nx * bias, py + ny * bias, pz + nz * bias, shadow)
+            deep = _depth_below(px + nx * _BEFORE_M, py + ny * _BEFORE_M, pz, heights)
             open_sky = (1.0 - _SHADED * min(max(deep, 0.0), 1.0)) * (1.0 + SIDE * (nx * sun[0] + ny * sun[1]) / flat)
             level = min(max(4.0 * nz - 3.0, 0.0), 1.0) * rows[6, 2]
             mirror = max(shiny[k], level * 0.6)

@@ -58,9 +58,7 @@ def _merge(material: str, parts: list[Part]) -> Surface:
 def _merge_coloured(material: str, parts: list[Part]) -> Surface:
     """Merge parts with vertex colours: TinyRenderer interpolates none, so every face gets its mean colour."""
     vertices, faces = soup(parts)
-    corner_colours = np.concatenate(
-        [np.zeros((0, 3, 3)), *(p.colours[p.faces] for p in parts if p.colours is not None)]
-    )
+    corner_colours = np.concatenate([p.colours[p.faces] for p in parts if p.colours is not None])
     side = max(1, int(np.ceil(np.sqrt(len(corner_colours)))))
     palette = np.zeros((side * side, 3), dtype=np.uint8)
     palette[: len(corner_colours)] = np.rint(corner_colours.mean(axis=1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -21,6 +21,8 @@ from aerialdojo_gen.scenes.model import HORIZON, Material, Part, Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+Colours = NDArray[np.uint8]
+_Table = Callable[[Material], NDArray[Any] | None]
 
 # How many holes a ray passes through, and how far behind each it restarts, metres.
 _MAX_HOLES, _ON_M = 12, 1e-3
@@ -36,8 +38,8 @@ class SurfaceTexels:
         self.material = np.repeat(np.array([names.index(p.material) for p in parts], dtype=np.int64), counts)
         self.vertices, self.faces = soup(parts)
         self.uv = np.concatenate([part.uv for part in parts]).astype(np.float64)
-        self._has_vertex_colours = any(part.colours is not None for part in parts)
-        if self._has_vertex_colours:
+        self.has_vertex_colours = any(part.colours is not None for part in parts)
+        if self.has_vertex_colours:
             self._colours = np.concatenate([_vertex_colours(p, materials[p.material]) for p in parts])
             self._is_coloured = np.repeat([part.colours is not None for part in parts], counts)
 
@@ -55,28 +57,27 @@ class SurfaceTexels:
     def is_hole(self, face: Ints, points: Floats) -> NDArray[np.bool_]:
         """Whether points (n, 3) on faces (n,) are masked out."""
         out = np.zeros(len(face), dtype=bool)
-        for k in np.unique(self.material[face]):
-            mask = self.materials[k].mask
-            if mask is not None:
-                rows = np.flatnonzero(self.material[face] == k)
-                uv = self.uv_at(face[rows], points[rows])
-                out[rows] = ~mask[texel(uv, mask.shape[0], mask.shape[1])]
+        self._sample(out, face, points, lambda material: None if material.mask is None else ~material.mask)
         return out
 
-    def colours(self, face: Ints, points: Floats) -> NDArray[np.uint8]:
-        """Colours (n, 3) of points (n, 3) on faces (n,), by the nearest texel."""
-        out = np.array([m.colour for m in self.materials], dtype=np.uint8)[self.material[face]]
-        for k in np.unique(self.material[face]):
-            texture = self.materials[k].texture
-            if texture is not None:
-                rows = np.flatnonzero(self.material[face] == k)
-                uv = self.uv_at(face[rows], points[rows])
-                out[rows] = texture[texel(uv, texture.shape[0], texture.shape[1])]
+    def colours(self, face: Ints, points: Floats, texture: _Table = lambda material: material.texture) -> Colours:
+        """Colours (n, 3) of points (n, 3) on faces (n,), by the nearest texel of each material's texture."""
+        out = self.mean_colours(face)
+        self._sample(out, face, points, texture)
         return self.with_vertex_colours(face, points, out)
 
-    def mean_colours(self, face: Ints) -> Floats:
+    def mean_colours(self, face: Ints) -> Colours:
         """Mean colours (n, 3) of the materials of faces (n,)."""
-        return np.array([m.colour for m in self.materials], dtype=np.float64)[self.material[face]]
+        return np.array([m.colour for m in self.materials], dtype=np.uint8)[self.material[face]]
+
+    def _sample(self, out: NDArray[Any], face: Ints, points: Floats, table: _Table) -> None:
+        """Write the texels of materials' tables at points on faces, where they have one."""
+        material = self.material[face]
+        for k in np.unique(material):
+            texels = table(self.materials[k])
+            if texels is not None:
+                rows = np.flatnonzero(material == k)
+                out[rows] = texels[texel(self.uv_at(face[rows], points[rows]), *texels.shape[:2])]
 
     def normals(self, face: Ints) -> Floats:
         """Unit normals (n, 3) of faces (n,)."""
@@ -86,14 +87,11 @@ class SurfaceTexels:
 
     def with_vertex_colours(self, face: Ints, points: Floats, colours: NDArray[Any]) -> NDArray[Any]:
         """Replace colours (n, 3) by interpolated vertex colours where a part has them."""
-        if not self._has_vertex_colours:
+        if not self.has_vertex_colours:
             return colours
         rows = np.flatnonzero(self._is_coloured[face])
-        mixed = np.einsum(
-            "nk,nkc->nc",
-            self.barycentric(face[rows], points[rows]),
-            self._colours[self.faces[face[rows]]].astype(float),
-        )
+        corners = self._colours[self.faces[face[rows]]].astype(float)
+        mixed = np.einsum("nk,nkc->nc", self.barycentric(face[rows], points[rows]), corners)
         out = colours.copy()
         out[rows] = np.clip(np.rint(mixed), 0, 255)
         return out
@@ -182,7 +180,7 @@ class Backdrop:
         if self.light is not None:
             # Its textures are finer than a pixel almost everywhere: their mean stands for them.
             lit = self._lit[face]
-            base, normal = self._texels.mean_colours(face[lit]), self._texels.normals(face[lit])
+            base, normal = self._texels.mean_colours(face[lit]).astype(np.float64), self._texels.normals(face[lit])
             colours[lit] = lit_in_haze(base, normal, unit[lit], distance[lit], self.light)
         rgb[rows, columns] = np.clip(colours + 0.5, 0.0, 255.0).astype(np.uint8)
 

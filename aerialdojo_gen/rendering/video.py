@@ -15,8 +15,29 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.pictures import decode_as_stored
 
 
-class Video(Sequence[NDArray[Any]]):
-    """The frames of a video file, or of a folder of PNG files; decoded on access, in any order."""
+class Frames(Sequence[NDArray[Any]]):
+    """Frames that are decoded on access, in any order."""
+
+    path: Path
+
+    @overload
+    def __getitem__(self, k: int) -> NDArray[Any]: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[NDArray[Any]]: ...
+    def __getitem__(self, k: int | slice) -> NDArray[Any] | list[NDArray[Any]]:
+        """Decode frame k, or those of a slice."""
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"{self.path.name} has {len(self)} frames, not {k}")
+        return self._decode(k % len(self))
+
+    def _decode(self, k: int) -> NDArray[Any]:
+        raise NotImplementedError
+
+
+class Video(Frames):
+    """The frames of a video file, or of a folder of PNG files."""
 
     def __init__(self, path: str | Path, stream: int = 0) -> None:
         path = Path(path)
@@ -63,17 +84,8 @@ class Video(Sequence[NDArray[Any]]):
         """Return the number of frames."""
         return len(self._pts)
 
-    @overload
-    def __getitem__(self, k: int) -> NDArray[Any]: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[NDArray[Any]]: ...
-    def __getitem__(self, k: int | slice) -> NDArray[Any] | list[NDArray[Any]]:
-        """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 millimetres of depth."""
-        if isinstance(k, slice):
-            return [self[i] for i in range(*k.indices(len(self)))]
-        if not -len(self) <= k < len(self):
-            raise IndexError(f"{self.path.name} has {len(self)} frames, not {k}")
-        k %= len(self)
+    def _decode(self, k: int) -> NDArray[Any]:
+        """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 of depth in the file's units."""
         if self._files:
             return self._png(k)
         if k != self._next:
@@ -117,13 +129,6 @@ class Tile(Video):
         if self._left + self.width > whole.width or self._top + self.height > whole.height:
             raise RenderError(f"{whole.path} places a view outside its frames: render it again")
 
-    @overload
-    def __getitem__(self, k: int) -> NDArray[Any]: ...
-    @overload
-    def __getitem__(self, k: slice) -> list[NDArray[Any]]: ...
-    def __getitem__(self, k: int | slice) -> NDArray[Any] | list[NDArray[Any]]:
-        """Decode frame k: (H, W, 3) uint8 of a picture, (H, W) uint16 of depth in the file's units."""
-        if isinstance(k, slice):
-            return [self[i] for i in range(*k.indices(len(self)))]
+    def _decode(self, k: int) -> NDArray[Any]:
         frame = self._parent.cached(k)
         return frame[self._top : self._top + self.height, self._left : self._left + self.width].copy()

@@ -15,8 +15,10 @@ from aerialdojo_gen.base.errors import RenderError
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.pictures import encode_png
 from aerialdojo_gen.geometry.cameras import Camera
+from aerialdojo_gen.geometry.portable import product
+from aerialdojo_gen.rendering.casters import ray_caster
 from aerialdojo_gen.rendering.lighting import Lighting, ShadowMap, cloud_map, height_map, light_of, sun_view
-from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Closable, Picture
+from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M, Picture, Renderer
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.surfaces import Surface, surfaces
 from aerialdojo_gen.rendering.texels import Backdrop, downscale
@@ -57,8 +59,10 @@ _NUDGE_M, _GAP_M = 1.3e-4, 3e-5
 _LARGEST_ATLAS_PX = 2048
 
 
-class RenderWorld(Closable):
-    """A scene ready to be rendered; a context manager that frees the renderer's memory at its end."""
+class PyBulletRenderer(Renderer):
+    """A scene in PyBullet's TinyRenderer."""
+
+    name, device = "pybullet", "TinyRenderer"
 
     def __init__(self, scene: Scene) -> None:
         found = surfaces(scene)
@@ -80,10 +84,11 @@ class RenderWorld(Closable):
 
     def relight(self, light: Light) -> None:
         """Draw by another light from now on."""
+        self.light = light
         self._light: Lighting = light_of(self._scene, self._materials, light)
         self._backdrop = Backdrop(self._scene, self._light)
         camera, pose, near_m, far_m = sun_view(self._scene, light=light)
-        self._shadow = ShadowMap(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
+        self._shadow = ShadowMap.of(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
 
     def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
         client = self._client
@@ -111,14 +116,18 @@ class RenderWorld(Closable):
                 textures[material.name] = pybullet.loadTexture(str(picture), physicsClientId=client)
             pybullet.changeVisualShape(body, -1, textureUniqueId=textures[material.name], physicsClientId=client)
 
-    def render(self, camera: Camera, world_from_camera: Floats) -> Picture:
-        """Take a picture from a pose (4, 4)."""
+    def render(self, camera: Camera, world_from_camera: Floats, instances: bool = False) -> Picture:
+        """Take a picture; the instance id map is ray-cast."""
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
         rgb = shade(
             camera, world_from_camera, albedo, depth, surface, self._light, self._shadow, self._clouds, self._heights
         )
         self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
-        return Picture(rgb, depth)
+        if not instances:
+            return Picture(rgb, depth)
+        rays = product(camera.rays().reshape(-1, 3), world_from_camera[:3, :3].T)
+        owner = ray_caster(self._scene).first_hit(world_from_camera[:3, 3], rays)[1]
+        return Picture(rgb, depth, owner.reshape(depth.shape))
 
     def rasterise(
         self, camera: Camera, world_from_camera: Floats, near_m: float = NEAR_M, far_m: float = FAR_M

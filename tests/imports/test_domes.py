@@ -12,12 +12,12 @@ from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode
 from aerialdojo_gen.rendering.gl import GlRenderer
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 
 CAMERA = Camera(256, 256, 90.0)
 
 
-@pytest.mark.parametrize("renderer", [GlRenderer, RenderWorld, RayRenderer])
+@pytest.mark.parametrize("renderer", [GlRenderer, PyBulletRenderer, RayRenderer])
 def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(renderer):
     nodes = [
         raw(box((-2, 8, 0), (2, 12, 3)), "Shed", (200, 40, 40)),

@@ -24,12 +24,12 @@ from aerialdojo_gen.rendering.checks import Solid
 from aerialdojo_gen.rendering.gl import GlRenderer
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures
 from aerialdojo_gen.rendering.raycast import RayRenderer
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.studio.web.payload import scene_payload
 
-RENDERERS = (GlRenderer, RenderWorld, RayRenderer)
+RENDERERS = (GlRenderer, PyBulletRenderer, RayRenderer)
 CAMERA = Camera(256, 256, 90.0)
 
 

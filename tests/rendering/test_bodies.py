@@ -7,10 +7,10 @@ from support.rendered import boxes_and_a_wall, courtyard
 
 from aerialdojo_gen import GlRenderer
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
-from aerialdojo_gen.rendering.backend import PyBulletRenderer
 from aerialdojo_gen.rendering.bodies import draw_bodies
 from aerialdojo_gen.rendering.gl import clip_from_world
 from aerialdojo_gen.rendering.picture import FAR_M, NEAR_M
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 from aerialdojo_gen.store.schemas import VIEWS
 
 

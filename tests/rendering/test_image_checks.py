@@ -10,7 +10,7 @@ from support.rendered import MATERIALS, block, courtyard
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks, picture_flags
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
@@ -25,7 +25,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def world(scene):
-    with RenderWorld(scene) as world:
+    with PyBulletRenderer(scene) as world:
         yield world
 
 
@@ -108,7 +108,7 @@ def test_depth_mismatch(sound, solid, fault):
 
 def test_sky_taken_for_a_surface():
     flat = Scene("flat", (block("ground", (-50, -50, -1), (50, 50, 0), "grass"),), MATERIALS, np.array([[-50.0] * 3, [50.0] * 3]))  # fmt: skip  # noqa: E501
-    with RenderWorld(flat) as world:
+    with PyBulletRenderer(flat) as world:
         picture = world.render(CAMERA, HERE)
     depth = np.where(np.isinf(picture.depth_m), np.float32(40.0), picture.depth_m)
     assert flags_of(Solid(flat), (picture, HERE)) == set()

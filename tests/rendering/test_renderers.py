@@ -24,6 +24,7 @@ from aerialdojo_gen.rendering.backend import (
     probe_scene,
     scene_renderer,
 )
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
@@ -247,7 +248,7 @@ def test_auto_passes_over_what_does_not_work_and_says_so(monkeypatch, fresh_choi
     def open_one(scene, name="auto"):
         if name == "gl":
             raise RenderError("the renderer gl lacks the package moderngl: install it")
-        return backend.PyBulletRenderer(scene)
+        return PyBulletRenderer(scene)
 
     monkeypatch.setattr(backend, "open_renderer", open_one)
     choice = choose_renderer()

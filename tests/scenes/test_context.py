@@ -25,7 +25,7 @@ from aerialdojo_gen.rendering.casters import ray_caster, triangle_caster
 from aerialdojo_gen.rendering.checks import Solid, scene_solid
 from aerialdojo_gen.rendering.orthographic import OrthographicPictures, orthographic_pictures
 from aerialdojo_gen.rendering.raycast import RayRenderer, ray_renderer
-from aerialdojo_gen.rendering.world import RenderWorld
+from aerialdojo_gen.rendering.world import PyBulletRenderer
 from aerialdojo_gen.scenes.context import cache_scene, context_of, open_contexts, open_scene, release_scenes
 from aerialdojo_gen.scenes.glb import write_glb
 
@@ -167,12 +167,12 @@ def test_what_draws_is_closed_when_its_scene_goes(meshes):
     place = open_scene(path, digest).scene
     renderer = scene_renderer(place, "pybullet")
     assert scene_renderer(place, "pybullet", reopen=True) is not renderer
-    world = scene_renderer(place, "pybullet")._world
+    world = scene_renderer(place, "pybullet")
     client = world._client
     assert pybullet.isConnected(client)
     open_scene(*meshes[1])
     assert not pybullet.isConnected(client)
-    assert isinstance(world, RenderWorld)
+    assert isinstance(world, PyBulletRenderer)
     again = context_of(place)
     drawn = scene_renderer(place, "pybullet")
     close_renderers()

@@ -153,13 +153,11 @@ class Storage:
 
     def change(self, version: str, author: Author, operation: Operation) -> tuple[State, Record | None]:
         """Apply an operation and save it."""
-        kind = operation.kind
-        return self._commit(
-            version,
-            author,
-            "do",
-            lambda state: document.edits_of(operation, state.annotations, self._next_id(state, kind)),
-        )
+
+        def edits(state: State) -> list[Edit]:
+            return document.edits_of(operation, state.annotations, self._next_id(state, operation.kind))
+
+        return self._commit(version, author, "do", edits)
 
     def replace(self, version: str, author: Author, raw: bytes) -> tuple[State, Record | None]:
         """Replace the file by another one, as a change that can be undone; `AnnotationError` if it is invalid."""
@@ -177,12 +175,11 @@ class Storage:
 
     def redo(self, version: str, author: Author) -> tuple[State, Record | None]:
         """Redo the last undone change of the author's tab."""
-        return self._commit(
-            version,
-            author,
-            "redo",
-            lambda _: [e for r in self.history.stacks(author.client)[1][-1:] for e in r.edits],
-        )
+
+        def edits(_: State) -> list[Edit]:
+            return [edit for record in self.history.stacks(author.client)[1][-1:] for edit in record.edits]
+
+        return self._commit(version, author, "redo", edits)
 
     def _next_id(self, state: State, kind: Kind) -> int:
         present = max((entry.id for entry in getattr(state.annotations, kind)), default=-1)

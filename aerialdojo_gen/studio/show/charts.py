@@ -18,12 +18,11 @@ from aerialdojo_gen.studio.show.pictured import PicturedTask
 Floats = NDArray[np.float64]
 
 # Clearance from tight (red) to open (blue), as in `view`; safe for colour-blind readers.
-TIGHT_M, OPEN_M = 0.25, 5.0
-_STOPS = ((0.25, "#a50026"), (0.5, "#f46d43"), (1.0, "#fee090"), (2.0, "#74add1"), (5.0, "#313695"))
+STOPS = {0.25: "#a50026", 0.5: "#f46d43", 1.0: "#fee090", 2.0: "#74add1", 5.0: "#313695"}
+CLEARANCE_SCALE = LogNorm(min(STOPS), max(STOPS), clip=True)
 CLEARANCE_COLOURS = LinearSegmentedColormap.from_list(
-    "clearance", [(math.log(m / TIGHT_M) / math.log(OPEN_M / TIGHT_M), colour) for m, colour in _STOPS]
+    "clearance", [(math.log(m / 0.25) / math.log(5.0 / 0.25), colour) for m, colour in STOPS.items()]
 )
-CLEARANCE_SCALE = LogNorm(TIGHT_M, OPEN_M, clip=True)
 
 _START, _GOAL, _TARGET = "#0284c7", "#16a34a", "#facc15"
 _HALO = (withStroke(linewidth=3, foreground="black"),)

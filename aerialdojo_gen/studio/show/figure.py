@@ -20,17 +20,7 @@ from aerialdojo_gen.base.terminal import shown_in_page
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store.atomic import atomic_file
 from aerialdojo_gen.studio.show import charts
-from aerialdojo_gen.studio.show.charts import (
-    CLEARANCE_COLOURS,
-    CLEARANCE_SCALE,
-    draw_map,
-    draw_profile,
-    draw_side,
-    plain,
-)
 from aerialdojo_gen.studio.show.pictured import PicturedTask
-
-_STOPS_M = (0.25, 0.5, 1.0, 2.0, 5.0)
 
 
 def render_page(task: PicturedTask) -> str:
@@ -45,16 +35,16 @@ def render_page(task: PicturedTask) -> str:
     return template.render(
         task=task,
         route=route,
-        map=_to_data_url(lambda axes: draw_map(axes, task, 1.6), 9.6, 6.0),
-        side=_to_data_url(lambda axes: draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
-        profile=_to_data_url(lambda axes: draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
+        map=_to_data_url(lambda axes: charts.draw_map(axes, task, 1.6), 9.6, 6.0),
+        side=_to_data_url(lambda axes: charts.draw_side(axes, task, 4.0), 9.6, 2.4, left=0.055),
+        profile=_to_data_url(lambda axes: charts.draw_profile(axes, task), 9.6, 2.2, left=0.055, bottom=0.2),
         reference=None if task.reference is None else data_url(encode_png(task.reference)),
         frames=[(frame, data_url(encode_jpeg(frame.rgb, PAGE_JPEG))) for frame in task.frames],
         poses=[
             (k, schemas.ACTION_NAMES[action], *pose)
             for k, (action, pose) in enumerate(zip(route["action"], task.poses.tolist(), strict=True))
         ],
-        clearances=[(m, to_hex(CLEARANCE_COLOURS(float(CLEARANCE_SCALE(m))))) for m in _STOPS_M],
+        clearances=[(m, to_hex(charts.CLEARANCE_COLOURS(float(charts.CLEARANCE_SCALE(m))))) for m in charts.STOPS],
     )
 
 
@@ -86,8 +76,8 @@ def task_figure(task: PicturedTask) -> Figure:
     sheet = _Sheet(_WIDTH_IN, 8.7 + strip)
     figure, top = sheet.figure, sheet.height
     size = min(19.0, 1700 / len(task.title))
-    figure.text(0.45 / _WIDTH_IN, 1 - 0.42 / top, plain(task.title), fontsize=size, weight="bold", va="center")
-    figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, plain(task.place), fontsize=11, color="#475569", va="center")
+    figure.text(0.45 / _WIDTH_IN, 1 - 0.42 / top, charts.plain(task.title), fontsize=size, weight="bold", va="center")
+    figure.text(0.45 / _WIDTH_IN, 1 - 0.80 / top, charts.plain(task.place), fontsize=11, color="#475569", va="center")
 
     charts.draw_map(sheet.axes(0.45, top - 6.25, 8.3, 5.2), task, 8.3 / 5.2)
     side = sheet.axes(0.85, strip + 0.3, 7.9, 1.95)
@@ -102,10 +92,10 @@ def task_figure(task: PicturedTask) -> Figure:
     for name, value in task.facts:
         figure.text(11.6 / _WIDTH_IN, y / top, name, fontsize=9, color="#475569")
         y -= 0.17
-        for line in textwrap.wrap(plain(value), 27)[:3]:
+        for line in textwrap.wrap(charts.plain(value), 27)[:3]:
             figure.text(11.6 / _WIDTH_IN, y / top, line, fontsize=10.5)
             y -= 0.17
-    words = "\n".join(line for part in plain(task.goal).splitlines() for line in textwrap.wrap(part, 68))
+    words = "\n".join(line for part in charts.plain(task.goal).splitlines() for line in textwrap.wrap(part, 68))
     figure.text(
         9.05 / _WIDTH_IN, (top - 3.85) / top, words, fontsize=9.5, va="top", linespacing=1.35,
         bbox={"facecolor": "#e8eefc", "edgecolor": "none", "boxstyle": "square,pad=0.5"},
@@ -115,7 +105,7 @@ def task_figure(task: PicturedTask) -> Figure:
     bar = figure.colorbar(
         ScalarMappable(charts.CLEARANCE_SCALE, charts.CLEARANCE_COLOURS),
         cax=sheet.axes(9.5, strip + 0.5, 4.2, 0.1),
-        orientation="horizontal", ticks=[0.25, 0.5, 1, 2, 5], format="%g",
+        orientation="horizontal", ticks=list(charts.STOPS), format="%g",
     )  # fmt: skip
     bar.ax.minorticks_off()
     bar.ax.tick_params(labelsize=7)
