@@ -56,7 +56,7 @@ def _nearest_on_segment(way: Floats, begin_m: Floats, end_m: Floats) -> Floats:
 
 
 # Agents that are not compared: the oracle, and the baselines that ignore observations.
-UPPER_BOUND, BASELINES = "upper bound", "floors"
+UPPER_BOUND, BASELINES = "upper bound", "baselines"
 GROUP_OF = {"oracle": UPPER_BOUND, "stop": BASELINES, "constant": BASELINES, "random": BASELINES}
 
 # The partition of episodes in OOD scenes whose training tasks the agent was trained on.

@@ -114,7 +114,7 @@ def cells(table: TextTable, label: str) -> tuple[str, ...]:
 
 def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, runs: list[Run]) -> None:
     assert [(run.name, run.group, len(run.episodes)) for run in runs] == [
-        ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "floors", 18)
+        ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "baselines", 18)
     ]  # fmt: skip
     # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
     alone = with_baselines(log, load_runs(log, ["floor"]))
@@ -125,7 +125,7 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, r
         "alpha"
     ]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
-    assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "floors"]
+    assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "baselines"]
     with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
         group_runs(runs, {"open": ["gamma"]})
 
@@ -152,7 +152,7 @@ def test_tables_4_and_5(runs: list[Run]) -> None:
     rows = [label for label, _ in table.rows]
     order = [rows.index(name) for name in ("package:Alpha", "package:Beta", "stop")]
     assert table.sections[order[0]] == "agents"
-    assert table.sections[order[2]] == "floors"
+    assert table.sections[order[2]] == "baselines"
     marks = [[table.marks.get((row, k)) for k in range(1, 8)] for row in order]
     assert marks[0] == [BEST, BEST, BEST, BEST, None, SECOND, BEST]
     assert marks[1] == [SECOND, SECOND, SECOND, SECOND, BEST, BEST, SECOND]
