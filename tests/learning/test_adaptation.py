@@ -183,14 +183,14 @@ def test_a_run_says_where_its_policy_was_trained_and_the_report_tells_ood_from_o
         run("evaluate", "--agent", "policy", "--option", f"weights={weights}", "--run", name, "--split", "test",
             "--limit", "4", "--out", str(tmp_path), "--submission", str(tmp_path / f"{name}.json.gz"),
             "--workers", "1")  # fmt: skip
-    rows = json.loads(run("report", "before", "after", "--log", str(tmp_path), "--no-floors", "--json"))
+    rows = json.loads(run("report", "before", "after", "--log", str(tmp_path), "--no-baselines", "--json"))
     parts = {(row["run"], row["name"]) for row in rows if row["scope"] == "partition"}
     assert parts == {("before", "ID"), ("before", "OOD"), ("after", "ID"), ("after", "OOD adapted")}
     page = " ".join(
-        run("report", "before", "after", "--log", str(tmp_path), "--no-floors", "--table", "partition").split()
+        run("report", "before", "after", "--log", str(tmp_path), "--no-baselines", "--table", "partition").split()
     )
     assert "OOD adapted: OOD scenes whose training tasks the agent was trained on: policy (after), 1 scene." in page
-    alone = run("report", "before", "--log", str(tmp_path), "--no-floors", "--table", "partition")
+    alone = run("report", "before", "--log", str(tmp_path), "--no-baselines", "--table", "partition")
     assert "adapted" not in alone
     chosen = Selection(("test",), limit=4)
     cards = [score(smoke, tmp_path / f"{name}.json.gz", tmp_path / "scored", selection=chosen) for name in BOTH]
