@@ -79,7 +79,7 @@ Group = Annotated[
 Intervals = Annotated[bool, typer.Option("--intervals/--no-intervals", help="Print 95 % confidence intervals.")]
 AddBaselines = Annotated[
     bool,
-    typer.Option("--baselines/--no-baselines", help="Add the agents stop, constant, random if they did the same tasks."),
+    typer.Option("--baselines/--no-baselines", help="Add stop, constant, random if they did the same tasks."),
 ]
 Style = Annotated[
     Literal["terminal", "markdown", "latex", "csv", "json"], typer.Option("--format", help="Output format.")
