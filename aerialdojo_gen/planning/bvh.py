@@ -116,14 +116,6 @@ def _box_gap2(
     return gx * gx + gy * gy + gz * gz
 
 
-@njit(cache=True, inline="always")
-def _next_node(node: int) -> int:
-    """Next node of a depth-first traversal after a subtree; 0 at the end."""
-    while node & 1:
-        node >>= 1
-    return node + 1 if node else 0
-
-
 @njit(cache=True)
 def segment_distance(
     px: float, py: float, pz: float, qx: float, qy: float, qz: float,
