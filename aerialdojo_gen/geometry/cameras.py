@@ -33,11 +33,19 @@ _BODY_FROM_CAMERA = {
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with square pixels."""
+    """A pinhole camera with square pixels.
 
-    width: int = 640  # Pixels
+    Attributes
+    ----------
+    width, height : int
+        Pixels.
+    fov_deg : float
+        Horizontal field of view, degrees, in (0, 180).
+    """
+
+    width: int = 640
     height: int = 640
-    fov_deg: float = FOV_DEG  # Horizontal field of view, in (0, 180)
+    fov_deg: float = FOV_DEG
 
     def __post_init__(self) -> None:
         """Refuse what is no picture."""
@@ -63,7 +71,27 @@ class Camera:
 
 
 def view_pose(position: ArrayLike, yaw_rad: float, view: str) -> Floats:
-    """Pose of a body's camera, world_from_camera (4, 4) float64; `view` is one of `VIEWS`."""
+    """Pose of one of the body's cameras.
+
+    Parameters
+    ----------
+    position : (3,) array_like
+        The body's centre, metres, world frame.
+    yaw_rad : float
+        The body's yaw, counter-clockwise from +x.
+    view : str
+        One of `aerialdojo_gen.store.schemas.VIEWS`.
+
+    Returns
+    -------
+    (4, 4) float64
+        world_from_camera.
+
+    Raises
+    ------
+    KeyError
+        If there is no such view.
+    """
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)
     world_from_body = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     pose = np.eye(4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -26,16 +27,16 @@ class Picture:
     instance: NDArray[np.int32] | None = None  # (H, W) int32 or None
 
 
-class Renderer:
+class Renderer(ABC):
     """A scene ready to be rendered; a context manager that frees its memory at its end."""
 
     name: str
     device: str  # As the driver names it
     light: Light  # That it draws by: at first the scene's own
 
+    @abstractmethod
     def render(self, camera: Camera, world_from_camera: NDArray[np.float64], instances: bool = False) -> Picture:
         """Take a picture from a pose (4, 4); its arrays are not changed by later calls."""
-        raise NotImplementedError
 
     def render_views(
         self, camera: Camera, poses: Sequence[NDArray[np.float64]], instances: bool = False
@@ -43,11 +44,11 @@ class Renderer:
         """Take several pictures."""
         return [self.render(camera, pose, instances) for pose in poses]
 
+    @abstractmethod
     def relight(self, light: Light) -> None:
         """Draw by another light from now on."""
-        raise NotImplementedError
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - one that holds nothing has nothing to free
         """Free the memory; a second call does nothing."""
 
     def __enter__(self) -> Self:

@@ -21,6 +21,7 @@ from aerialdojo_gen.rendering.picture import Picture, Renderer
 from aerialdojo_gen.rendering.shading import shade
 from aerialdojo_gen.rendering.texels import Backdrop, SurfaceTexels, masked_caster
 from aerialdojo_gen.scenes.context import context_of
+from aerialdojo_gen.scenes.light import Light
 from aerialdojo_gen.scenes.model import Scene
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,8 @@ class RayRenderer(Renderer):
         self._rays = masked_caster(scene, caster or TriangleRayCaster(texels.vertices, texels.faces))
         self._vertex_colours = texels if texels.has_vertex_colours else None
         self._backdrop = Backdrop(scene)
-        self._light: Lighting = light_of(scene, [material.name for material in texels.materials])
+        self._scene, self._materials = scene, [material.name for material in texels.materials]
+        self.relight(scene.light)
         tiles = [np.array([[m.colour]], np.uint8) if m.texture is None else m.texture for m in texels.materials]
         self._texels = np.concatenate([t.reshape(-1, 3) for t in tiles])
         sizes = np.array([t.shape[:2] for t in tiles], np.int64)
@@ -55,6 +57,11 @@ class RayRenderer(Renderer):
         far_below[2, 3] = -1e6
         self._open_sky = HeightMap.nowhere()
         self._no_shadow = ShadowMap.of(Camera(1, 1, 90.0), far_below, np.full((1, 1), np.inf, np.float32))
+
+    def relight(self, light: Light) -> None:
+        """Draw by another light from now on."""
+        self.light = light
+        self._light: Lighting = light_of(self._scene, self._materials, light)
 
     def render(self, camera: Camera, world_from_camera: Floats, instances: bool = True) -> Picture:
         """Take a picture, always with its instance id map."""

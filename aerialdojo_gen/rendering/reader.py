@@ -26,7 +26,15 @@ from aerialdojo_gen.rendering.video import Frames, Tile, Video
 
 
 class DepthVideo(Frames):
-    """Depth in metres, (H, W) float32, inf where nothing lies within range, over a `Video` of the stored values."""
+    """Depth in metres, over a `Video` of the stored values.
+
+    Attributes
+    ----------
+    stored : Video
+        The stored values, (H, W) uint16; 0 where nothing lies within range.
+    step : float
+        0 where these are millimetres, else the share by which they grow (`codecs.to_stored`).
+    """
 
     def __init__(self, video: Video, step: float = 0.0) -> None:
         self.path, self.stored = video.path, video
@@ -49,13 +57,28 @@ class DepthVideo(Frames):
 
 @dataclass(frozen=True)
 class Recording:
-    """All videos of one trajectory, by view."""
+    """All videos of one trajectory.
 
-    rgb: dict[str, Video]  # Frames are (H, W, 3) uint8
-    depth_m: dict[str, DepthVideo]  # Frames are (H, W) float32: planar depth in metres
-    cameras: dict[str, dict[str, Any]]  # ``K``, ``body_from_camera``, ``fov_deg``, ``pixel_centre``, …
-    fps: float  # 0 for PNG files, whose frames' times stand in the table ``frames``
-    instance: dict[str, Video]  # Where recorded; (H, W) uint16: number of the node in the scene's mesh, plus 1
+    Attributes
+    ----------
+    rgb : dict of str to Video
+        By view; frames are (H, W, 3) uint8.
+    depth_m : dict of str to DepthVideo
+        By view; frames are (H, W) float32, planar depth in metres, inf where nothing lies within range.
+    cameras : dict of str to dict
+        By view: ``K`` (3 x 3, pixels), ``body_from_camera`` (4 x 4; body x forward, y left, z up), ``fov_deg``,
+        ``pixel_centre``.
+    fps : float
+        Frames a second; 0 for PNG files, whose frames' times stand in the table ``frames``.
+    instance : dict of str to Video
+        By view, where they were recorded; frames are (H, W) uint16: number of the node in the scene's mesh, plus 1.
+    """
+
+    rgb: dict[str, Video]
+    depth_m: dict[str, DepthVideo]
+    cameras: dict[str, dict[str, Any]]
+    fps: float
+    instance: dict[str, Video]
 
     def __len__(self) -> int:
         """Return the number of frames, the same in every video."""
@@ -63,7 +86,23 @@ class Recording:
 
 
 def read_recording(folder: str | Path) -> Recording:
-    """Open a recording, ``<data>/media/<scene>/<nav_id>``; nothing is decoded yet."""
+    """Open a recording.
+
+    Parameters
+    ----------
+    folder : str or Path
+        ``<data>/media/<scene>/<nav_id>``.
+
+    Returns
+    -------
+    Recording
+        Nothing is decoded yet.
+
+    Raises
+    ------
+    RenderError
+        There is no recording, a video is missing or damaged, or the videos differ in length.
+    """
     folder = Path(folder)
     if (folder / TILED).is_file():
         videos = _tiles(folder / TILED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
@@ -32,8 +33,9 @@ class Frames(Sequence[NDArray[Any]]):
             raise IndexError(f"{self.path.name} has {len(self)} frames, not {k}")
         return self._decode(k % len(self))
 
+    @abstractmethod
     def _decode(self, k: int) -> NDArray[Any]:
-        raise NotImplementedError
+        """Decode frame k, not negative."""
 
 
 class Video(Frames):

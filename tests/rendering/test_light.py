@@ -97,6 +97,17 @@ def test_a_renderer_that_is_lit_anew_draws_as_one_of_that_light(name):
     assert np.array_equal(scene_renderer(scene, name).render(camera, pose).rgb, own)
 
 
+def test_rays_that_are_lit_anew_draw_as_those_of_that_light():
+    scene, camera, pose = court(), Camera(48, 48, 90.0), view_pose((1.0, 1.0, 3.0), 0.5, "front")
+    renderer, wet = RayRenderer(scene), chosen_light(scene.light, "wet")
+    own = renderer.render(camera, pose).rgb
+    renderer.relight(wet)
+    lit = renderer.render(camera, pose).rgb
+    assert renderer.light == wet
+    assert np.array_equal(lit, RayRenderer(replace(scene, sun=wet.sun, weather=wet.weather)).render(camera, pose).rgb)
+    assert not np.array_equal(lit, own)
+
+
 def test_drawn_lights_are_those_of_their_key_and_differ():
     own = Light((0.0, 0.0, 1.0))
     drawn = [chosen_light(own, RANDOM, 0, f"task-{k}") for k in range(40)]
