@@ -111,7 +111,9 @@ def check_replaced(data: Where, pipeline: Pipeline, scenes: Sequence[str], *, wh
     if not lost:
         return
     others = sorted({found[scene] for scene in lost}, key=lambda maker: maker.name)
-    named = " and ".join(dict.fromkeys(f"{m}{' with other settings' * (m.name == mine.name)}" for m in others))
+    named = " and ".join(
+        dict.fromkeys(str(m) + (" with other settings" if m.name == mine.name else "") for m in others)
+    )
     parts = (("remove", removed), ("replace", replaced))
     what = " and ".join(f"{verb} {_listed(root, part)}" for verb, part in parts if part)
     names = {maker.name for maker in others} - {"", mine.name}
