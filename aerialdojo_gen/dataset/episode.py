@@ -104,7 +104,8 @@ class Episode:
             self.termination = "collision"
 
     def _measure(self) -> None:
-        dx, dy, dz = (a - b for a, b in zip(self.position, self._goal, strict=True))
+        (x, y, z), (goal_x, goal_y, goal_z) = self.position, self._goal
+        dx, dy, dz = x - goal_x, y - goal_y, z - goal_z
         self.horizontal_distance_m = math.hypot(dx, dy)
         self.distance_m = math.sqrt(dx * dx + dy * dy + dz * dz)
         self.min_distance_m = min(self.min_distance_m, self.distance_m)

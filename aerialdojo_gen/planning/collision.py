@@ -122,12 +122,13 @@ class CollisionWorld:
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
         """Whether a ball moving straight from `p` to `q` touches a surface: its exact sweep, a capsule."""
-        ax, ay, az = np.asarray(p, np.float64).tolist()
-        bx, by, bz = np.asarray(q, np.float64).tolist()
+        return self._swept(*np.asarray(p, np.float64).tolist(), *np.asarray(q, np.float64).tolist(), radius_m)
+
+    def _swept(self, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius_m: float) -> bool:
         dx, dy, dz = bx - ax, by - ay, bz - az
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         if length < 1e-9:
-            return self.sphere_in_collision(p, radius_m)
+            return self.sphere_in_collision((ax, ay, az), radius_m)
         key = (radius_m, round(length, 9))
         capsules = self._shapes.capsules
         capsule = capsules.get(key)
@@ -152,7 +153,7 @@ class CollisionWorld:
         p = np.asarray(points, np.float64)
         if len(p) == 1:
             return self.sphere_in_collision(p[0], radius_m)
-        return any(self.segment_in_collision(a, b, radius_m) for a, b in itertools.pairwise(p))
+        return any(self._swept(*a, *b, radius_m) for a, b in itertools.pairwise(p.tolist()))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
         spheres = self._shapes.spheres

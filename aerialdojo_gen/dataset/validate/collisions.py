@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from aerialdojo_gen.dataset.validate.registry import Finding, check
-from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
+from aerialdojo_gen.dataset.validate.rows import Floats, Mask, Rows, SceneData
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.planning.certify import corners
 from aerialdojo_gen.planning.collision import CollisionWorld
@@ -24,11 +24,16 @@ _HALVINGS = 14
 
 
 @check("routes", needs=("mesh",), after=_FITS, samples=True)
-def route_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
+def route_collision(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The body's sweep along the stored positions touches no surface (FCL, a capsule a leg)."""
-    world, radius = data.world, data.pipeline.embodiment.radius_m
+    world, radius, cap = data.world, data.pipeline.embodiment.radius_m, data.pipeline.plan.clearance_cap_m
+    bodies = rows.floats("min_clearance_m") - _CLEARANCE_M
+    wide = _free_as_stored(data)
     for row in data.sampled_routes():
-        if hit := _hit(world, corners(data.paths.xyz[data.paths.of(row)]), radius):
+        legs = corners(data.paths.xyz[data.paths.of(row)])
+        # Where a body as thick as the stored clearance passes, so does the drone's: one sweep for two checks.
+        wide[row] = radius <= bodies[row] <= cap and not world.route_in_collision(legs, float(bodies[row]))
+        if not wide[row] and (hit := _hit(world, legs, radius)):
             yield Finding(row, f"the body touches a surface {hit}", "a free sweep")
 
 
@@ -50,15 +55,20 @@ def replay_collision(data: SceneData, _rows: Rows) -> Iterator[Finding]:
 def min_clearance(data: SceneData, rows: Rows) -> Iterator[Finding]:
     """The stored clearance is right: a body a little thinner passes everywhere, one a little thicker does not."""
     world, cap = data.world, data.pipeline.plan.clearance_cap_m
-    stored, paths = rows.floats("min_clearance_m"), data.paths
+    stored, paths, wide = rows.floats("min_clearance_m"), data.paths, _free_as_stored(data)
     for row in data.sampled_routes(*_FITS, "route_collision", "null_value", "not_finite"):
         legs, stored_m = corners(paths.xyz[paths.of(row)]), float(stored[row])
         if stored_m > cap + _CLEARANCE_M:
             yield Finding(row, f"{stored_m:.6g} m", f"{cap:g} m at most")
             continue
-        passes = stored_m <= _CLEARANCE_M or not world.route_in_collision(legs, stored_m - _CLEARANCE_M)
+        passes = wide[row] or stored_m <= _CLEARANCE_M or not world.route_in_collision(legs, stored_m - _CLEARANCE_M)
         if not passes or (stored_m < cap and not world.route_in_collision(legs, max(stored_m, 0.0) + _CLEARANCE_M)):
             yield Finding(row, f"{stored_m:.6g} m", f"{_clearance_m(world, legs, cap):.4f} m")
+
+
+def _free_as_stored(data: SceneData) -> Mask:
+    """Routes that a body passes which is nearly as thick as their stored clearance, as far as that is known."""
+    return data.cached("free as stored", lambda: np.zeros(len(data["routes"]), np.bool_))
 
 
 def _hit(world: CollisionWorld, legs: Floats, radius: float) -> str:

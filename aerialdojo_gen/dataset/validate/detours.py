@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.sections import SearchAttempt
+from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.dataset.validate.registry import Finding, check
 from aerialdojo_gen.dataset.validate.rows import Floats, Rows, SceneData
 from aerialdojo_gen.planning.attempt import costs_at
@@ -128,21 +129,25 @@ def _cost_m(planner: Planner, poses: Floats, actions: NDArray[np.integer[Any]]) 
     return total
 
 
+@njit(cache=True)
 def _pieces(positions: Floats) -> list[tuple[int, int, float, float]]:
     """Shortest pieces of a route that the straight way would save enough of: first and last pose, flown, straight."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
-    offset = positions[None] - positions[:, None]
-    straight = np.hypot(offset[..., 0], offset[..., 1]) + np.abs(offset[..., 2])
-    flown = along[None] - along[:, None]
-    saved = flown - straight
-    saving = ((saved >= _SAVED_M) & (saved >= _SAVED_SHARE * flown)) | (saved >= _SAVED_ANYWAY_M)
-    found, end = [], len(positions)
+    n = len(positions)
+    along = np.zeros(n)
+    for i in range(1, n):
+        dx, dy, dz = positions[i] - positions[i - 1]
+        along[i] = along[i - 1] + math.sqrt(dx * dx + dy * dy + dz * dz)
+    found, end = [(0, 0, 0.0, 0.0) for _ in range(0)], n
     # From the last start backwards: a piece that holds a shorter one is not looked at.
-    for first in range(len(positions) - 2, -1, -1):
-        ends = np.flatnonzero(saving[first, first + 1 : end])
-        if len(ends):
-            end = first + 1 + int(ends[0])
-            found.append((first, end, float(flown[first, end]), float(straight[first, end])))
+    for first in range(n - 2, -1, -1):
+        for last in range(first + 1, end):
+            dx, dy, dz = positions[last] - positions[first]
+            straight, flown = math.hypot(dx, dy) + abs(dz), along[last] - along[first]
+            saved = flown - straight
+            if (saved >= _SAVED_M and saved >= _SAVED_SHARE * flown) or saved >= _SAVED_ANYWAY_M:
+                found.append((first, last, flown, straight))
+                end = last
+                break
     return found
 
 
