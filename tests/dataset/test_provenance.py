@@ -72,21 +72,22 @@ def test_commands_take_the_pipeline_of_the_release(data, capsys):
     code, _, err = said(capsys, "render", "--data", data, "--limit", "1", "--workers", "1")
     assert (code, bool(re.search(r"render: [1-9] rows in", err))) == (0, True), err
     assert files_of(data / "release") == before
+    quick = ("--no-meshes", "--pictures", "0", "--workers", "1")
     for place in (data, data / "release"):
-        code, out, err = said(
-            capsys, "validate", "--release", place, "--no-meshes", "--pictures", "0", "--workers", "1"
-        )
+        code, out, err = said(capsys, "validate", "--release", place, *quick)
         assert code == 0
         assert "another salt" not in out + err
-    code, out, err = said(
-        capsys, "validate", "--data", data, "--no-meshes", "--workers", "1", "--pipeline", "aerialdojo-200k"
-    )
+    code, out, err = said(capsys, "validate", "--data", data, *quick, "--pipeline", "aerialdojo-200k")
     assert err.startswith("not the pipeline of the release, which is --pipeline smoke")
 
 
-def test_a_pipeline_of_ones_own_is_found_beside_the_data_or_asked_for(data, pipeline, capsys):
+def test_a_pipeline_of_ones_own_takes_the_place_of_another_and_is_found_beside_the_data(data, pipeline, capsys):
     file = pipeline()
     split(data, file, replace=True)
+    assert existing_scenes(data) == [B]
+    (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
+    assert (entry["name"], entry["scenes"]) == ("other", [B])
+    assert f"| `{A}` |" not in (data / "release" / "README.md").read_text()
     before = times(data)
     code, _, err = said(capsys, "split", "--data", data, "--workers", "1")
     assert (code, times(data)) == (0, before), err
@@ -104,15 +105,6 @@ def test_a_pipeline_of_ones_own_is_found_beside_the_data_or_asked_for(data, pipe
         open_pipeline(None, data)
 
 
-def test_replace_puts_the_other_pipeline_s_release_in_its_place(data, pipeline):
-    split(data, pipeline(), replace=True)
-    assert existing_scenes(data) == [B]
-    (entry,) = json.loads((data / "release" / "pipeline.json").read_text())["pipelines"]
-    assert (entry["name"], entry["scenes"]) == ("other", [B])
-    split(data, pipeline())
-    assert f"| `{A}` |" not in (data / "release" / "README.md").read_text()
-
-
 def test_what_describes_a_release_is_written_again_only_where_something_is_another(data, project):
     documents = [data / "release" / name for name in ("README.md", "croissant.json", "pipeline.json")]
     split(data, project / "pipelines" / "smoke.toml")
@@ -123,13 +115,6 @@ def test_what_describes_a_release_is_written_again_only_where_something_is_anoth
         path.write_bytes(change) if change else path.unlink()
         split(data, project / "pipelines" / "smoke.toml")
         assert [path.read_bytes() for path in documents] == [text for _, text in before], path.name
-
-
-def test_the_same_pipeline_on_some_scenes_keeps_the_others(data, project):
-    before = files_of(data / "release")
-    shutil.rmtree(data / "release" / "tasks" / "id_train")
-    split(data, project / "pipelines" / "smoke.toml", scene=[A])
-    assert files_of(data / "release") == before
 
 
 def test_a_scene_is_added_beside_another_pipeline_s_and_not_put_in_its_place(data, project, pipeline):
@@ -151,17 +136,18 @@ def test_a_copy_with_the_same_name_and_other_settings_removes_nothing(data, pipe
     assert existing_scenes(data) == [B]
 
 
-@pytest.mark.parametrize("record", [None, "{", '{"pipelines": [{"name": 3}]}'])
-def test_a_release_that_does_not_say_is_not_thinned_out_but_made_again(data, project, pipeline, record):
+def test_a_release_that_does_not_say_is_not_thinned_out_but_made_again(data, project, pipeline):
     path = data / "release" / "pipeline.json"
     before = files_of(data / "release")
-    path.unlink()
-    if record is not None:
-        path.write_text(record)
-    with pytest.raises(UsageError, match="made by a pipeline that it does not name: pipeline 'other' would remove 1"):
-        split(data, pipeline())
-    split(data, project / "pipelines" / "smoke.toml")
-    assert files_of(data / "release") == before
+    for record in (None, "{", '{"pipelines": [{"name": 3}]}'):
+        path.unlink() if record is None else path.write_text(record)
+        with pytest.raises(UsageError, match="by a pipeline that it does not name: pipeline 'other' would remove 1"):
+            split(data, pipeline())
+        split(data, project / "pipelines" / "smoke.toml")
+        assert files_of(data / "release") == before
+    shutil.rmtree(data / "release" / "tasks" / "id_train")
+    split(data, project / "pipelines" / "smoke.toml", scene=[A])
+    assert files_of(data / "release") == before, "the other scene stays"
 
 
 def test_what_stands_beside_the_tables_is_written_while_the_data_is_held(tmp_path):
@@ -181,7 +167,7 @@ def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(da
     paper, hard = (load_pipeline(project / "pipelines" / f"aerialdojo-{name}.toml") for name in ("200k", "hard"))
     asked = hard.filter
     assert (asked.min_plan_detour, asked.max_visible_at_start, hard.split.paper_counts) == (1.05, 0.0, False)
-    for stage in BEFORE:
+    for stage in ("build-scenes", "annotate-import", "anchor-sample", "reference-images", "describe", "pair-objects"):
         assert hard.section(stage) == paper.section(stage)
     # That release has no counts to be full of: it searches all candidates.
     assert hard.section("plan") == paper.plan.model_copy(update={"search": "all", "quota": None})
@@ -209,6 +195,3 @@ def test_a_harder_release_of_the_same_candidates_costs_filter_and_split_alone(da
     assert "pipeline `hard`" in card
     assert "kept are only routes at least 5 % longer than the shortest without obstacles, and only tasks" in card
     assert "to the paper's counts" not in card
-
-
-BEFORE = ("build-scenes", "annotate-import", "anchor-sample", "reference-images", "describe", "pair-objects")

@@ -64,22 +64,6 @@ def pool(n, seed):
     return [f"U_Test_0-{k:012x}" for k in rng.permutation(n)], settings.tolist(), lengths
 
 
-@settings(deadline=None, max_examples=30)
-@given(st.integers(0, 1000), st.floats(0.85, 1.15))
-def test_a_choice_has_the_numbers_and_the_metres(seed, longer):
-    ids, setting, lengths = pool(1500, seed)
-    wanted = {"base": 200, "standard": 150, "long_horizon": 40}
-    plain = sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
-    mask = select_quota(Accepted(ids, setting, lengths), wanted, longer * plain, seed)
-    assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
-    assert lengths[mask].sum() == pytest.approx(longer * plain, rel=0.01)
-    order = np.random.default_rng(seed).permutation(len(ids))
-    again = select_quota(
-        Accepted([ids[k] for k in order], [setting[k] for k in order], lengths[order]), wanted, longer * plain, seed
-    )
-    assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
-
-
 def test_a_length_out_of_reach_takes_the_nearest():
     ids, setting, lengths = pool(300, 3)
     wanted = {"base": 40}
@@ -98,27 +82,28 @@ def test_another_seed_releases_other_tasks():
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 1000), st.floats(0.9, 1.1), st.sampled_from([0.5, 2.0, 5.0, 50.0]))
-def test_harder_tasks_are_preferred_and_numbers_and_metres_hold(seed, longer, preference):
+def test_numbers_and_metres_hold_and_harder_tasks_are_preferred(seed, longer, preference):
     ids, setting, lengths = pool(1500, seed)
     rng = np.random.default_rng(seed)
     levels = difficulty_level(rng.choice([1.0, 1.2], 1500), rng.choice([0.0, 0.4], 1500))
     assert set(levels.tolist()) == {0, 1, 2}
     wanted = {"base": 150, "standard": 120, "long_horizon": 40}
     path_m = longer * sum(n * (SETTINGS[s][0] + SETTINGS[s][1]) / 2 for s, n in wanted.items())
-    plain = select_quota(Accepted(ids, setting, lengths), wanted, path_m, seed)
-    mask = select_quota(Accepted(ids, setting, lengths, levels), wanted, path_m, seed, preference)
-    assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
-    assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
-    assert levels[mask].sum() > levels[plain].sum()
-    # Equal steps are no preference, and the order of rows is none either.
-    assert (
-        select_quota(Accepted(ids, setting, lengths, np.ones(1500, np.int64)), wanted, path_m, seed, preference)
-        == plain
-    ).all()
     order = rng.permutation(1500)
-    mixed = Accepted([ids[k] for k in order], [setting[k] for k in order], lengths[order], levels[order])
-    again = select_quota(mixed, wanted, path_m, seed, preference)
-    assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+    chosen = []
+    for told, asked in (((), 0.0), ((levels,), preference)):
+        mask = select_quota(Accepted(ids, setting, lengths, *told), wanted, path_m, seed, asked)
+        assert {s: sum(m and t == s for m, t in zip(mask, setting, strict=True)) for s in wanted} == wanted
+        assert lengths[mask].sum() == pytest.approx(path_m, rel=0.01)
+        # The order of rows is no preference.
+        mixed = Accepted([ids[k] for k in order], [setting[k] for k in order], *(v[order] for v in (lengths, *told)))
+        again = select_quota(mixed, wanted, path_m, seed, asked)
+        assert {ids[k] for k in np.flatnonzero(mask)} == {ids[order[k]] for k in np.flatnonzero(again)}
+        chosen.append(mask)
+    plain, hard = chosen
+    assert levels[hard].sum() > levels[plain].sum()
+    alike = Accepted(ids, setting, lengths, np.ones(1500, np.int64))
+    assert (select_quota(alike, wanted, path_m, seed, preference) == plain).all()
 
 
 def test_where_all_candidates_are_wanted_nothing_is_preferred():

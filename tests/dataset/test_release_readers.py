@@ -25,7 +25,7 @@ from support.command_line import called
 from support.handmade import filled
 
 from aerialdojo_gen.base.errors import StoreError
-from aerialdojo_gen.dataset.contents import SHARDS, TABLES, check_release, counts, table_and_split
+from aerialdojo_gen.dataset.contents import SHARDS, TABLES, check_release, counts, existing_scenes, table_and_split
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.tables import from_rows
@@ -129,7 +129,8 @@ def test_the_cards_head_names_every_split_and_its_files(smoke, stored):
             split = part["split"] if TABLES[config["config_name"]].split else "all"
             files = sorted((smoke / "release").glob(part["path"]))
             named[config["config_name"], split] = sum(pq.read_metadata(path).num_rows for path in files)
-    assert named == {key: table.num_rows for key, table in stored.items()}
+    counted = {(t, s): n for t, splits in counts(smoke, check_release(smoke)).items() for s, n in splits.items()}
+    assert named == counted == {key: table.num_rows for key, table in stored.items()}
     assert [c["config_name"] for c in head["configs"] if c.get("default")] == ["tasks"]
     assert head["license"] == "apache-2.0"
 
@@ -160,24 +161,15 @@ def test_a_filter_on_setting_or_modality_reads_no_row_in_vain(tmp_path_factory, 
 
 
 def test_poses_have_no_dictionary_and_pictures_no_second_compression(smoke):
-    meta = pq.read_metadata(next((smoke / "release" / "routes" / "id_train").glob("*.parquet")))
-    chunks = {c["path_in_schema"]: c for c in meta.row_group(0).to_dict()["columns"]}
+    chunks = {}
+    for table in ("routes/id_train", "objects"):
+        meta = pq.read_metadata(next((smoke / "release" / table).glob("*.parquet")))
+        chunks |= {c["path_in_schema"]: c for c in meta.row_group(0).to_dict()["columns"]}
+    told = {name: (chunk["has_dictionary_page"], chunk["compression"]) for name, chunk in chunks.items()}
     for name in ("x_m", "y_m", "z_m", "yaw_rad", "action"):
-        chunk = chunks[f"{name}.list.element"]
-        assert not chunk["has_dictionary_page"]
-        assert chunk["compression"] == "ZSTD"
-    assert chunks["target_object_id"]["has_dictionary_page"]
-    meta = pq.read_metadata(next((smoke / "release" / "objects").glob("*.parquet")))
-    chunks = {c["path_in_schema"]: c for c in meta.row_group(0).to_dict()["columns"]}
-    assert chunks["reference_image"]["compression"] == "UNCOMPRESSED"
-    assert not chunks["reference_image"]["has_dictionary_page"]
-
-
-def test_counts_are_those_of_the_rows(smoke, stored):
-    found = counts(smoke, check_release(smoke))
-    assert {(t, s): n for t, splits in found.items() for s, n in splits.items()} == {
-        key: table.num_rows for key, table in stored.items()
-    }
+        assert told[f"{name}.list.element"] == (False, "ZSTD")
+    assert told["target_object_id"] == (True, "ZSTD")
+    assert told["reference_image"] == (False, "UNCOMPRESSED")
 
 
 @pytest.fixture
@@ -190,27 +182,17 @@ def broken(smoke, tmp_path):
 SCENE = "U_Courtyard_0"
 
 
-def remove(data):
-    store.shard_path(data, "routes/test", SCENE).unlink()
+def part(data, table):
+    return store.shard_path(data, table, SCENE)
 
 
 def truncate(data):
-    path = store.shard_path(data, "tasks/train", SCENE)
-    path.write_bytes(path.read_bytes()[:-20])
+    part(data, "tasks/train").write_bytes(part(data, "tasks/train").read_bytes()[:-20])
 
 
 def drop_row(data):
-    path = store.shard_path(data, "tasks/train", SCENE)
-    table = pq.read_table(path, partitioning=None)
-    pq.write_table(table.slice(1), path)
-
-
-def lose_scene_row(data):
-    store.shard_path(data, "release/scenes", SCENE).unlink()
-
-
-def replace_by_foreign(data):
-    pq.write_table(pa.table({"x": [1]}), store.shard_path(data, "release/anchors", SCENE))
+    path = part(data, "tasks/train")
+    pq.write_table(pq.read_table(path, partitioning=None).slice(1), path)
 
 
 def mix_runs(data):
@@ -218,20 +200,23 @@ def mix_runs(data):
     store.write_shard(data, "release/landmarks", SCENE, 0, table, fingerprint="of another run")
 
 
+MISSING = "is missing: run aerialdojo-gen split --scene {}$"
+DELETE = "delete it and run the command again$"
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (remove, r"routes/id_test/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
-        (truncate, r"tasks/id_train/part-{}.parquet is damaged .*delete it and run the command again$"),
+        (lambda data: part(data, "routes/test").unlink(), "routes/id_test/part-{}.parquet " + MISSING),
+        (lambda data: part(data, "release/scenes").unlink(), "release/scenes/part-{}.parquet " + MISSING),
+        (truncate, r"tasks/id_train/part-{}.parquet is damaged .*" + DELETE),
+        (drop_row, r"tasks/id_train/part-{}.parquet has \d+ rows where \d+ were written: " + DELETE),
         (
-            drop_row,
-            r"tasks/id_train/part-{}.parquet has \d+ rows where \d+ were written: delete it and run .* again$",
+            lambda data: pq.write_table(pa.table({"x": [1]}), part(data, "release/anchors")),
+            r"anchors/part-{}.parquet is damaged \(not written by aerialdojo-gen\): delete it and ",
         ),
-        (lose_scene_row, r"release/scenes/part-{}.parquet is missing: run aerialdojo-gen split --scene {}$"),
-        (replace_by_foreign, r"anchors/part-{}.parquet is damaged \(not written by aerialdojo-gen\): delete it and "),
         (mix_runs, r"the release's parts of {} in .* are of different runs: run .* split --scene {} --force$"),
     ],
-    ids=lambda case: getattr(case, "__name__", ""),
 )
 def test_a_broken_release_is_named_by_its_file_and_its_mend(broken, damage, message):
     check_release(broken)
@@ -240,17 +225,18 @@ def test_a_broken_release_is_named_by_its_file_and_its_mend(broken, damage, mess
         check_release(broken)
     assert len(str(error.value).splitlines()) == 1
     assert re.search(message.replace("{}", SCENE), str(error.value))
+    assert SCENE in existing_scenes(broken)
 
 
 def test_stats_of_a_broken_release_names_every_fault_and_shows_no_table(broken):
-    remove(broken)
+    part(broken, "routes/test").unlink()
     truncate(broken)
     done = called("stats", "--data", broken)
     assert done.returncode == 1
     assert done.stdout == ""
     damaged, missing = done.stderr.splitlines()
-    assert damaged.startswith(f"error: {store.shard_path(broken, 'tasks/train', SCENE)} is damaged")
-    assert missing.startswith(f"{store.shard_path(broken, 'routes/test', SCENE)} is missing")
+    assert damaged.startswith(f"error: {part(broken, 'tasks/train')} is damaged")
+    assert missing.startswith(f"{part(broken, 'routes/test')} is missing")
 
 
 def test_a_scene_that_is_not_released_is_named(smoke):

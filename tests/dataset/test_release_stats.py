@@ -15,11 +15,10 @@ from support.command_line import called
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.dataset.contents import check_release
 from aerialdojo_gen.dataset.stats.comparison import as_csv, as_markdown
-from aerialdojo_gen.dataset.stats.figures import draw_figures
 from aerialdojo_gen.dataset.stats.figures.charts import composition
 from aerialdojo_gen.dataset.stats.figures.maps import _round_length
 from aerialdojo_gen.dataset.stats.figures.ranking import _ranking
-from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS
+from aerialdojo_gen.dataset.stats.figures.style import SETTING_COLOURS, save
 from aerialdojo_gen.dataset.stats.frames import read_goals, read_tasks
 from aerialdojo_gen.dataset.stats.measures import difficulty_tables, goal_tables
 from aerialdojo_gen.dataset.stats.tables import Made, benchmark_table, in_paper_order, made_of, tables
@@ -69,14 +68,11 @@ def test_the_tables_of_42_scenes_fit_a_terminal(papers):
 
 def test_totals_are_the_papers_own(papers):
     total = {row.name: row.ours[0] for row in tables(papers)[0].rows}
-    assert total["scenes"] == 42
-    assert total["scene types"] == 21
-    assert total["landmarks"] == 109
-    assert total["objects"] == 2099
-    assert total["instances"] == 205_732
-    assert total["navigation tasks"] == 102_866
+    counts = {"scenes": 42, "scene types": 21, "landmarks": 109, "objects": 2099, "instances": 205_732,
+              "navigation tasks": 102_866}  # fmt: skip
+    assert {name: total[name] for name in counts} == counts
     assert total["routes in all, km"] == pytest.approx(4_115.313, abs=0.5)
-    assert total["instances, base"] + total["instances, standard"] + total["instances, long-horizon"] == 205_732
+    assert sum(total[f"instances, {s}"] for s in ("base", "standard", "long-horizon")) == 205_732
     by_split = {row.name: row.ours[-1] for row in tables(papers)[3].rows}
     assert by_split == {
         "ID train": 113_642, "ID test": 28_452, "OOD train": 12_712, "OOD test": 50_926, "all": 205_732
@@ -95,7 +91,7 @@ def test_what_is_not_the_papers_is_shown_with_the_papers_below(papers):
     assert "| 13 (paper: 14) |" in as_markdown([table])
 
 
-def test_shares_and_lengths_are_those_of_the_appendix(papers):
+def test_shares_lengths_types_and_anchors_are_those_of_the_paper(papers):
     shares = {row.name: (row.ours[0], row.theirs[0]) for row in tables(papers)[4].rows}
     assert len(shares) == 12
     # The paper prints two digits; a release of its counts has its shares to half of the last one.
@@ -106,12 +102,8 @@ def test_shares_and_lengths_are_those_of_the_appendix(papers):
     # Table 2: 2,607.253 km of 125,064 instances, two a route.
     assert lengths["Urban"] == pytest.approx(2_607_253 / 62_532)
     assert list(lengths) == ["Urban", "Natural", "Infrastructure", "Disaster", "all"]
-
-
-def test_types_and_anchors_are_those_of_table_2(papers):
     table = tables(papers)[1]
-    columns = [column.name for column in table.columns]
-    urban = dict(zip(columns, table.rows[0].ours, strict=True))
+    urban = {column.name: ours for column, ours in zip(table.columns, table.rows[0].ours, strict=True)}
     assert (urban["types"], urban["scenes"], urban["anchors"]) == (9, 18, 1030)
     some = tables([m for m in papers if m.scene != "U_Mall_0"])[1]
     assert (some.rows[0].theirs[0], some.rows[1].theirs[0]) == (None, 6)
@@ -144,25 +136,18 @@ def test_csv_has_every_figure_once_and_to_the_last_digit(papers):
 
 def test_markdown_tables_are_regular(papers):
     for block in as_markdown(tables(papers)).split("### ")[1:]:
-        widths = {line.count("|") for line in block.splitlines() if line.startswith("|")}
-        assert len(widths) == 1
+        assert len({line.count("|") for line in block.splitlines() if line.startswith("|")}) == 1
 
 
-def test_scenes_that_the_paper_lacks_have_no_papers_figures(smoke):
+def test_a_release_of_other_scenes_or_numbers_is_not_held_to_the_papers(smoke, papers):
     made = [made_of(smoke, name) for name in check_release(smoke)]
-    for table in tables(made):
-        assert table.compared == 0
-        assert not any("paper" in line for line in table.terminal())
-    names = [row.name for row in tables(made)[1].rows]
-    assert names == ["Urban", "all"]
+    for scenes in (made, [replace(m, paper_scene=None) for m in papers]):
+        for table in tables(scenes):
+            assert table.compared == 0
+            assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
+    assert [row.name for row in tables(made)[1].rows] == ["Urban", "all"]
     total = {row.name: row.ours[0] for row in tables(made)[0].rows}
     assert total["instances"] == sum(m.instances for m in made) > 0
-
-
-def test_a_release_of_other_numbers_is_not_held_to_the_papers(papers):
-    for table in (*tables([replace(m, paper_scene=None) for m in papers]),):
-        assert table.compared == 0
-        assert not any("paper" in line for line in [*table.terminal(), *table.markdown()])
 
 
 @pytest.fixture(scope="module")
@@ -173,25 +158,32 @@ def frame(smoke):
     return routes.merge(tasks[tasks["modality"] == "image"], on=["nav_id", "scene", "setting"])
 
 
-def test_difficulty_is_what_pandas_makes_of_the_tables(smoke, frame):
-    tasks = read_tasks(smoke, check_release(smoke))
-    by_setting, by_scene, *_ = ({row.name: row.ours for row in table.rows} for table in difficulty_tables(tasks))
-    for scene in (*check_release(smoke), "all"):
+@pytest.fixture(scope="module")
+def measured(smoke):
+    """Tasks, and the tables of goals and of difficulty, rows by name."""
+    names = check_release(smoke)
+    tasks = read_tasks(smoke, names)
+    shown = (goal_tables(read_goals(smoke, names), tasks), difficulty_tables(tasks))
+    return tasks, *([{row.name: row.ours for row in table.rows} for table in made] for made in shown)
+
+
+def test_difficulty_is_what_pandas_makes_of_the_tables(measured, frame):
+    by_setting, by_scene, *_ = measured[2]
+    for scene in by_scene:
         own = frame if scene == "all" else frame[frame["scene"] == scene]
         assert by_scene[scene] == pytest.approx((
             len(own), own["plan_detour"].median(), own["plan_detour"].quantile(0.9),
             100 * (own["plan_detour"] < 1.05).mean(), 100 * own["straight_line_free"].mean(),
             100 * (own["target_visible_at_start"] > 0).mean(), own["climb_m"].median(),
         ))  # fmt: skip
-    assert by_scene["all"][0] == len(frame)
+    assert by_scene.keys() == {"all", *frame["scene"]}
     assert by_setting["base"][0] == (frame["setting"] == "base").sum()
 
 
-def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
-    tasks = read_tasks(smoke, check_release(smoke))
+def test_splits_are_what_pandas_makes_of_the_tables(measured, frame):
     test = frame[frame["subset"] == "test"]
     new = [~test[f"{what}_seen_in_train"] for what in ("target", "start", "pair")]
-    seen, held = ({row.name: row.ours for row in table.rows} for table in difficulty_tables(tasks)[2:])
+    seen, held = measured[2][2:]
     assert seen["all"] == pytest.approx((
         len(test), new[0].sum(), 100 * new[0].mean(), new[1].sum(), 100 * new[1].mean(), (new[0] & new[1]).sum(),
         new[2].sum(), 100 * new[2].mean(),
@@ -204,24 +196,20 @@ def test_splits_are_what_pandas_makes_of_the_tables(smoke, frame):
             assert side == "test" or not own["target_held_out"].any()
 
 
-def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke):
-    release = smoke / "release"
-    anchors, objects = (pd.concat(pd.read_parquet(p) for p in sorted((release / t).glob("*.parquet")))
+def test_what_goals_show_is_what_pandas_makes_of_the_tables(smoke, measured):
+    anchors, objects = (pd.concat(pd.read_parquet(p) for p in sorted((smoke / "release" / t).glob("*.parquet")))
                         for t in ("anchors", "objects"))  # fmt: skip
     goals = anchors[anchors["selected"]]
     fronts, told = goals["off_front_rad"].dropna(), objects["tells_shown"].dropna()
-    names = check_release(smoke)
-    table = goal_tables(read_goals(smoke, names), read_tasks(smoke, names))[0]
-    assert table.rows[-1].ours == pytest.approx((
+    *families, total = measured[1][0].values()
+    assert total == pytest.approx((
         len(objects), len(fronts), 100 * (fronts <= np.radians(60.0)).mean(), 100 * (told == 1.0).mean(),
         100 * goals["part_unoccluded"].mean(), 100 * goals["part_framed"].mean(), objects["step_back_m"].median(),
     ))  # fmt: skip
-    assert sum(row.ours[0] for row in table.rows[:-1]) == len(objects)
+    assert sum(ours[0] for ours in families) == len(objects)
 
 
-def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
-    names = check_release(smoke)
-    shown = goal_tables(read_goals(smoke, names), read_tasks(smoke, names))
+def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(measured, frame):
     turns = ahead = sideways = 0
     for actions in frame["action"]:
         names = [schemas.ACTION_NAMES[a] for a in actions]
@@ -233,28 +221,23 @@ def test_how_routes_fly_is_what_a_loop_over_their_actions_makes(smoke, frame):
                 ahead += metres[k] * name.startswith("MoveForward")
                 sideways += metres[k] * name.startswith(("MoveLeft", "MoveRight"))
     n_actions = frame["action"].map(len)
-    assert shown[1].rows[-1].ours == pytest.approx((
+    assert [*measured[1][1].values()][-1] == pytest.approx((
         len(frame), frame["min_clearance_m"].median(), frame["min_clearance_m"].quantile(0.1), n_actions.median(),
         100 * turns / n_actions.sum(), 100 * sideways / (ahead + sideways),
     ))  # fmt: skip
-    assert max(len(line) for table in shown for line in table.terminal(80)) <= 80
 
 
-def test_tables_of_difficulty_fit_a_terminal(smoke):
-    tasks = read_tasks(smoke, check_release(smoke))
+def test_tables_of_goals_and_difficulty_fit_a_terminal_where_a_release_tells_of_it(smoke, measured):
+    tasks = measured[0]
     many = pd.concat([tasks] * 3, ignore_index=True)
     many = many.assign(scene=np.resize([*inventory()], len(many)))
-    for table in difficulty_tables(many):
+    hard = difficulty_tables(many)
+    for table in (*hard, *goal_tables(read_goals(smoke, check_release(smoke)), tasks)):
         assert max(map(len, table.terminal())) <= 100
         assert max(map(len, table.terminal(80))) <= 80
-    assert len(difficulty_tables(many)[1].terminal(80)) == 3 + 42 + 1
-
-
-def test_a_release_that_does_not_say_has_no_such_tables(smoke):
-    tasks = read_tasks(smoke, check_release(smoke))
+    assert len(hard[1].terminal(80)) == 3 + 42 + 1
     assert difficulty_tables(tasks.assign(plan_detour=np.nan)) == []
-    unsplit = tasks.assign(target_split="")
-    assert len(difficulty_tables(unsplit)) == 2
+    assert len(difficulty_tables(tasks.assign(target_split=""))) == 2
 
 
 def stats(*arguments):
@@ -290,8 +273,7 @@ def test_the_command_writes_what_it_prints(smoke, drawn):
 
 
 def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tmp_path):
-    for path in draw_figures(smoke, check_release(smoke), tmp_path):
-        assert path.read_bytes() == (drawn[0] / "drawn" / path.name).read_bytes()
+    for path in (drawn[0] / "drawn").iterdir():
         if path.suffix == ".png":
             picture = cv2.imread(str(path))
             # Something is drawn, and nothing runs over the edge.
@@ -303,6 +285,8 @@ def test_figures_are_pictures_without_a_date_and_the_same_again(smoke, drawn, tm
             assert root.tag.endswith("svg")
             assert "<dc:date>" not in path.read_text()
             assert not [e for e in root.iter() if e.tag.endswith("}text")], "letters are outlines"
+    for path in save(composition(read_tasks(smoke, check_release(smoke))), tmp_path, "composition"):
+        assert path.read_bytes() == (drawn[0] / "drawn" / path.name).read_bytes()
 
 
 def test_bars_are_as_long_as_the_counts(smoke):

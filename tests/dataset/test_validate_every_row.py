@@ -170,4 +170,4 @@ def test_rows_out_of_order_are_found_in_every_part(data):
         here = dataclasses.replace(data, tables={**data.tables, "routes": swapped}, faulty={})
         one = next(one for one in SCENE_CHECKS if one.name == "unsorted_rows")
         (outcome,) = (o for o in run_checks(here, [one]) if o.table == "routes")
-        assert [fault.part for fault in outcome.faults] == [rows.parts[part]]
+        assert [(fault.part, fault.key) for fault in outcome.faults] == [(rows.parts[part], swapped.key(end - 1))]

@@ -142,13 +142,6 @@ def test_faults_of_tasks_and_routes(planted):
     assert check(planted) == expected
 
 
-def test_rows_out_of_order(planted):
-    rows = planted.rows(ROUTES)
-    rows[2], rows[3] = rows[3], rows[2]
-    planted.write(ROUTES, rows, sort=False)
-    assert check(planted, use_meshes=False) == {"unsorted_rows": [named(ROUTES, rows[3])]}
-
-
 def test_instances_are_held_against_each_other_where_routes_are_lost(planted):
     planted.path("routes/test").unlink()
     row = planted.edit(TRAIN, put("start_x_m", 1.25), of_goal("semantic"))

@@ -9,24 +9,7 @@ TEXTS = ("A red van stands by the hut.", "A red van stands by the gate.", "Look 
 
 def test_counts():
     found = measure(TEXTS, [1, 2, 3], ["x", "x", "y"])
-    words = {
-        "a",
-        "red",
-        "van",
-        "stands",
-        "by",
-        "the",
-        "hut",
-        "gate",
-        "look",
-        "for",
-        "blue",
-        "tent",
-        "it",
-        "has",
-        "door",
-    }
-    assert (found["texts"], found["words"], found["vocabulary"]) == ("3", "23", f"{len(words)}")
+    assert (found["texts"], found["words"], found["vocabulary"]) == ("3", "23", "15")
     assert found["fewest, median, most words"] == "7, 7, 9"
     assert (found["frames"], found["most common frame"]) == ("2", "66.67%")
     assert found["first four words shared"] == "66.7%"

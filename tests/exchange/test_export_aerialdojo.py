@@ -1,10 +1,12 @@
 """The authors' layout: its folders, its words, its numbers."""
 
+import io
 import json
 import math
 import os
 import re
 import shutil
+import tarfile
 from pathlib import Path
 
 import cv2
@@ -12,14 +14,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
+from support.command_line import called
 from support.releases import copy_release, files_of, released, replace_rows
-from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import AssetError, StoreError, UsageError
-from aerialdojo_gen.cli.app import app
-from aerialdojo_gen.dataset.contents import existing_scenes
-from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.dataset.contents import existing_scenes, release_scenes
+from aerialdojo_gen.exchange import exporting
+from aerialdojo_gen.exchange.exporting import estimate_size, export_release
+from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store import shards as store
+from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.staging import AREA
 
 
@@ -35,9 +39,13 @@ def task_files(layout: Path) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def tasks(layout) -> list[tuple[Path, dict]]:
-    """Every task, and the file that it stands in."""
-    return [(path, task) for path in task_files(layout) for task in json.loads(path.read_text())]
+def tasks(layout, smoke) -> list[tuple[Path, dict, pd.Series, pd.Series]]:
+    """Every task, with the file that it stands in, its row and its route."""
+    rows, routes = released(smoke, "tasks"), released(smoke, "routes")
+    written = [(path, task) for path in task_files(layout) for task in json.loads(path.read_text())]
+    assert len(written) == len(rows)
+    ids = [(task["trajectory_id"], "i" if "ImageOGS" in path.parts else "s") for path, task in written]
+    return [(*one, rows.loc[f"{nav}-{goal}"], routes.loc[nav]) for one, (nav, goal) in zip(written, ids, strict=True)]
 
 
 def test_folders_are_those_of_the_authors(layout, smoke):
@@ -81,13 +89,13 @@ def test_both_instances_are_the_same_episode(layout):
 
 
 def test_a_task_has_the_fields_of_the_authors(tasks):
-    for path, task in tasks:
-        goal = {"image"} if "ImageOGS" in path.parts else {"description"}
+    for path, task, row, _ in tasks:
         assert set(task) == {
             "episode_id", "trajectory_id", "map_name", "coordinate_system", "task", "used-in-train",
             "start_true_name", "goal_true_name", "start_object_name", "goal_object_name",
             "category", "Landmark", "Direction", "start_pose", "goal_pose", "info",
-        } | goal  # fmt: skip
+            "image" if row["modality"] == "image" else "description",
+        }  # fmt: skip
         assert task["coordinate_system"] == "ProjectAirSim NED"
         assert set(task["info"]) == {"geodesic_distance", "euclidean_distance", "complexity"}
         assert task["map_name"] == path.parent.name.rsplit("_", 2)[0]
@@ -120,25 +128,25 @@ def evaluator_reads(task: dict) -> dict:
     }
 
 
-def test_the_authors_evaluator_reads_every_task(tasks, smoke):
-    rows = released(smoke, "tasks")
-    for path, task in tasks:
+def test_the_authors_evaluator_reads_every_task(tasks):
+    for _, task, row, _ in tasks:
         seen = evaluator_reads(task)
-        row = rows.loc[f"{task['trajectory_id']}-{'i' if 'ImageOGS' in path.parts else 's'}"]
         assert seen["description"] == row["description" if row["modality"] == "semantic" else "landmark"]
         assert np.linalg.norm(seen["quaternion"]) == pytest.approx(1)
-    assert len(tasks) == len(rows)
 
 
-def test_a_task_states_its_route_and_its_objects_by_node_and_name(tasks, smoke):
+def test_a_task_states_its_route_and_its_objects_turned_into_ned(tasks, smoke):
     objects = pd.read_parquet(smoke / "release/objects").set_index(["scene", "mesh_node"])["name"]
-    routes = released(smoke, "routes")
-    for _, task in tasks:
-        assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"]
+    for _, task, row, route in tasks:
+        assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"] == row["target_name"]
         assert objects[task["map_name"], task["start_object_name"]] == task["start_true_name"]
-        route = routes.loc[task["trajectory_id"]]
+        assert (task["Landmark"], task["Direction"]) == (row["landmark"], row["direction"])
         info = [task["info"][name] for name in ("geodesic_distance", "euclidean_distance", "complexity")]
         assert info == route[["length_m", "euclidean_m", "detour_ratio"]].tolist()
+        assert task["start_pose"]["start_position"] == [row["start_y_m"], row["start_x_m"], -row["start_z_m"]]
+        assert task["goal_pose"]["goal_position"] == [route["goal_y_m"], route["goal_x_m"], -route["goal_z_m"]]
+        north, east, _ = rotate_x(task["start_pose"]["start_quaternion_xyzw"])
+        assert [east, north] == pytest.approx([math.cos(row["start_yaw_rad"]), math.sin(row["start_yaw_rad"])])
 
 
 def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smoke):
@@ -162,8 +170,16 @@ def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smo
         assert np.abs(again - large).mean() > 0.3
 
 
-def test_the_releases_own_pictures_are_exported_on_demand(smoke, tmp_path):
-    export_release("aerialdojo", smoke, tmp_path / "out", ["U_Courtyard_0"], picture_px=0)
+def test_the_size_is_announced_and_the_releases_own_pictures_are_exported_on_demand(smoke, tmp_path, monkeypatch):
+    monkeypatch.setattr(exporting, "_MANY_FILES", 100)
+    size, said = estimate_size("aerialdojo", open_root(smoke), release_scenes(smoke), 0), io.StringIO()
+    export_release("aerialdojo", smoke, tmp_path / "out", picture_px=0, reporter=Reporter(stream=said))
+    written = [path.stat() for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert size.files == len(written), "to the file"
+    # Links to one file count once.
+    assert size.bytes == pytest.approx(sum({file.st_ino: file.st_size for file in written}.values()), rel=0.25)
+    told = f"export: {size}; --shards writes 3 files in their place, into {tmp_path / 'out'}"
+    assert said.getvalue().startswith(told)
     objects = pd.read_parquet(smoke / "release/objects").set_index("reference_image_id")["reference_image"]
     pictures = list((tmp_path / "out").glob("ImageOGS/**/Images/*.png"))
     assert pictures
@@ -235,27 +251,24 @@ def test_trajectories_fly_as_their_words_say_in_ned(layout, smoke):
     assert sorted(lengths) == pytest.approx(sorted(routes["length_m"]), abs=1e-9)
 
 
-def test_numbers_are_ours_turned(layout, smoke):
-    routes, tasks = released(smoke, "routes"), released(smoke, "tasks")
-    path = layout / "SemanticOGS/IID_TRAINS/1_BaseTasks/U_Courtyard_0_B_Train/Task.json"
-    mine = tasks[
-        (tasks["scene"] == "U_Courtyard_0") & (tasks["subset"] == "train") & (tasks["modality"] == "semantic")
-        & (tasks["setting"] == "base")
-    ]  # fmt: skip
-    mine = mine.sort_values("nav_id")
-    for task, (_, row) in zip(json.loads(path.read_text()), mine.iterrows(), strict=True):
-        route = routes.loc[row["nav_id"]]
-        assert task["start_pose"]["start_position"] == [row["start_y_m"], row["start_x_m"], -row["start_z_m"]]
-        assert task["goal_pose"]["goal_position"] == [route["goal_y_m"], route["goal_x_m"], -route["goal_z_m"]]
-        assert task["goal_true_name"] == row["target_name"]
-        assert (task["Landmark"], task["Direction"]) == (row["landmark"], row["direction"])
-        north, east, _ = rotate_x(task["start_pose"]["start_quaternion_xyzw"])
-        assert [east, north] == pytest.approx([math.cos(row["start_yaw_rad"]), math.sin(row["start_yaw_rad"])])
-
-
-def test_the_same_release_gives_the_same_bytes(layout, smoke, tmp_path):
-    export_release("aerialdojo", smoke, tmp_path / "again")
-    assert files_of(tmp_path / "again") == files_of(layout)
+def test_archives_unpacked_are_the_files(layout, smoke, tmp_path):
+    """Those of an export before, to the byte; the archives tell nothing of when and where they were made."""
+    counts = export_release("aerialdojo", smoke, tmp_path / "tars", shards=True)
+    archives = sorted((tmp_path / "tars").glob("*.tar"))
+    assert [path.stem for path in archives] == release_scenes(smoke)
+    assert {path.name for path in (tmp_path / "tars").iterdir()} == {*(p.name for p in archives), "export.json"}
+    for path in archives:
+        with tarfile.open(path) as tar:
+            assert all((m.uid, m.gid, m.mtime, m.uname, m.gname) == (0, 0, 0, "", "") for m in tar)
+            assert {m.mode for m in tar} == {0o755, 0o644}
+            names = [Path(name) for name in tar.getnames()]
+            assert names == sorted(names)
+            tar.extractall(tmp_path / "unpacked", filter="data")
+    files = files_of(layout)
+    document = json.loads(files.pop("export.json"))
+    assert document == json.loads((tmp_path / "tars" / "export.json").read_text())
+    assert document["counts"] == counts
+    assert files_of(tmp_path / "unpacked") == files
 
 
 def test_a_picture_is_on_the_disk_once(layout):
@@ -290,51 +303,32 @@ def test_a_folder_of_others_is_never_replaced(smoke, tmp_path):
     assert os.listdir(tmp_path) == ["out"]
 
 
-def test_an_export_is_replaced_by_force_alone(smoke, tmp_path):
-    out = tmp_path / "out"
+def test_an_export_is_replaced_by_force_alone_and_there_again_after_a_kill(smoke, tmp_path):
+    out, item = tmp_path / "out", tmp_path / AREA / "dead"
     export_release("aerialdojo", smoke, out, ["U_Courtyard_0"], picture_px=0)
     before = {p.relative_to(out) for p in out.rglob("*")}
-    with pytest.raises(UsageError, match="--force replaces it"):
-        export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
-    assert {p.relative_to(out) for p in out.rglob("*")} == before
+    for killed in (False, True):
+        if killed:
+            # As a kill leaves it where two names cannot be exchanged.
+            item.mkdir(parents=True)
+            (item / "lease").write_text("out")
+            out.rename(item / "old")
+        with pytest.raises(UsageError, match="--force replaces it"):
+            export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
+        assert {p.relative_to(out) for p in out.rglob("*")} == before
+        assert os.listdir(tmp_path) == ["out"]
     export_release("aerialdojo", smoke, out, ["U_Courtyard_1"], force=True, picture_px=0)
     assert not list(out.rglob("U_Courtyard_0*"))
     assert os.listdir(tmp_path) == ["out"]
 
 
-def test_an_export_killed_while_it_replaced_another_is_there_again(smoke, tmp_path):
-    out, item = tmp_path / "out", tmp_path / AREA / "dead"
-    export_release("aerialdojo", smoke, out, ["U_Courtyard_0"], picture_px=0)
-    # As a kill leaves it where two names cannot be exchanged.
-    item.mkdir(parents=True)
-    (item / "lease").write_text("out")
-    out.rename(item / "old")
-    with pytest.raises(UsageError, match="--force replaces it"):
-        export_release("aerialdojo", smoke, out, ["U_Courtyard_1"])
-    assert list(out.rglob("U_Courtyard_0*"))
-    assert os.listdir(tmp_path) == ["out"]
-
-
-def test_the_command_says_what_it_wrote_and_what_is_wrong(smoke, tmp_path):
-    runner = CliRunner()
-    arguments = ["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "32", "--out", str(tmp_path / "o")]
-    done = runner.invoke(app, ["export", *arguments])
-    assert done.exit_code == 0
+def test_the_command_says_what_it_wrote(smoke, tmp_path):
+    out = tmp_path / "o"
+    done = called("export", "--format", "aerialdojo", "--data", smoke, "--picture-size", 32, "--out", out)
+    assert done.returncode == 0, done.stderr
     scenes = existing_scenes(smoke)
     n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)
     assert n > 100
-    assert done.output.strip().endswith(f"2 scenes, 24 task files, {2 * n} tasks, {n} trajectories, 16 pictures")
-    lost = json.loads((tmp_path / "o/export.json").read_text())["lost"]
-    assert "min_clearance_m" in lost["routes"]
-    for arguments, error in (
-        (["--format", "xml", "--data", str(smoke)], "no format 'xml': there are aerialdojo, habitat"),
-        (["--format", "habitat", "--data", str(smoke), "--scene", "Nowhere"], "Nowhere"),
-        (["--format", "habitat", "--data", str(smoke), "--picture-size", "64"], "is for --format aerialdojo"),
-        (["--format", "aerialdojo", "--data", str(smoke), "--picture-size", "9"], "16 to 4096 pixels, or 0"),
-    ):
-        failed = runner.invoke(app, ["export", *arguments, "--out", str(tmp_path / "p")])
-        assert isinstance(failed.exception, UsageError)
-        assert error in str(failed.exception)
-        assert not (tmp_path / "p").exists()
-    absent = runner.invoke(app, ["export", "--format", "habitat", "--data", str(tmp_path / "no"), "--out", "p"])
-    assert isinstance(absent.exception, StoreError)
+    told = f"2 scenes, 24 task files, {2 * n} tasks, {n} trajectories, 16 pictures"
+    assert done.stdout.strip().endswith(told)
+    assert "min_clearance_m" in json.loads((out / "export.json").read_text())["lost"]["routes"]

@@ -1,6 +1,7 @@
 """The export as Habitat's ObjectNav-v1, read by a strict reader of the published schema."""
 
 import gzip
+import io
 import json
 import math
 from pathlib import Path
@@ -13,7 +14,10 @@ import trimesh
 from scipy.spatial.transform import Rotation
 from support.releases import files_of, released
 
-from aerialdojo_gen.exchange.exporting import export_release
+from aerialdojo_gen.dataset.contents import release_scenes
+from aerialdojo_gen.exchange.exporting import estimate_size, export_release
+from aerialdojo_gen.pipeline.progress import Reporter
+from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import ACTION_NAMES
 
 FIELDS = {
@@ -132,9 +136,14 @@ def test_goals_are_all_objects_seen_from_their_anchors(habitat, smoke):
             assert view.iou == (row["image_fraction"] if anchor["selected"] else None)
 
 
-def test_the_same_release_gives_the_same_bytes(habitat, smoke, tmp_path):
-    export_release("habitat", smoke, tmp_path / "again")
-    assert files_of(tmp_path / "again") == files_of(habitat)
+def test_the_size_is_announced_and_the_same_release_gives_the_same_bytes(habitat, smoke, tmp_path):
+    size, said = estimate_size("habitat", open_root(smoke), release_scenes(smoke), 0), io.StringIO()
+    export_release("habitat", smoke, tmp_path / "again", reporter=Reporter(stream=said))
+    files = files_of(tmp_path / "again")
+    assert files == files_of(habitat)
+    assert size.files == len(files)
+    assert size.bytes == pytest.approx(sum(map(len, files.values())), rel=0.6)
+    assert said.getvalue().startswith(f"export: {size}, into {tmp_path / 'again'}")
 
 
 def test_goals_lie_where_the_meshes_have_their_objects(habitat, smoke):

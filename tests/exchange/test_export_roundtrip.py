@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -23,16 +24,16 @@ RECOMPUTED = {"euclidean_m": 1e-9, "length_m": 1e-9, "detour_ratio": 1e-9}
 
 @pytest.fixture(scope="module")
 def there_and_back(smoke, tmp_path_factory):
+    """The release in the authors' layout, what is imported from it, and the report."""
     folder = tmp_path_factory.mktemp("roundtrip")
     export_release("aerialdojo", smoke, folder / "layout", picture_px=0)
-    report = import_benchmark("aerialdojo", [folder / "layout"], folder / "data")
-    return smoke, folder / "data", report
+    return folder / "layout", folder, import_benchmark("aerialdojo", [folder / "layout"], folder)
 
 
 @pytest.mark.parametrize("table", ["tasks", "routes"])
-def test_tasks_and_routes_come_back(there_and_back, table):
-    data, back, _ = there_and_back
-    ours, theirs = released(data, table), imported(back, table)
+def test_tasks_and_routes_come_back(smoke, there_and_back, table):
+    _, back, _ = there_and_back
+    ours, theirs = released(smoke, table), imported(back, table)
     assert len(ours) > 100
     assert ours.index.tolist() == theirs.index.tolist()
     lost = set(LOST.get(table, ()))
@@ -52,12 +53,12 @@ def test_no_column_is_missing_or_of_another_type(there_and_back):
             assert (mine.type, mine.metadata) == (field.type, field.metadata)
 
 
-def test_objects_come_back_as_far_as_tasks_name_them(there_and_back):
-    data, back, _ = there_and_back
-    landmarks = pd.read_parquet(data / "release/landmarks").set_index(["scene", "landmark_id"])["name"]
-    routes = released(data, "routes")
+def test_objects_come_back_as_far_as_tasks_name_them(smoke, there_and_back):
+    _, back, _ = there_and_back
+    landmarks = pd.read_parquet(smoke / "release/landmarks").set_index(["scene", "landmark_id"])["name"]
+    routes = released(smoke, "routes")
     targets = set(zip(routes["scene"], routes["target_object_id"], strict=True))
-    ours = pd.read_parquet(data / "release/objects").set_index(["scene", "object_id"])
+    ours = pd.read_parquet(smoke / "release/objects").set_index(["scene", "object_id"])
     ours = ours[[key in targets for key in ours.index]].sort_index()
     theirs = pd.read_parquet(back / "imported/aerialdojo/objects").set_index(["scene", "object_id"]).loc[ours.index]
     lost = {name for name in LOST["objects"] if name in ours.columns}
@@ -147,27 +148,22 @@ def test_any_flight_and_any_name_come_back(smoke, tmp_path_factory, flown_ones, 
             assert_same(column, ours[column], theirs[column], RECOMPUTED.get(column, 0.0))
 
 
-def test_a_navigation_task_keeps_its_name_whatever_part_is_imported(smoke, there_and_back, tmp_path):
-    _, back, _ = there_and_back
-    export_release("aerialdojo", smoke, tmp_path / "layout", ["U_Courtyard_1"])
-    part = tmp_path / "layout/ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
-    import_benchmark("aerialdojo", [part], tmp_path / "data")
-    mine, all_of_them = imported(tmp_path / "data", "routes"), imported(back, "routes")
-    pd.testing.assert_frame_equal(
-        mine.drop(columns=["source_file", "source_row"]),
-        all_of_them.loc[mine.index].drop(columns=["source_file", "source_row"]),
-    )
-    assert set(mine.index) <= set(released(smoke, "routes").index)
+PART = "ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
 
 
-def test_without_its_name_a_navigation_task_is_named_by_its_objects(smoke, tmp_path):
-    export_release("aerialdojo", smoke, tmp_path / "layout", ["U_Courtyard_1"], picture_px=0)
-    for path in (tmp_path / "layout").glob("*OGS/*/*/*/Task.json"):
-        tasks = json.loads(path.read_text())
-        path.write_text(json.dumps([{k: v for k, v in task.items() if k != "trajectory_id"} for task in tasks]))
-    import_benchmark("aerialdojo", [tmp_path / "layout"], tmp_path / "all")
-    part = tmp_path / "layout/ImageOGS/OOD_TESTS/1_BaseTasks/U_Courtyard_1_B_Test/Task.json"
-    import_benchmark("aerialdojo", [part], tmp_path / "part")
-    every, some = imported(tmp_path / "all", "routes"), imported(tmp_path / "part", "routes")
+@pytest.mark.parametrize("named", [True, False])
+def test_a_navigation_task_has_the_same_name_whatever_part_is_imported(smoke, there_and_back, tmp_path, named):
+    """Its own, or where the files have none, one by its objects."""
+    layout, folder, _ = there_and_back
+    if not named:
+        layout, folder = shutil.copytree(layout, tmp_path / "layout"), tmp_path / "all"
+        for path in layout.glob("*OGS/*/*/*/Task.json"):
+            tasks = json.loads(path.read_text())
+            path.write_text(json.dumps([{k: v for k, v in t.items() if k != "trajectory_id"} for t in tasks]))
+        import_benchmark("aerialdojo", [layout], folder)
+    import_benchmark("aerialdojo", [layout / PART], tmp_path / "part")
+    every, some = (imported(data, "routes").drop(columns=["source_file", "source_row"])
+                   for data in (folder, tmp_path / "part"))  # fmt: skip
     assert len(some) > 10
-    assert some["x_m"].map(tuple).equals(every.loc[some.index, "x_m"].map(tuple))
+    pd.testing.assert_frame_equal(some, every.loc[some.index])
+    assert (set(some.index) <= set(released(smoke, "routes").index)) == named

@@ -10,10 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import task_files
-from typer.testing import CliRunner
+from support.command_line import called
 
 from aerialdojo_gen.base.errors import UsageError
-from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.exchange.importing import Options, import_benchmark
 from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store.schemas import ACTION_NAMES
@@ -42,12 +41,11 @@ def test_uav_on(tmp_path):
     assert tasks.loc[0, ["start_x_m", "start_y_m", "start_z_m"]].tolist() == [307.40, -38.41, 10.0]
     # Headings of 0, 45 and 90 degrees: north, north-east, east.
     assert np.degrees(tasks["start_yaw_rad"].to_numpy()) == pytest.approx([90, 45, 0], abs=0.1)
-    assert tasks["target_name"].tolist() == ["MonkeyBars"] * 3
-    assert tasks["description"].tolist() == ["A playground structure of blue bars."] * 3
+    said = ["MonkeyBars", "A playground structure of blue bars.", "BrushifyRoad_test"]
+    assert tasks[["target_name", "description", "scene"]].to_numpy().tolist() == [said] * 3
     assert tasks["subset"].tolist() == ["test", "train", "test"]
-    assert tasks["scene"].unique().tolist() == ["BrushifyRoad_test"]
-    assert routes[["goal_x_m", "goal_y_m", "goal_z_m"]].to_numpy().tolist() == [[267.50, -56.23, -29.62]] * 3
-    assert routes["stated_length_m"].tolist() == [91.0] * 3
+    goal = ["goal_x_m", "goal_y_m", "goal_z_m", "stated_length_m"]
+    assert routes[goal].to_numpy().tolist() == [[267.50, -56.23, -29.62, 91.0]] * 3
     assert routes["euclidean_m"][0] == pytest.approx(math.dist([-38.41, 307.40, -10.0], [-56.23, 267.50, 29.62]))
     assert routes["x_m"].isna().all()
     assert objects[["mesh_node", "name"]].to_numpy().tolist() == [["SM_PullupBar01_2", "MonkeyBars"]]
@@ -107,8 +105,7 @@ def test_cityavos_angles_are_as_one_says(tmp_path, angles, yaws, expected):
 
 def test_aerialvln(tmp_path):
     report, tasks, routes, objects = imported(tmp_path, "aerialvln", task_files.aerialvln())
-    assert tasks["scene"].tolist() == ["5", "5"]
-    assert tasks["description"].tolist() == ["Rise, then fly to the red roof."] * 2
+    assert tasks[["scene", "description"]].to_numpy().tolist() == [["5", "Rise, then fly to the red roof."]] * 2
     assert tasks["target_name"].isna().all()
     assert tasks["source_id"].tolist() == ["A0", "A1"]
     names = ["MoveForward5", "TurnLeft15", "MoveForward5", "MoveUp2", "MoveRight5", "TurnRight15", "MoveLeft5",
@@ -145,8 +142,7 @@ def test_aerialvln_path_with_other_actions_keeps_the_poses(tmp_path):
     assert route["action"] is None
     assert route["source_action"].tolist() == ["forward 5 m", "forward 5 m", "stop"]
     assert len(route["x_m"]) == len(path)
-    end = np.add(path[0], [10, 0, 0])
-    assert route["replay_error_m"] == pytest.approx(math.dist(end, path[-1]))
+    assert route["replay_error_m"] == pytest.approx(math.dist(np.add(path[0], [10, 0, 0]), path[-1]))
     assert set(report.notes) == {
         "not one action a pose: action is null, source_action has them",
         "reference_path has attitudes: yaws are taken from start_rotation and the turns",
@@ -167,14 +163,12 @@ def test_openfly(tmp_path):
     assert [route["goal_x_m"], route["goal_y_m"]] == [route["x_m"][-1], route["y_m"][-1]]
     assert report.replay() == {"routes": 2, "median_m": 4.0, "max_m": 4.0, "over_3_m": 2}
     assert report.unmapped == {"index_list": 2}
-
-
-def test_openfly_actions_that_are_ours_keep_their_numbers(tmp_path):
-    _, _, routes, _ = imported(tmp_path, "openfly", task_files.openfly((1, 1, 0)), Options(frame="nwu"))
+    # Actions that are ours keep their numbers; x points north in nwu: (5, 6) is 6 m west and 5 m north.
+    document = task_files.openfly((1, 1, 0))
+    _, _, routes, _ = imported(tmp_path, "openfly", document, Options(frame="nwu"), force=True)
     route = routes.iloc[0]
     assert [ACTION_NAMES[a] for a in route["action"]] == ["MoveForward3", "MoveForward3", "Stop"]
     assert route["replay_error_m"] < 1e-9
-    # x points north in nwu: what the file calls (5, 6) is 6 m west and 5 m north.
     assert [route["x_m"][0], route["y_m"][0]] == [-6, 5]
 
 
@@ -223,10 +217,9 @@ def test_an_import_is_replaced_by_force_alone(tmp_path):
 
 def test_the_command_reports(tmp_path):
     path = task_files.write(tmp_path / "t.json", task_files.openfly(drift_m=4.0))
-    arguments = ["import-benchmark", str(path), "--format", "openfly", "--frame", "enu", "--data", str(tmp_path)]
-    done = CliRunner().invoke(app, arguments)
-    assert done.exit_code == 0, done.output
-    lines = done.output.splitlines()
+    done = called("import-benchmark", path, "--format", "openfly", "--frame", "enu", "--data", tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
     assert lines[0] == str(tmp_path / "imported/openfly")
     assert lines[1] == "  openfly, frame enu: 2 records in 1 files; 2 tasks, 2 routes, 0 objects"
     assert "  not mapped: index_list 2" in lines

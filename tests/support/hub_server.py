@@ -35,7 +35,6 @@ class Hub(ThreadingHTTPServer):
     def __init__(self):
         super().__init__(("127.0.0.1", 0), _Handler)
         self.repos, self.objects, self.calls = {}, {}, Counter()
-        self.asked = []
         # After so many bodies of files were sent or fetched the server says 403 to all; None for never.
         self.gives_up_after = None
         # What is sent in place of a file's bytes, by its path.
@@ -100,7 +99,6 @@ class _Handler(BaseHTTPRequestHandler):
             body = self._chunks()
         path = urllib.parse.unquote(urllib.parse.urlsplit(self.path).path)
         with self.server.lock:
-            self.server.asked.append(f"{method} {path}")
             for verb, pattern, answer in _ROUTES:
                 if verb in (method, "GET" if method == "HEAD" else "") and (at := re.fullmatch(pattern, path)):
                     answer(self, body, *at.groups())
