@@ -1,7 +1,6 @@
 """What a bad merge, a bad disk or a bad author could do to a release that passes every check of form."""
 
 import hashlib
-from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -61,16 +60,19 @@ def patched(picture):
 @pytest.mark.parametrize("renderer", ["auto", "pybullet"])
 def test_pictures_swapped_or_copied(planted, renderer):
     """By the renderer that drew them, and by another one; of four pictures, one is its own."""
-    rows = planted.rows(OBJECTS)[:4]
+    rows = planted.rows(OBJECTS)
+    four = scene_data(planted, pictures=4).sampled_objects
+    pictures = [rows[row]["reference_image"] for row in four]
     swapped = {0: 1, 1: 0, 2: 0}
-    pictures = [row["reference_image"] for row in rows]
     for mine, other in swapped.items():
-        rows[mine]["reference_image"] = pictures[other]
+        rows[four[mine]]["reference_image"] = pictures[other]
     planted.write(OBJECTS, rows)
     drawn = definitions().reference_images.model_copy(update={"renderer": renderer})
-    data = replace(scene_data(planted), pipeline=definitions().model_copy(update={"reference_images": drawn}))
+    data = scene_data(planted, pictures=4)
+    data.pipeline = data.pipeline.model_copy(update={"reference_images": drawn})
     told = {fault.key: fault.found for fault in outcome_of(data, "image_redrawn").faults}
-    assert told == {f"object_id={a}": f"the picture of object_id={b}" for a, b in swapped.items()}
+    names = [named(OBJECTS, rows[row]) for row in four]
+    assert told == {names[a]: f"the picture of {names[b]}" for a, b in swapped.items()}
 
 
 CHANGES = [

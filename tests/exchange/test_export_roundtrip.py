@@ -115,7 +115,7 @@ def flown(rows: dict, start, actions, approach) -> dict:
     }  # fmt: skip
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(flights, names, names)
 def test_any_flight_and_any_name_come_back(smoke, tmp_path_factory, flown_ones, target, description):
     folder = tmp_path_factory.mktemp("any")

@@ -184,23 +184,24 @@ def test_webdataset_reads_the_shards_back(made, seen, lerobot):
     assert at == len(samples)
 
 
-def test_the_same_bytes_by_any_number_of_workers_and_the_same_data_in_other_parts(made, smoke, tmp_path, monkeypatch):
-    """Of WebDataset's shards the test of a killed export shows it: two processes write them."""
-    folder, options = made[0] / "lerobot", ExportOptions(**OPTIONS)
-    again = export_for_learning("lerobot", smoke, tmp_path / "again", options, workers=2)
+@pytest.mark.nightly
+def test_the_same_bytes_by_any_number_of_workers(made, smoke, tmp_path):
+    again = export_for_learning("lerobot", smoke, tmp_path / "again", ExportOptions(**OPTIONS), workers=2)
     assert again == made[1]["lerobot"]
-    assert files_of(tmp_path / "again") == files_of(folder)
-    assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
+    assert files_of(tmp_path / "again") == files_of(made[0] / "lerobot")
+
+
+def test_the_same_data_in_other_parts(made, smoke, tmp_path, monkeypatch):
     monkeypatch.setattr(lerobot_writer, "frames_a_part", lambda options: 20)
-    cut = export_for_learning("lerobot", smoke, tmp_path / "cut", options, workers=1)
-    assert cut.parts > again.parts
-    one, many = lerobot_reader.load(folder), lerobot_reader.load(tmp_path / "cut")
+    cut = export_for_learning("lerobot", smoke, tmp_path / "cut", ExportOptions(**OPTIONS), workers=1)
+    assert cut.parts > made[1]["lerobot"].parts
+    assert not list(tmp_path.glob(".*")), "nothing unfinished is left"
+    one, many = lerobot_reader.load(made[0] / "lerobot"), lerobot_reader.load(tmp_path / "cut")
     assert many.frames.equals(one.frames)
     for key, of in one.stats.items():
         for name, value in of.items():
             assert many.stats[key][name] == pytest.approx(value, abs=1e-9)
-    last = len(one.episodes) - 1
-    key = "observation.depth.down"
+    last, key = len(one.episodes) - 1, "observation.depth.down"
     assert (many.video(key, last) == one.video(key, last)).all()
 
 
