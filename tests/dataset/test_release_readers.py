@@ -141,7 +141,7 @@ def task(k, setting, modality):
     return filled(schemas.TASKS, key | told | {"setting": setting, "modality": modality, "start_x_m": k * 0.1})
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(picked=st.lists(st.sampled_from(schemas.SETTINGS), max_size=40))
 def test_a_filter_on_setting_or_modality_reads_no_row_in_vain(tmp_path_factory, picked):
     data = tmp_path_factory.mktemp("data")

@@ -14,9 +14,7 @@ from support.planting import (
     edit_mesh,
     named,
     outcome_of,
-    poses,
     put,
-    refly,
     rename,
     retell,
     scene_data,
@@ -25,12 +23,9 @@ from support.releases import files_of
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
-from aerialdojo_gen.dataset.validate.detours import _pieces
 from aerialdojo_gen.pipeline.stages.work.task_ids import key_of, nav_id
-from aerialdojo_gen.store.schemas import APPROACH
 
 OBJECTS = "release/objects"
-LEFT_1, RIGHT_1, UP_1, UP_2, DOWN_1, DOWN_2 = 4, 7, 10, 11, 12, 13
 
 
 def objects_of(*ids):
@@ -67,9 +62,9 @@ def test_pictures_swapped_or_copied(planted, renderer):
     for mine, other in swapped.items():
         rows[four[mine]]["reference_image"] = pictures[other]
     planted.write(OBJECTS, rows)
-    drawn = definitions().reference_images.model_copy(update={"renderer": renderer})
     data = scene_data(planted, pictures=4)
-    data.pipeline = data.pipeline.model_copy(update={"reference_images": drawn})
+    asked = data.pipeline.reference_images.model_copy(update={"renderer": renderer})
+    data.pipeline = data.pipeline.model_copy(update={"reference_images": asked})
     told = {fault.key: fault.found for fault in outcome_of(data, "image_redrawn").faults}
     names = [named(OBJECTS, rows[row]) for row in four]
     assert told == {names[a]: f"the picture of {names[b]}" for a, b in swapped.items()}
@@ -228,45 +223,6 @@ def test_a_landmark_called_after_another_thing(planted):
     assert found["landmark_name"] == [named("release/landmarks", landmark)]
     # Texts that name the hydrant may now mean the landmark.
     assert set(found) <= {"landmark_name", "object_words"}
-
-
-# Two metres are a clear share of so short a route: a wider search finds a better one.
-SHORT_M = 9
-
-
-def longer(row, insert, data):
-    """A short route with needless moves at its start, measured anew; None where they hit something."""
-    if row["length_m"] > SHORT_M or row["action"][0] == APPROACH:
-        return None
-    new = refly(row, [*insert, *row["action"]])
-    path, radius = poses(new)[:, :3], data.pipeline.embodiment.radius_m
-    low, high = data.mesh.bounds
-    inside = ((path >= low + radius) & (path <= high - radius)).all()
-    return new if inside and not data.world.route_in_collision(path, radius) else None
-
-
-def test_routes_longer_than_they_need_be_with_right_figures(planted):
-    data, rows = scene_data(planted), planted.rows("routes/train")
-    keys = []
-    for insert in ([UP_1, DOWN_1], [LEFT_1, RIGHT_1], [UP_2, UP_2, UP_2, DOWN_2, DOWN_2, DOWN_2]):
-        untouched = (k for k, row in enumerate(rows) if named("routes/train", row) not in keys)
-        k, new = next((k, new) for k in untouched if (new := longer(rows[k], insert, data)))
-        rows[k] = new
-        keys.append(named("routes/train", new))
-    planted.write("routes/train", rows)
-    found = check(planted)
-    assert found["needless_piece"] == sorted(keys)
-    assert set(found) <= {"needless_piece", "min_clearance", "long_way_round"}
-    # Without its corners, which a sample may leave out, the longest is found.
-    round_about = outcome_of(scene_data(planted, sample=0), "long_way_round").faults
-    assert keys[-1] in {fault.key for fault in round_about}
-
-
-def test_pieces_are_the_shortest_that_are_worth_it(planted):
-    square = np.array([[0, 0, 0], [5, 0, 0], [5, 2, 0], [5, 0, 0], [9, 0, 0], [9, 0, 3.0]])
-    assert _pieces(square) == [(1, 3, 4.0, 0.0)]
-    straight = poses(planted.rows("routes/train")[0])[:1, :3] + np.arange(4)[:, None] * [1.0, 0.0, 0.0]
-    assert _pieces(straight) == []
 
 
 def test_an_id_that_begins_with_its_target(planted):

@@ -9,6 +9,7 @@ from support.planting import (
     measured,
     named,
     of_nav,
+    outcome_of,
     plant,
     poses,
     refly,
@@ -17,12 +18,13 @@ from support.planting import (
 )
 
 from aerialdojo_gen.dataset.validate import collisions, oracle
+from aerialdojo_gen.dataset.validate.detours import _pieces
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
 from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 RADIUS = 0.25
-UP_2, DOWN_2, LEFT_5, RIGHT_5 = 11, 13, 6, 9
+LEFT_1, RIGHT_1, UP_1, UP_2, DOWN_1, DOWN_2, LEFT_5, RIGHT_5 = 4, 7, 10, 11, 12, 13, 6, 9
 KEY = "routes/train"
 
 
@@ -257,6 +259,45 @@ def test_the_oracle_says_what_a_flight_lacks(planted, world, key, change, words)
     found = {data["routes"].key(fault.row): fault.found for fault in oracle.oracle_fails(data, data["routes"])}
     assert list(found) == [f"nav_id={row['nav_id']}"]
     assert words in found[f"nav_id={row['nav_id']}"]
+
+
+# Two metres are a clear share of so short a route: a wider search finds a better one.
+SHORT_M = 9
+
+
+def longer(row, insert, data):
+    """A short route with needless moves at its start, measured anew; None where they hit something."""
+    if row["length_m"] > SHORT_M or row["action"][0] == APPROACH:
+        return None
+    new = refly(row, [*insert, *row["action"]])
+    path, radius = poses(new)[:, :3], data.pipeline.embodiment.radius_m
+    low, high = data.mesh.bounds
+    inside = ((path >= low + radius) & (path <= high - radius)).all()
+    return new if inside and not data.world.route_in_collision(path, radius) else None
+
+
+def test_routes_longer_than_they_need_be_with_right_figures(planted):
+    data, rows = scene_data(planted), planted.rows(KEY)
+    keys = []
+    for insert in ([UP_1, DOWN_1], [LEFT_1, RIGHT_1], [UP_2, UP_2, UP_2, DOWN_2, DOWN_2, DOWN_2]):
+        untouched = (k for k, row in enumerate(rows) if named(KEY, row) not in keys)
+        k, new = next((k, new) for k in untouched if (new := longer(rows[k], insert, data)))
+        rows[k] = new
+        keys.append(named(KEY, new))
+    planted.write(KEY, rows)
+    found = check(planted)
+    assert found["needless_piece"] == sorted(keys)
+    assert set(found) <= {"needless_piece", "min_clearance", "long_way_round"}
+    # Without its corners, which a sample may leave out, the longest is found.
+    round_about = outcome_of(scene_data(planted, sample=0), "long_way_round").faults
+    assert keys[-1] in {fault.key for fault in round_about}
+
+
+def test_pieces_are_the_shortest_that_are_worth_it(planted):
+    square = np.array([[0, 0, 0], [5, 0, 0], [5, 2, 0], [5, 0, 0], [9, 0, 0], [9, 0, 3.0]])
+    assert _pieces(square) == [(1, 3, 4.0, 0.0)]
+    straight = poses(planted.rows(KEY)[0])[:1, :3] + np.arange(4)[:, None] * [1.0, 0.0, 0.0]
+    assert _pieces(straight) == []
 
 
 def test_a_sample_asks_fcl_about_so_many_routes_and_always_the_same(planted):

@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.releases import LISTS, assert_same, copy_release, imported, released, replace_rows, schema_of
 
@@ -115,7 +115,7 @@ def flown(rows: dict, start, actions, approach) -> dict:
     }  # fmt: skip
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6)
 @given(flights, names, names)
 def test_any_flight_and_any_name_come_back(smoke, tmp_path_factory, flown_ones, target, description):
     folder = tmp_path_factory.mktemp("any")

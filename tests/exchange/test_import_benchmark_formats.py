@@ -172,7 +172,7 @@ def test_openfly(tmp_path):
     assert [route["x_m"][0], route["y_m"][0]] == [-6, 5]
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.integers(1, 7), min_size=1, max_size=20), st.integers(1, 4))
 def test_any_aerialvln_flight_replays_in_our_frame(tmp_path, actions, n):
     _, tasks, routes, _ = imported(tmp_path, "aerialvln", task_files.aerialvln((*actions, 0), n), force=True)

@@ -1,17 +1,68 @@
-"""Actions of others: what they do, and which of ours do the same."""
+"""The frames of foreign task files, with an exact way back, and their actions: which of ours do the same."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from aerialdojo_gen.exchange.actions import actions_of, move, replay, words_of
+from aerialdojo_gen.exchange.frames import FRAMES, frame_named, world_to_habitat, yaw_to_habitat_quaternion_xyzw
 from aerialdojo_gen.exchange.readers import AERIALVLN_MOVES as AERIALVLN
 from aerialdojo_gen.exchange.readers import OPENFLY_MOVES as OPENFLY
 from aerialdojo_gen.geometry import motion
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
+
+frames = st.sampled_from(list(FRAMES.values()))
+coordinates = st.floats(-1e5, 1e5, allow_subnormal=False)
+points = st.tuples(coordinates, coordinates, coordinates)
+yaws = st.floats(-math.pi, math.pi)
+
+
+def rotate(quaternion_xyzw, vector):
+    return Rotation.from_quat(quaternion_xyzw).apply(vector)
+
+
+def forward(yaw):
+    return np.array([math.cos(yaw), math.sin(yaw), 0.0])
+
+
+@given(frames, points)
+def test_positions_come_back_to_the_last_bit(frame, point):
+    assert frame.positions_to_world(frame.positions_from_world(point)).tolist() == list(point)
+    x, y, z = world_to_habitat(point)
+    assert [x, -z, y] == list(point)
+
+
+@given(frames, yaws)
+def test_an_attitude_looks_the_same_way_in_both_frames(frame, yaw):
+    quaternion = frame.quaternion_from_world_yaw(yaw)
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-12)
+    assert frame.matrix @ rotate(quaternion, [1, 0, 0]) == pytest.approx(forward(yaw), abs=1e-12)
+    back = float(frame.quaternion_to_world_yaw(quaternion))
+    assert abs(math.remainder(back - yaw, 2 * math.pi)) < 1e-9
+    assert -math.pi < back <= math.pi
+
+
+@given(yaws)
+def test_habitats_bodies_look_along_minus_z(yaw):
+    quaternion = yaw_to_habitat_quaternion_xyzw(yaw)
+    assert rotate(quaternion, [0, 0, -1]) == pytest.approx(world_to_habitat(forward(yaw)), abs=1e-12)
+    # Up stays up, left stays left.
+    assert rotate(quaternion, [0, 1, 0]) == pytest.approx(world_to_habitat([0, 0, 1]), abs=1e-12)
+    assert rotate(quaternion, [-1, 0, 0]) == pytest.approx(world_to_habitat(forward(yaw + math.pi / 2)), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_axes_point_where_the_letters_of_the_name_say(name):
+    """Which makes each frame a turn that keeps handedness."""
+    ways = {"e": [1, 0, 0], "w": [-1, 0, 0], "n": [0, 1, 0], "s": [0, -1, 0], "u": [0, 0, 1], "d": [0, 0, -1]}
+    axes = frame_named(name).positions_to_world(np.eye(3))
+    assert axes.tolist() == [ways[letter] for letter in name]
+    assert np.linalg.det(axes) == 1.0
+
 
 starts = st.tuples(st.floats(-500, 500), st.floats(-500, 500), st.floats(0, 60), st.floats(-math.pi, math.pi))
 action_lists = st.lists(st.integers(1, APPROACH - 1), min_size=1, max_size=40)
@@ -20,7 +71,6 @@ directions = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)).fil
 )
 
 
-@settings(deadline=None)
 @given(starts, action_lists)
 def test_words_and_poses_give_the_actions_back(start, actions):
     poses = motion.replay(start, actions)
@@ -31,7 +81,6 @@ def test_words_and_poses_give_the_actions_back(start, actions):
     assert error < 1e-9
 
 
-@settings(deadline=None)
 @given(starts, action_lists, directions)
 def test_an_approach_comes_back_as_one(start, actions, direction):
     poses = motion.replay(start, actions)
@@ -72,7 +121,6 @@ def test_actions_that_do_the_same_are_found():
     assert move("turn left 30°", turn_deg=30).ours is None
 
 
-@settings(deadline=None)
 @given(starts, action_lists)
 def test_replay_agrees_with_that_of_the_planner(start, actions):
     steps = np.column_stack([motion.DISPLACEMENTS[actions], motion.TURNS[actions] * motion.TURN_RAD])
