@@ -17,11 +17,8 @@ from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.scenes.glb import write_glb
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.schemas import SPLIT_COLUMNS, TableSpec
+from aerialdojo_gen.store.schemas import TableSpec
 from aerialdojo_gen.store.tables import from_rows
-
-# What a table tells of splits, where that does not matter.
-UNSPLIT = dict.fromkeys(SPLIT_COLUMNS)
 
 
 def instance(node: str, *meshes: trimesh.Trimesh, category: str = "thing") -> Instance:
