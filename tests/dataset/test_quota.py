@@ -1,8 +1,6 @@
 """Quotas: the paper's numbers to the integer, chosen by the tasks' own ids, or a word on what is lacking."""
 
-import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.handmade import write_rows
 
-from aerialdojo_gen.annotations.draft import DraftOptions
 from aerialdojo_gen.base.errors import PoolError
 from aerialdojo_gen.base.paper_figures import inventory, splits
 from aerialdojo_gen.cli.common import open_pipeline
-from aerialdojo_gen.dataset.build import run_pipeline
-from aerialdojo_gen.imports.drafting import draft_scene
+from aerialdojo_gen.pipeline import runner
+from aerialdojo_gen.pipeline.runner import stages_named
 from aerialdojo_gen.pipeline.stages.work.candidate_pool import pool_lines, pool_of, require_pools
 from aerialdojo_gen.pipeline.stages.work.quota import (
     Accepted,
@@ -25,9 +22,7 @@ from aerialdojo_gen.pipeline.stages.work.quota import (
     train_quotas,
 )
 from aerialdojo_gen.pipeline.stages.work.task_ids import held_out, key_of, reference_id
-from aerialdojo_gen.store import shards as store
 
-ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = {"base": (5.0, 30.0), "standard": (30.0, 60.0), "long_horizon": (60.0, 100.0)}
 
 
@@ -168,23 +163,12 @@ def test_a_pool_that_is_too_small_is_named_and_nothing_else(tmp_path):
     assert "173/173 " in shown[3]
 
 
-@pytest.mark.pipeline
-def test_split_writes_nothing_where_a_pool_is_too_small(tmp_path):
-    project = tmp_path / "project"
-    (project / "scenes").mkdir(parents=True)
-    (project / "annotations").mkdir()
-    shutil.copy(ROOT / "scene_assets" / "smoke" / "U_Courtyard_0.toml", project / "scenes" / "D_Flood_1.toml")
-    assets = json.dumps(str(ROOT / "scene_assets"))
-    (project / "pipeline.toml").write_text(
-        f'name = "short"\nscene_assets = {assets}\nrecipes = "scenes"\nannotations = "annotations"\n'
-        "[split]\npaper_counts = true\n"
-    )
-    data = tmp_path / "data"
-    pipeline, roots = open_pipeline(project / "pipeline.toml", data)
-    source = json.loads((ROOT / "annotations" / "smoke" / "U_Courtyard_0.json").read_text())
-    landmarks = tuple(entry["node"] for entry in source["landmarks"])
-    draft_scene("D_Flood_1", pipeline, roots, DraftOptions(landmarks, len(landmarks), n_objects=4))
-    with pytest.raises(PoolError, match=r"D_Flood_1: \d+ base tasks short"):
-        run_pipeline(project / "pipeline.toml", data, stages=["split"], workers=1)
-    assert store.shards(data, "verdicts", "D_Flood_1")
-    assert not (data / "release").exists()
+def test_split_writes_nothing_where_a_pool_is_too_small(smoke, tmp_path):
+    """The tables of a small scene, called after one of the paper's."""
+    (split,) = stages_named(["split"])
+    for table in split.reads:
+        shutil.copytree(smoke / table / "U_Courtyard_0", tmp_path / table / "D_Flood_1")
+    config, roots = open_pipeline(None, tmp_path)
+    with pytest.raises(PoolError, match=r"D_Flood_1: \d+ standard tasks short"):
+        runner.run([split], ["D_Flood_1"], config, roots)
+    assert not (tmp_path / "release").exists()

@@ -8,6 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from support.command_line import called
+from support.layout_checks import drawn
 from support.planting import SMOKE, check, definitions, put
 
 from aerialdojo_gen.base.config.pipeline import Pipeline
@@ -24,7 +25,7 @@ def relative(planted, key):
     return planted.path(key).relative_to(planted.release).as_posix()
 
 
-@pytest.mark.parametrize("key", ["tasks/test", "routes/train", "release/objects", "release/scenes"])
+@pytest.mark.parametrize("key", drawn(["tasks/test", "routes/train", "release/objects", "release/scenes"], 2))
 def test_a_part_that_is_missing(planted, key):
     planted.path(key).unlink()
     assert check(planted) == {"part_missing": [relative(planted, key)]}
@@ -95,7 +96,7 @@ def test_a_scene_that_the_card_counts_and_nobody_has(planted):
     assert set(check(planted, whole=True, use_meshes=False)) == {"card_counts"}
 
 
-@pytest.mark.parametrize("tables", [["landmarks"], ["anchors", "objects"], ["scenes"]])
+@pytest.mark.parametrize("tables", drawn([["landmarks"], ["anchors", "objects"], ["scenes"]], 1))
 def test_tables_without_rows(planted, tables):
     keys = [f"release/{table}" for table in tables]
     for key in keys:

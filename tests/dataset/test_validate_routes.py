@@ -21,6 +21,7 @@ from aerialdojo_gen.dataset.validate import collisions, oracle
 from aerialdojo_gen.dataset.validate.detours import _pieces
 from aerialdojo_gen.dataset.validate.registry import ALWAYS_AFTER, TABLES
 from aerialdojo_gen.dataset.validate.run import SCENE_CHECKS
+from aerialdojo_gen.geometry.motion import replay
 from aerialdojo_gen.store.schemas import APPROACH, STOP, TURN_LEFT, TURN_RIGHT
 
 RADIUS = 0.25
@@ -223,8 +224,7 @@ def test_replayed_actions_are_swept_for_themselves(planted, world):
         row["action"][:2] = [LEFT_5, RIGHT_5]
 
     def hits(row):
-        actions = [LEFT_5, RIGHT_5, *row["action"][2:]]
-        return world.segment_in_collision(*poses(refly(row, actions))[:2, :3], RADIUS)
+        return world.segment_in_collision(*replay(poses(row)[0], [LEFT_5])[:, :3], RADIUS)
 
     row = planted.edit(KEY, change, hits)
     data = scene_data(planted)

@@ -39,13 +39,13 @@ def task_files(layout: Path) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def tasks(layout, smoke) -> list[tuple[Path, dict, pd.Series, pd.Series]]:
+def tasks(layout, smoke) -> list[tuple[Path, dict, dict, dict]]:
     """Every task, with the file that it stands in, its row and its route."""
-    rows, routes = released(smoke, "tasks"), released(smoke, "routes")
+    rows, routes = (released(smoke, table).to_dict("index") for table in ("tasks", "routes"))
     written = [(path, task) for path in task_files(layout) for task in json.loads(path.read_text())]
     assert len(written) == len(rows)
     ids = [(task["trajectory_id"], "i" if "ImageOGS" in path.parts else "s") for path, task in written]
-    return [(*one, rows.loc[f"{nav}-{goal}"], routes.loc[nav]) for one, (nav, goal) in zip(written, ids, strict=True)]
+    return [(*one, rows[f"{nav}-{goal}"], routes[nav]) for one, (nav, goal) in zip(written, ids, strict=True)]
 
 
 def test_folders_are_those_of_the_authors(layout, smoke):
@@ -136,13 +136,13 @@ def test_the_authors_evaluator_reads_every_task(tasks):
 
 
 def test_a_task_states_its_route_and_its_objects_turned_into_ned(tasks, smoke):
-    objects = pd.read_parquet(smoke / "release/objects").set_index(["scene", "mesh_node"])["name"]
+    objects = pd.read_parquet(smoke / "release/objects").set_index(["scene", "mesh_node"])["name"].to_dict()
     for _, task, row, route in tasks:
         assert objects[task["map_name"], task["goal_object_name"]] == task["goal_true_name"] == row["target_name"]
         assert objects[task["map_name"], task["start_object_name"]] == task["start_true_name"]
         assert (task["Landmark"], task["Direction"]) == (row["landmark"], row["direction"])
         info = [task["info"][name] for name in ("geodesic_distance", "euclidean_distance", "complexity")]
-        assert info == route[["length_m", "euclidean_m", "detour_ratio"]].tolist()
+        assert info == [route[name] for name in ("length_m", "euclidean_m", "detour_ratio")]
         assert task["start_pose"]["start_position"] == [row["start_y_m"], row["start_x_m"], -row["start_z_m"]]
         assert task["goal_pose"]["goal_position"] == [route["goal_y_m"], route["goal_x_m"], -route["goal_z_m"]]
         north, east, _ = rotate_x(task["start_pose"]["start_quaternion_xyzw"])

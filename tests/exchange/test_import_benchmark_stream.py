@@ -97,7 +97,7 @@ for path in sys.argv[2:]:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_memory_does_not_grow_with_the_file(tmp_path):
     sizes = {}
     record = task_files.openfly((1, 1, 0), 1)[0] | {"index_list": ["20250109_131812_2"] * 1500}
