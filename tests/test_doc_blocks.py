@@ -43,7 +43,7 @@ NOT_RUN = {
     r"run my-scenes/.*": "runs in tests/imports/test_own_scene.py",
     r"add-scene \S+ (odm_|city\.).*": "reads a scan, a city: tests/imports/test_cuts.py and "
     "tests/imports/test_surfaces.py make some",
-    r"report qwen .*": "scores what a language model flew: tests/benchmark/test_told_heading.py",
+    r"report qwen .*": "scores what a language model flew: tests/benchmark/test_goal.py",
     r"evaluate --preset .*": "asks a language model: tests/benchmark/test_llm_evaluate.py does, of its own server",
     r"annotate-draft .* --rewrite .*": "asks a language model: tests/studio/test_rewrite.py does, of its own server",
     r"evaluate --agent clip .*": "needs a CLIP model: tests/benchmark/test_clip_heuristic.py makes a small one",

@@ -18,8 +18,8 @@ from aerialdojo_gen.store.root import DataRoot
 
 DIFFICULTY, SEEN = "difficulty", "seen"
 
-# Parts of a breakdown: which values of a column belong to each, by its heading.
-_Parts = Mapping[str, Callable[[Any], bool]]
+# Parts of a breakdown by their headings: the value that belongs to each, or which values do.
+_Parts = Mapping[str, Any]
 _Columns = dict[str, dict[str, Any]]
 
 
@@ -67,31 +67,25 @@ _SPECS = (
         {"out of view": lambda share: float(share) <= 0.0, "in view": lambda share: float(share) > 0.0},
         note="In view: one of the four views shows some of the target before the first action.",
     ),
-    Breakdown(
-        DIFFICULTY, ("straight_line_free",), "The straight way to the goal",
-        {"free": lambda free: free is True, "blocked": lambda free: free is False},
-    ),
+    Breakdown(DIFFICULTY, ("straight_line_free",), "The straight way to the goal", {"free": True, "blocked": False}),
     Breakdown(DIFFICULTY, ("climb_m",), "Climb of the route, m", _bins(0.0, 1.0, 3.0, 6.0)),
     Breakdown(DIFFICULTY, ("detour_ratio",), "Detour of the route (κ)", _bins(1.0, 1.1, 1.25, 1.5)),
     *(
         Breakdown(
             SEEN, (f"{what}_seen_in_train",), f"{title} that training shows",
-            {"seen in training": lambda seen: seen is True, "unseen": lambda seen: seen is False}, "tasks",
+            {"seen in training": True, "unseen": False}, "tasks",
         )
         for what, title in (
             ("target", "Targets"), ("start", "Start poses"), ("pair", "Pairs of start object and target"),
             ("shape", "Shapes of targets"),
         )
     ),
-    Breakdown(
-        SEEN, ("target_split",), "The split by target",
-        {"train": lambda side: side == "train", "test": lambda side: side == "test"}, "tasks",
-    ),
+    Breakdown(SEEN, ("target_split",), "The split by target", {"train": "train", "test": "test"}, "tasks"),
     Breakdown(
         SEEN, ("target_held_out", "start_held_out"), "Objects held out from the split by target",
         {
-            "neither": lambda both: both == (False, False), "target alone": lambda both: both == (True, False),
-            "start alone": lambda both: both == (False, True), "target and start": lambda both: both == (True, True),
+            "neither": (False, False), "target alone": (True, False), "start alone": (False, True),
+            "target and start": (True, True),
         }, "tasks",
     ),
 )  # fmt: skip
@@ -131,7 +125,9 @@ def find_breakdowns(root: DataRoot, runs: Sequence[Run]) -> Breakdowns:
 
 
 def _label(value: Any, parts: _Parts) -> str:
-    return "" if value is None else next((head for head, belongs in parts.items() if belongs(value)), "")
+    if value is None:
+        return ""
+    return next((head for head, own in parts.items() if (own(value) if callable(own) else own == value)), "")
 
 
 def _values(run: Run, breakdown: Breakdown, released: Callable[[str, str, str], _Columns]) -> list[Any] | None:

@@ -96,15 +96,10 @@ class Flight:
     light: Light
 
     def __init__(
-        self,
-        data: Where,
-        sensors: Sensors,
-        success_radius_m: float = SUCCESS_RADIUS_M,
-        embodiment: Embodiment | None = None,
-        renderer: str = "auto",
-        hints: Sequence[str] = (),
+        self, data: Where, sensors: Sensors, success_radius_m: float = SUCCESS_RADIUS_M,
+        embodiment: Embodiment | None = None, renderer: str = "auto", hints: Sequence[str] = (),
         scenes_in_memory: int = SEVERAL,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._scenes_in_memory = scenes_in_memory
         self._opened: set[str] = set()
         self._reader: Thread | None = None

@@ -32,11 +32,6 @@ class Head:
     partition: str
     adapted: bool | None = None  # Only of agents that were, or were not, trained on OOD scenes; None for all
 
-    @property
-    def title(self) -> str:
-        """Its heading."""
-        return MEASURES[self.metric].head
-
 
 _HEADS = (
     *(Head(f"all scenes, {_NEAR_M:g} m", metric, _NEAR_M, "all") for metric in METRICS),
@@ -78,22 +73,20 @@ def write_leaderboard(folder: Path, page: Path) -> int:
     heads = [head for head in _HEADS if any(_has(head, row, card.adapted) for card, row in scored)]
     groups = [(group, len(list(part))) for group, part in groupby(heads, key=lambda head: head.group)]
     tables = {_TITLES[setting]: _lines(cards, setting, heads) for setting in (*SETTINGS, "all")}
-    text = (
-        page_environment()
-        .get_template("leaderboard.html.j2")
-        .render(
-            version=__version__,
-            cards=cards,
-            heads=heads,
-            groups=groups,
-            starts={0, *accumulate(count for _, count in groups)},
-            tables={title: lines for title, lines in tables.items() if any(not line.is_paper for line in lines)},
-            **page_parts(["report.css", "leaderboard.css"], "leaderboard.js"),
-        )
+    template = page_environment().get_template("leaderboard.html.j2")
+    html = template.render(
+        version=__version__,
+        cards=cards,
+        heads=heads,
+        measures=MEASURES,
+        groups=groups,
+        starts={0, *accumulate(count for _, count in groups)},
+        tables={title: lines for title, lines in tables.items() if any(not line.is_paper for line in lines)},
+        **page_parts(["report.css", "leaderboard.css"], "leaderboard.js"),
     )
     make_folder(page.parent)
     with atomic_file(page.parent, page.name) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(html, encoding="utf-8")
     return len(cards)
 
 

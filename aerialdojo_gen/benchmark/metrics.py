@@ -52,15 +52,11 @@ PROFILES = {
         Profile("uav-on", 20.0, about="UAV-ON: Stop within 20 m, a collision ends the episode"),
         Profile("aerialvln", 20.0, planar=True, about="AerialVLN: Stop within 20 m in the plane"),
         Profile(
-            "openfly",
-            20.0,
-            needs_stop=False,
-            fails_on_collision=False,
-            straight_reference=True,
+            "openfly", 20.0, needs_stop=False, fails_on_collision=False, straight_reference=True,
             about="OpenFly: the episode ends within 20 m, however it ends; SPL against the straight distance",
         ),
     )
-}
+}  # fmt: skip
 DEFAULT_PROFILES = ("aerialdojo", "aerialdojo-5m")
 
 

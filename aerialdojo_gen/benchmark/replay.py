@@ -117,45 +117,34 @@ def replays(
         extent = (low[0], high[0], low[1], high[1])
         seen = orthographic_pictures(scene.model).from_above(extent, float(high[0] - low[0]) / _MAP_PX)
         places = (("goal", route, "goal_"), ("target", target, ""), ("size", target, "size_"))
-        yield Replay(
-            instances[0],
-            {f"{what}_{a}_m": of[f"{name}{a}_m"] for what, of, name in places for a in "xyz"},
-            {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")},
-            (float(low[0]), float(low[1])),
-            (float(high[0]), float(high[1])),
-            data_url(encode_jpeg(seen, MAP_JPEG)),
-            flights,
-        )
+        known = {f"{what}_{a}_m": of[f"{name}{a}_m"] for what, of, name in places for a in "xyz"}
+        reference = {name: route[name] for name in ("x_m", "y_m", "z_m", "length_m")}
+        corners = (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
+        yield Replay(instances[0], known, reference, *corners, data_url(encode_jpeg(seen, MAP_JPEG)), flights)
 
 
 _scene = lru_cache(maxsize=4)(ReleasedScene)
 
 
 def _flight(scene: ReleasedScene, run: Run, episode: dict[str, Any], steps: Any, frames: bool) -> Flight:
-    rows = steps.filter(pc.equal(steps["task_id"], episode["task_id"])).to_pylist()
-    start = math.dist(
-        [episode[f"start_{a}_m"] for a in "xyz"], [scene.route(episode["nav_id"])[f"goal_{a}_m"] for a in "xyz"]
-    )
-    lists: dict[str, list[Any]] = {name: [episode[f"start_{name}"]] for name in ("x_m", "y_m", "z_m", "yaw_rad")}
-    lists |= {"distance_m": [start], "said": ["start"], "answers": [""]}
-    for row in rows:
-        for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m"):
-            lists[name].append(row[name])
-        done = "unreadable answer" if row["action"] is None else ACTION_NAMES[row["action"]]
-        lists["said"].append(f"{done} (refused)" if row["refused"] else done)
-        lists["answers"].append(row["answer"] or "")
+    flown, route = steps.filter(pc.equal(steps["task_id"], episode["task_id"])), scene.route(episode["nav_id"])
+    first = {name: episode[f"start_{name}"] for name in ("x_m", "y_m", "z_m", "yaw_rad")}
+    first["distance_m"] = math.dist([first[f"{a}_m"] for a in "xyz"], [route[f"goal_{a}_m"] for a in "xyz"])
+    lists = {name: [value, *flown[name].to_pylist()] for name, value in first.items()}
+    said, answers = ["start"], ["", *(answer or "" for answer in flown["answer"].to_pylist())]
+    for action, refused in zip(flown["action"].to_pylist(), flown["refused"].to_pylist(), strict=True):
+        done = "unreadable answer" if action is None else ACTION_NAMES[action]
+        said.append(f"{done} (refused)" if refused else done)
     pictures = {}
     if frames:
         # The last pose may lie in what was hit: a camera there sees the inside of it.
-        last = len(lists["said"]) - (2 if episode["collision"] else 1)
+        last = len(said) - (2 if episode["collision"] else 1)
         for k in sorted({round(k) for k in np.linspace(0, max(last, 0), min(_MAX_FRAMES, last + 1))}):
             position = tuple(lists[name][k] for name in ("x_m", "y_m", "z_m"))
             views, *_ = render_views(scene.model, _FRAME, position, lists["yaw_rad"][k])
             pictures[k] = data_url(encode_jpeg(views["front"], REPLAY_JPEG))
-    rounded = {name: [round(v, 3) for v in lists[name]] for name in ("x_m", "y_m", "z_m", "yaw_rad", "distance_m")}
-    return Flight(
-        run.label, _outcome(episode), **rounded, said=lists["said"], answers=lists["answers"], frames=pictures
-    )
+    rounded = {name: [round(v, 3) for v in values] for name, values in lists.items()}
+    return Flight(run.label, _outcome(episode), **rounded, said=said, answers=answers, frames=pictures)
 
 
 def _outcome(episode: dict[str, Any]) -> str:

@@ -99,13 +99,9 @@ def html(
 def page_environment() -> jinja2.Environment:
     """Return what renders the benchmark's pages: everything is escaped, and no name may be missing."""
     return jinja2.Environment(
-        loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"),
-        autoescape=True,
-        finalize=shown_in_page,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+        loader=jinja2.PackageLoader("aerialdojo_gen.benchmark"), autoescape=True, finalize=shown_in_page,
+        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
 
 
 def page_parts(styles: Sequence[str], script: str) -> dict[str, str]:

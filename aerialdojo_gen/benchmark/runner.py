@@ -41,18 +41,10 @@ _SETTINGS = "run.json"
 
 
 def evaluate(
-    data: Where,
-    evaluation: Evaluation,
-    *,
-    out: Where | None = None,
-    workers: int | None = 1,
-    executor: str = "local",
-    address: str | None = None,
-    rerun_failed: bool = False,
-    restart: bool = False,
-    limits: Limits | None = None,
-    reporter: Reporter | None = None,
-) -> Outcome:
+    data: Where, evaluation: Evaluation, *, out: Where | None = None, workers: int | None = 1,
+    executor: str = "local", address: str | None = None, rerun_failed: bool = False, restart: bool = False,
+    limits: Limits | None = None, reporter: Reporter | None = None,
+) -> Outcome:  # fmt: skip
     """Fly an agent through the tasks of a selection; `aerialdojo-gen evaluate` in the library."""
     started = time.monotonic()
     limits = limits or Limits()

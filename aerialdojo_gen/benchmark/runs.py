@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -112,24 +113,15 @@ def load_runs(data: Where, names: Sequence[str] = (), sample: Sample | None = No
             rerun_command = command("evaluate", run=name, protocol=sample and "paper", rerun_failed=bool(failed))
             of = "" if sample is None else " of the paper's sample"
             raise StoreError(f"run {name!r} has no finished episode{of}{said} {rerun_command}")
-    agents = [table["agent"][0].as_py() for table in tables.values()]
-    hints = [table["told"][0].as_py() or "" for table in tables.values()]
-    # With hints it is another contender.
-    called = [f"{agent} + {more}" if more else agent for agent, more in zip(agents, hints, strict=True)]
-    return [
-        Run(
-            name,
-            call if called.count(call) == 1 else f"{call} ({name})",
-            agent,
-            table["agent_options"][0].as_py(),
-            table,
-            mark_adapted(episodes_of(table), table["agent_options"][0].as_py()),
-            read(name, "failures").num_rows,
-            root,
-            hints=more,
-        )
-        for (name, table), agent, more, call in zip(tables.items(), agents, hints, called, strict=True)
-    ]
+    loaded = []
+    for name, table in tables.items():
+        agent, options, told = (table[column][0].as_py() for column in ("agent", "agent_options", "told"))
+        # With hints it is another contender.
+        label = f"{agent} + {told}" if told else agent
+        episodes, failed = mark_adapted(episodes_of(table), options), read(name, "failures").num_rows
+        loaded.append(Run(name, label, agent, options, table, episodes, failed, root, hints=told or ""))
+    labels = Counter(run.label for run in loaded)
+    return [replace(run, label=f"{run.label} ({run.name})") if labels[run.label] > 1 else run for run in loaded]
 
 
 def mark_adapted(episodes: Episodes, options: str) -> Episodes:
@@ -184,16 +176,12 @@ def group_runs(runs: Sequence[Run], groups: Mapping[str, Sequence[str]] | None =
 
     others = "other agents" if chosen else "agents"
     order = [*chosen, others, UPPER_BOUND, BASELINES]
-    grouped = [
-        replace(
-            run,
-            group=next(
-                (head for head, names in chosen.items() if run.name in names or run.agent in names),
-                GROUP_OF.get(run.agent, others),
-            ),
-        )
-        for run in runs
-    ]
+
+    def group(run: Run) -> str:
+        named = (heading for heading, names in chosen.items() if run.name in names or run.agent in names)
+        return next(named, GROUP_OF.get(run.agent, others))
+
+    grouped = [replace(run, group=group(run)) for run in runs]
     # A single group needs no heading.
     if len({run.group for run in grouped}) == 1:
         return [replace(run, group="") for run in grouped]

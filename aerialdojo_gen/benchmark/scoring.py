@@ -102,18 +102,10 @@ class _Replay(Evaluation):
 
 
 def score(
-    data: Where,
-    file: Path,
-    folder: Path,
-    *,
-    selection: Selection,
-    embodiment: Embodiment | None = None,
-    name: str | None = None,
-    adapted: bool = False,
-    replace: bool = False,
-    workers: int | None = 1,
+    data: Where, file: Path, folder: Path, *, selection: Selection, embodiment: Embodiment | None = None,
+    name: str | None = None, adapted: bool = False, replace: bool = False, workers: int | None = 1,
     reporter: Reporter | None = None,
-) -> ScoreCard:
+) -> ScoreCard:  # fmt: skip
     """Fly a submission's actions again, and add it to a folder; nothing is written where it is refused."""
     root, submission = open_root(data), read_submission(file)
     name = check_run_name(name or submission.run.name)

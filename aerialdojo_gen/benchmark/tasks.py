@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -115,14 +116,12 @@ def select(data: Where, selection: Selection) -> pa.Table:
 
 def draw_evenly(scenes: Sequence[str], ids: Sequence[str], limit: int, seed: int, stage: str) -> list[int]:
     """Draw rows, ascending: the first of every scene in random order, then the second, and so on, up to the limit."""
-    by_scene: dict[str, list[tuple[int, int]]] = {}
-    for i, (scene, name) in enumerate(zip(scenes, ids, strict=True)):
-        by_scene.setdefault(scene, []).append((rng.rank(seed, stage, name), i))
-    keys = [
-        (turn, rng.rank(seed, stage, scene), i)
-        for scene, ranked in by_scene.items()
-        for turn, (_, i) in enumerate(sorted(ranked)[:limit])
-    ]
+    order = {scene: rng.rank(seed, stage, scene) for scene in set(scenes)}
+    turns: Counter[str] = Counter()
+    keys = []
+    for _, i in sorted((rng.rank(seed, stage, name), i) for i, name in enumerate(ids)):
+        keys.append((turns[scenes[i]], order[scenes[i]], i))
+        turns[scenes[i]] += 1
     return sorted(i for _, _, i in sorted(keys)[:limit])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -110,12 +110,13 @@ def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
     """Add the usage of two attempts; unknown counts stay unknown."""
     if a is None or b is None:
         return a or b
-    both = {}
-    for name in ("input_tokens", "output_tokens", "cost_usd", "request_s"):
+
+    def both(name: str, total: Callable[[list[Any]], Any] = sum) -> Any:
         known = [v for v in (getattr(a, name), getattr(b, name)) if v is not None]
-        both[name] = sum(known) if known else None
-    longest = [v for v in (a.longest_request_s, b.longest_request_s) if v is not None]
-    return replace(a, requests=a.requests + b.requests, longest_request_s=max(longest, default=None), **both)
+        return total(known) if known else None
+
+    sums = {name: both(name) for name in ("requests", "input_tokens", "output_tokens", "cost_usd", "request_s")}
+    return Usage(**sums, longest_request_s=both("longest_request_s", max))
 
 
 def _usage_columns(used: Usage | None) -> dict[str, Any]:
@@ -187,14 +188,9 @@ class Worker:
     """Flies units with one agent."""
 
     def __init__(
-        self,
-        agent: Agent,
-        flight: Flight,
-        data: DataRoot,
-        identity: dict[str, str],
-        retry_policy: RetryPolicy,
+        self, agent: Agent, flight: Flight, data: DataRoot, identity: dict[str, str], retry_policy: RetryPolicy,
         secrets: Secrets,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._agent, self._flight, self._data = agent, flight, data
         self._identity, self._retry_policy, self._secrets = identity, retry_policy, secrets
         self._guarded = GuardedAgent(agent, identity["agent"], secrets, retry_policy.tolerate)
@@ -289,12 +285,8 @@ class Worker:
             for name, value in zip(_COLUMNS, values, strict=True):
                 columns[name].append(value)
         seconds = {"wall_s": time.perf_counter() - started, "agent_s": thinking}
-        return {
-            "task_id": task.row["task_id"],
-            "episode": self._row(task),
-            "steps": columns,
-            "timing": self._key(task) | seconds,
-        }
+        timing = self._key(task) | seconds
+        return {"task_id": task.row["task_id"], "episode": self._row(task), "steps": columns, "timing": timing}
 
     def _observe(self) -> Observation:
         try:

@@ -54,13 +54,9 @@ def worker(data: DataRoot, evaluation: Evaluation, link: WorkerChannel) -> Itera
 
 
 def fly_units(
-    data: DataRoot,
-    evaluation: Evaluation,
-    units: Sequence[WorkUnit],
-    executor: Executor,
-    on_finished: Callable[[Finished], None],
-    stopped: Callable[[], bool],
-) -> Iterator[str]:
+    data: DataRoot, evaluation: Evaluation, units: Sequence[WorkUnit], executor: Executor,
+    on_finished: Callable[[Finished], None], stopped: Callable[[], bool],
+) -> Iterator[str]:  # fmt: skip
     """Fly units, and yield a scene when all of its units are finished."""
     left = Counter(unit.scene for unit in units)
     fly, channel = partial(_fly, data, evaluation), ParentChannel(on_finished, stopped)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.flying import town
-from support.llm_agents import KEY
+from support.llm_agents import KEY, PROTOCOLS
 from support.walled import write_walled
 
 from aerialdojo_gen.planning.flight_space import FlightSpace
@@ -29,3 +29,8 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("OPENAI", "ANTHROPIC"):
         monkeypatch.setenv(f"{name}_API_KEY", KEY)
         monkeypatch.delenv(f"{name}_BASE_URL", raising=False)
+
+
+@pytest.fixture(params=PROTOCOLS)
+def protocol(request: pytest.FixtureRequest) -> str:
+    return request.param

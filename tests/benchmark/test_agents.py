@@ -1,5 +1,7 @@
-"""The agents: how they are found, what they do, and the explorer's map."""
+"""The agents: how they are found, what they do, the explorer's map; the references as agents can fly them."""
 
+import cmath
+import dataclasses
 import math
 import os
 import subprocess
@@ -7,22 +9,34 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from support.extended import set_columns, with_column
 from support.handmade import box, instance, scene
+from support.planting import definitions
 
 import aerialdojo_gen
-from aerialdojo_gen.base.errors import UsageError
+from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import AgentBase, load_agent
 from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
-from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent, thumbnail
+from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.agents.load import read_options
-from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
+from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, OracleAgent
+from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
+from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.episode import Episode
+from aerialdojo_gen.dataset.validate import oracle
+from aerialdojo_gen.dataset.validate.parts import read_tables, release_of
+from aerialdojo_gen.dataset.validate.rows import SceneData
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.store import schemas
+from aerialdojo_gen.store.schemas import APPROACH, STOP
+from aerialdojo_gen.store.schemas.columns import list_of
 
 EYES = Sensors(("front", "left", "right"), rgb=False, width=48, height=48)
 
@@ -33,32 +47,24 @@ def goal(budget=90, name="red van", image=None, sensors=BLIND):
     return Goal(kind, name, "clock tower", "north", text, image, Rules(budget, sensors=sensors))
 
 
-def flown(agent, n, budget=90):
-    return [agent.act(Observation(k, budget - k)) for k in range(n)]
+def flown(agent, n):
+    return [agent.act(Observation(k, 90 - k)) for k in range(n)]
 
 
 class Nothing:
     """No agent."""
 
 
-class Mine(AgentBase):
-    def __init__(self, gain=1.0):
-        if gain < 0:
-            raise ValueError("gain is not negative")
+class Typed(AgentBase):
+    """Has a default of every type, and takes no negative number."""
 
-    def reset(self, goal):
-        pass
+    def __init__(self, needed, n=3, share=0.5, flag=False, name="", seed=None, names=("a",)):
+        if n < 0:
+            raise ValueError("n is not negative")
 
-    def act(self, observation):
-        return 0
+    def reset(self, goal): ...
 
-
-def test_built_in_agents_are_made_by_name():
-    classes = {"oracle": OracleAgent, "stop": StopAgent, "constant": ConstantAgent}
-    assert all(isinstance(load_agent(name), cls) for name, cls in classes.items())
-    assert isinstance(load_agent("random", seed=3), RandomAgent)
-    assert isinstance(load_agent("explorer", likeness=0.9), ExplorerAgent)
-    assert isinstance(load_agent(f"{__name__}:Mine", gain=2), Mine)
+    def act(self, observation): ...
 
 
 @pytest.mark.parametrize(
@@ -74,24 +80,13 @@ def test_built_in_agents_are_made_by_name():
         ("random", {"stop_probability": 2}, "between 0 and 1"),
         ("constant", {"actions": "MoveForward5,MoveBack1"}, "no action 'MoveBack1': there are Stop, MoveForward1, "),
         ("constant", {"actions": [16]}, "no action '16'"),
-        (f"{__name__}:Mine", {"gain": -1}, "gain is not negative"),
+        (f"{__name__}:Typed", {"needed": 1, "n": -1}, "n is not negative"),
     ],
 )
 def test_what_cannot_be_made_is_said_in_one_line(name, options, message):
     with pytest.raises(UsageError, match=message) as error:
         load_agent(name, **options)
     assert "\n" not in str(error.value)
-
-
-class Typed(AgentBase):
-    """Has a default of every type."""
-
-    def __init__(self, needed, n=3, share=0.5, flag=False, name="", seed=None, names=("a",)):
-        self.given = needed, n, share, flag, name, seed, names
-
-    def reset(self, goal): ...
-
-    def act(self, observation): ...
 
 
 @pytest.mark.parametrize(
@@ -124,18 +119,19 @@ def test_an_option_that_cannot_be_converted_is_named(option, text, what):
         read_options(f"{__name__}:Typed", {option: text})
 
 
-def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops():
-    names = schemas.ACTION_NAMES
-    for agent, expected in (
-        (load_agent("constant"), [names.index(name) for name in BEST_CONSTANT]),
-        (load_agent("constant", actions="moveup1, 14,MoveForward3"), [10, 14, 2]),
-        (load_agent("constant", actions=[9, "TurnRight15"]), [9, 15]),
-    ):
-        flights = []
-        for told in (goal(), goal(name="blue bench", budget=300)):
-            agent.reset(told)
-            flights.append(flown(agent, 6))
-        assert flights[0] == flights[1] == (expected + [schemas.STOP] * 6)[:6]
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({}, [schemas.ACTION_NAMES.index(name) for name in BEST_CONSTANT]),
+        ({"actions": "moveup1, 14,MoveForward3"}, [10, 14, 2]),
+        ({"actions": [9, "TurnRight15"]}, [9, 15]),
+    ],
+)
+def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops(options, expected):
+    agent = load_agent("constant", **options)
+    for told in (goal(), goal(name="blue bench", budget=300)):
+        agent.reset(told)
+        assert flown(agent, 6) == (expected + [schemas.STOP] * 6)[:6]
 
 
 def test_the_oracle_leaves_the_approach_out_and_stops_at_the_end():
@@ -146,25 +142,17 @@ def test_the_oracle_leaves_the_approach_out_and_stops_at_the_end():
 
 
 def test_random_draws_depend_on_seed_and_goal_alone():
-    def draws(seed=0, **kw):
-        agent = RandomAgent(seed)
-        agent.reset(goal(**kw))
+    def draws(name="red van", **options):
+        agent = load_agent("random", **options)
+        agent.reset(goal(name=name))
         return flown(agent, 90)
 
     assert draws() == draws()
     assert draws() != draws(seed=1)
-    assert draws() != draws(name="blue van")
-    everything = {a for name in range(20) for a in draws(name=str(name))}
-    assert everything == set(range(16))
-
-
-def test_how_likely_random_stops_can_be_set():
-    never = RandomAgent(stop_probability=0.0)
-    never.reset(goal())
-    assert 0 not in flown(never, 90)
-    for agent in (RandomAgent(stop_probability=1.0), StopAgent()):
-        agent.reset(goal())
-        assert set(flown(agent, 90)) == {0}
+    assert draws() != draws("blue van")
+    assert {a for name in range(20) for a in draws(str(name))} == set(range(16))
+    assert 0 not in draws(stop_probability=0.0)
+    assert set(draws(stop_probability=1.0)) == {0}
 
 
 class Seer:
@@ -216,11 +204,9 @@ def test_the_explorer_flies_on_and_touches_nothing(village):
         while episode.termination is None:
             episode.step(agent.act(seer.look(episode)))
         assert (episode.termination, episode.n_actions) == ("stop", 60), "the last action is a Stop"
-        x, y, _ = episode.position
-        heading = 0.7 * k
-        ahead = math.cos(heading) * (x - start[0]) + math.sin(heading) * (y - start[1])
-        left = -math.sin(heading) * (x - start[0]) + math.cos(heading) * (y - start[1])
-        assert (agent._x_m, agent._y_m) == pytest.approx((ahead, left), abs=1e-6), "it knows where it is"
+        moved = complex(*episode.position[:2]) - complex(*start[:2])
+        own = complex(agent._x_m, agent._y_m) * cmath.exp(0.7j * k)
+        assert own == pytest.approx(moved, abs=1e-6), "it knows where it is"
         lengths.append(episode.path_length_m)
     assert len(lengths) >= 2
     assert np.mean(lengths) > 15.0
@@ -234,30 +220,69 @@ def test_the_explorer_stops_where_the_picture_fits(village):
     agent.reset(goal(60, image=picture, sensors=EYES))
     assert agent.act(Seer(village).look(episode, {"front": other})) != 0
     assert agent.act(Seer(village).look(episode, {"front": picture})) == 0
-    assert (thumbnail(picture) ** 2).mean() == pytest.approx(1.0, abs=1e-3)
-
-
-def test_the_explorer_says_what_it_needs():
     with pytest.raises(UsageError, match="front, left and right"):
-        ExplorerAgent().reset(goal(sensors=Sensors(("front",))))
+        agent.reset(goal(sensors=Sensors(("front",))))
 
 
 def test_an_agent_in_the_working_directory_is_found_and_takes_no_librarys_place(tmp_path):
-    """By a console script too, whose own folder is first on the path in place of the working directory."""
-    text = "class Mine:\n    def reset(self, goal): pass\n    def act(self, observation): return 0\n"
     for name in ("mine", "numpy"):
-        (tmp_path / f"{name}.py").write_text(text)
-    code = (
-        "from aerialdojo_gen.benchmark.agents import load_agent\n"
-        "from aerialdojo_gen.benchmark.evaluation import agent_code_digest\n"
-        "before = agent_code_digest('mine:Mine')\nprint(type(load_agent('mine:Mine')).__name__)\n"
-        "open('mine.py', 'a').write('x = 1')\nassert agent_code_digest('mine:Mine') != before\n"
-        "load_agent('numpy:Mine')"
-    )
-    # -P: as a console script has it.
+        (tmp_path / f"{name}.py").write_text("class Mine:\n    reset = act = print\n")
+    code = "from aerialdojo_gen.benchmark.agents import load_agent as load\nload('mine:Mine')\nload('numpy:Mine')"
+    # -P: as a console script has it, whose own folder is first on the path in place of the working directory.
     env = os.environ | {"PYTHONPATH": str(Path(aerialdojo_gen.__file__).parents[1])}
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
-    )
-    assert done.stdout == "Mine\n"
-    assert "module numpy has no Mine" in done.stderr
+    command = [sys.executable, "-P", "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert done.stderr.strip().endswith("cannot load agent 'numpy:Mine': module numpy has no Mine")
+
+
+SEMANTIC = Selection(scenes=("U_Courtyard_0",), modalities=("semantic",))
+AS_AGENT = Evaluation("r", "oracle", {"actions": "agent_action"}, SEMANTIC)
+
+
+def test_the_oracle_flies_that_list_and_no_other(planted):
+    for side in ("train", "test"):
+        lists = [[14, STOP]] * len(planted.rows(f"routes/{side}"))
+        set_columns(planted, f"routes/{side}", agent_action=pa.array(lists, list_of(pa.int8())))
+    evaluate(planted.data, AS_AGENT)
+    steps = read_run(planted.data, "r", "steps").to_pandas()
+    assert steps.groupby("task_id").action.apply(list).map(tuple).unique().tolist() == [(14, STOP)]
+
+
+def test_a_release_without_them_says_so(planted):
+    for side in ("train", "test"):
+        table = pq.read_table(planted.path(f"routes/{side}"), partitioning=None)
+        planted.write_table(f"routes/{side}", table.drop_columns("agent_action"))
+    with pytest.raises(StoreError, match=r"^the routes of U_Courtyard_0 in .* have no agent_action.*$"):
+        evaluate(planted.data, AS_AGENT)
+    with pytest.raises(UsageError, match="routes have the lists action and agent_action, not 'actions'"):
+        load_agent("oracle", actions="actions")
+
+
+def test_each_fault_is_found_and_only_it(planted):
+    release = release_of(planted.data)
+    data = SceneData(planted.scene, release, definitions(), read_tables(release, planted.scene)[0])
+    routes, tasks = data["routes"], data["tasks"]
+    flown = routes.column("action").to_pylist()
+    own = [[a for a in actions if a != APPROACH] for actions in flown]
+    with_approach = next(row for row, actions in enumerate(flown) if APPROACH in actions)
+    long = [row for row, actions in enumerate(own) if len(actions) > 12 and row != with_approach]
+    faults = {
+        with_approach: (flown[with_approach], f"action {APPROACH}"),
+        long[0]: (own[long[0]][:-1], "no Stop at its end alone"),
+        long[1]: ([STOP, *own[long[1]]], "no Stop at its end alone"),
+        long[2]: ([STOP], "m from the "),
+        long[3]: ([], "no Stop at its end alone"),
+        long[4]: ([11] * 30 + [STOP], "flight volume"),
+    }
+    # A turn to and fro before the Stop: other actions, the same place.
+    budget = dict(zip(tasks.texts("nav_id"), tasks.ints("action_budget").tolist(), strict=True))
+    turned = [k for k, nav_id in enumerate(routes.texts("nav_id")) if len(own[k]) + 2 <= budget[nav_id]]
+    assert len(turned) > 20
+    lists = [[*a[:-1], 14, 15, STOP] if k in turned else a for k, a in enumerate(own)]
+    for row, (actions, _) in faults.items():
+        lists[row] = actions
+    table = with_column(routes.table, "agent_action", pa.array(lists, list_of(pa.int8())))
+    found = {f.row: f.found for f in oracle.agent_action_fails(data, dataclasses.replace(routes, table=table))}
+    assert found.keys() == faults.keys()
+    for row, (_, words) in faults.items():
+        assert words in found[row], found[row]

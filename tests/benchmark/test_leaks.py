@@ -35,23 +35,7 @@ def reachable(*roots):
         if isinstance(thing, np.ndarray) and thing.base is not None:
             queue.append(thing.base)
         queue += gc.get_referents(thing)
-        for cls in type(thing).__mro__:
-            slots = cls.__dict__.get("__slots__", ())
-            queue += [getattr(thing, s) for s in ((slots,) if isinstance(slots, str) else slots) if hasattr(thing, s)]
     return list(seen.values())
-
-
-def numbers(things):
-    """Every number among them, those in arrays of floats too, but for depth, which is float32 and seen."""
-    for thing in things:
-        if isinstance(thing, float):
-            yield np.array([thing])
-        elif isinstance(thing, np.ndarray) and thing.dtype == np.float64:
-            yield thing.ravel()
-
-
-def words(things):
-    return [t.decode("latin-1") if isinstance(t, bytes) else t for t in things if isinstance(t, str | bytes)]
 
 
 class Secrets:
@@ -59,33 +43,36 @@ class Secrets:
 
     def __init__(self, data, task):
         row = task.row
-        route = {r["nav_id"]: r for r in store.read_scene(data, f"routes/{row['subset']}", row["scene"]).to_pylist()}[
-            row["nav_id"]
-        ]
-        target = next(
-            o for o in store.read_scene(data, "release/objects", row["scene"]).to_pylist()
-            if o["object_id"] == route["target_object_id"]
-        )  # fmt: skip
+        routes, objects = (
+            store.read_scene(data, table, row["scene"]).to_pylist()
+            for table in (f"routes/{row['subset']}", "release/objects")
+        )
+        route = next(r for r in routes if r["nav_id"] == row["nav_id"])
+        target = next(o for o in objects if o["object_id"] == route["target_object_id"])
         goal = np.array([route["goal_x_m"], route["goal_y_m"], route["goal_z_m"]])
         path = np.array([route["x_m"], route["y_m"], route["z_m"]]).T
-        self.numbers = np.concatenate([
+        known = np.concatenate([
             goal, path.ravel(), np.linalg.norm(path - goal, axis=1), route["yaw_rad"], [route["goal_yaw_rad"]],
             [route["euclidean_m"], route["length_m"], route["detour_ratio"], route["min_clearance_m"]],
             [target[k] for k in ("x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")],
         ])  # fmt: skip
         # Round numbers (0 m, 1 m, a right angle) tell nothing, and stand everywhere.
-        self.numbers = self.numbers[np.abs(self.numbers * 1000 - np.rint(self.numbers * 1000)) > 1e-6]
+        self.numbers = known[np.abs(known * 1000 - np.rint(known * 1000)) > 1e-6]
         self.words = [
             row["task_id"], row["nav_id"], row["scene"], target["mesh_node"], target["reference_image_id"], str(data),
             "/meshes", ".glb", ".parquet",
         ]  # fmt: skip
 
     def found(self, *roots):
-        things = reachable(*roots)
-        hits = [word for word in self.words for text in words(things) if word in text]
-        for values in numbers(things):
-            near = np.abs(values[:, None] - self.numbers[None]) < 1e-5
-            hits += values[near.any(axis=1)].tolist()
+        """What of it the roots lead to; depth, which is float32, is seen."""
+        hits = []
+        for thing in reachable(*roots):
+            if isinstance(thing, str | bytes):
+                text = thing if isinstance(thing, str) else thing.decode("latin-1")
+                hits += [word for word in self.words if word in text]
+            elif isinstance(thing, float) or (isinstance(thing, np.ndarray) and thing.dtype == np.float64):
+                values = np.ravel(thing)
+                hits += values[(np.abs(values[:, None] - self.numbers) < 1e-5).any(axis=1)].tolist()
         return hits
 
 

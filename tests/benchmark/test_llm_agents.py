@@ -1,27 +1,16 @@
 """The language-model agents: the real client packages against a real server on 127.0.0.1."""
 
-from __future__ import annotations
-
 import base64
 import json
 import logging
 import sys
 import traceback
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from support.llm_agents import FORWARD_3, KEY, PROTOCOLS, agent_of, begun, goal_for, observation
-from support.llm_server import (
-    MOVE,
-    Call,
-    Filtered,
-    Raw,
-    Say,
-    Status,
-    serving,
-)
+from support.llm_agents import FORWARD_3, KEY, agent_of, begun, goal_for, observation
+from support.llm_server import MOVE, Call, Filtered, Raw, Say, Status, serving
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError
 from aerialdojo_gen.benchmark.agents import AgentUnavailable, InvalidAnswer, load_agent
@@ -31,30 +20,25 @@ from aerialdojo_gen.store.schemas import ACTION_NAMES, STOP
 pytestmark = pytest.mark.usefixtures("keys")
 
 
-def parts_of(request: dict[str, Any]) -> list[dict[str, Any]]:
+def parts_of(request):
     messages = request["body"]["messages"]
     return [part for m in messages if m["role"] == "user" for part in m["content"]]
 
 
-def texts_of(request: dict[str, Any]) -> str:
+def texts_of(request):
     return "\n".join(part["text"] for part in parts_of(request) if part["type"] == "text")
 
 
-def pictures_of(request: dict[str, Any]) -> list[np.ndarray]:
+def pictures_of(request):
     found = []
     for part in parts_of(request):
-        if part["type"] == "image_url":
-            data = part["image_url"]["url"].split(",", 1)[1]
-        elif part["type"] == "image":
-            data = part["source"]["data"]
-        else:
-            continue
-        found.append(cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED))
+        if part["type"] != "text":
+            data = part["source"]["data"] if part["type"] == "image" else part["image_url"]["url"].split(",", 1)[1]
+            found.append(cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_UNCHANGED))
     return found
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_a_normal_answer_becomes_an_action(protocol: str) -> None:
+def test_a_normal_answer_becomes_an_action(protocol):
     with serving(Say(MOVE), Say('{"action": "Stop"}')) as service:
         agent = begun(protocol, service, input_usd_per_million=2.0, output_usd_per_million=10.0, temperature=0.5)
         assert agent.act(observation(0)) == FORWARD_3
@@ -65,15 +49,12 @@ def test_a_normal_answer_becomes_an_action(protocol: str) -> None:
         assert usage.cost_usd == pytest.approx((2000 * 2 + 40 * 10) / 1e6)
         agent.reset(goal_for(agent))
         assert agent.usage().requests == 0
-        agent.close()
     first, second = service.requests
     assert first["path"] == {"openai": "/v1/chat/completions", "anthropic": "/v1/messages"}[protocol]
-    assert first["body"]["temperature"] == 0.5
-    assert first["body"]["max_tokens"] == 1024
+    assert (first["body"]["temperature"], first["body"]["max_tokens"]) == (0.5, 1024)
     assert any(KEY in value for name, value in first["headers"].items() if name in ("authorization", "x-api-key"))
     # The system prompt, the goal, and what is seen, with its budget; then what was done.
-    told = json.dumps(first["body"])
-    assert "You pilot a small drone" in told
+    assert "You pilot a small drone" in json.dumps(first["body"])
     assert "TARGET: red van" in texts_of(first)
     assert "step 0; 90 actions left" in texts_of(first)
     assert "YOUR LAST ACTIONS" not in texts_of(first)
@@ -83,8 +64,7 @@ def test_a_normal_answer_becomes_an_action(protocol: str) -> None:
     assert (depth == round(10 / 50 * 255)).all()
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_what_is_sent_follows_the_options(protocol: str) -> None:
+def test_what_is_sent_follows_the_options(protocol):
     with serving(Say(MOVE)) as service:
         views = ("front", "down")
         agent = agent_of(
@@ -98,9 +78,8 @@ def test_what_is_sent_follows_the_options(protocol: str) -> None:
     last = service.requests[-1]
     assert (last["body"]["max_tokens"], last["body"]["seed"]) == (99, 7)
     assert "temperature" not in last["body"]
-    assert [line for line in texts_of(last).splitlines() if line.startswith("- step")] == [
-        "- step 1: MoveForward3. Nothing here.", "- step 2: MoveForward3. Nothing here."
-    ]  # fmt: skip
+    done = [line.partition(":")[0] for line in texts_of(last).splitlines() if line.startswith("- step")]
+    assert done == ["- step 1", "- step 2"]
     # The goal's picture, that of the step before, and two views.
     assert [p.shape for p in pictures_of(last)] == [(8, 8, 3), (32, 32, 3), (32, 32, 3), (32, 32, 3)]
     assert [float(p.mean()) for p in pictures_of(last)] == pytest.approx([200, 0, 0, 40], abs=2)
@@ -108,25 +87,22 @@ def test_what_is_sent_follows_the_options(protocol: str) -> None:
     assert "depth" not in texts_of(last)
 
 
-@pytest.mark.parametrize(
-    ("protocol", "bad"),
-    [("openai", "Let me think. " + MOVE), ("openai", ""), ("anthropic", '{"action": "Fly"}'), ("anthropic", "")],
-)
-def test_an_unreadable_answer_gets_one_attempt_at_repair(protocol: str, bad: str) -> None:
+@pytest.mark.parametrize("bad", ["Let me think. " + MOVE, '{"action": "Fly"}', "", "half a pair \ud800"])
+def test_an_unreadable_answer_gets_one_attempt_at_repair(protocol, bad):
     with serving(Say(bad), Say(MOVE)) as service:
         agent = begun(protocol, service)
         assert agent.act(observation()) == FORWARD_3
-        assert agent.usage().requests == 2
-        assert agent.usage().input_tokens == 2000
+        usage = agent.usage()
+        assert (usage.requests, usage.input_tokens, usage.cost_usd) == (2, 2000, None), "no prices"
     messages = [m for m in service.requests[1]["body"]["messages"] if m["role"] != "system"]
     assert [m["role"] for m in messages] == ["user", "assistant", "user"]
+    assert bad.partition("\ud800")[0] in json.dumps(messages[1], ensure_ascii=False).replace('\\"', '"')
     with pytest.raises(InvalidAnswer) as refused:
         parse_answer(bad)
     assert f"This answer cannot be read: {refused.value}" in texts_of(service.requests[1])
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_what_cannot_be_read_is_said_never_guessed(protocol: str) -> None:
+def test_what_cannot_be_read_is_said_never_guessed(protocol):
     with serving(Say("I stop."), Say("Stop!"), Say(MOVE)) as service:
         agent = begun(protocol, service)
         with pytest.raises(InvalidAnswer, match="not one JSON object"):
@@ -139,22 +115,12 @@ def test_what_cannot_be_read_is_said_never_guessed(protocol: str) -> None:
 
 
 @pytest.mark.parametrize(("protocol", "error"), [("openai", AgentUnavailable), ("anthropic", InvalidAnswer)])
-def test_an_answer_that_the_filter_took_is_the_services(protocol: str, error: type[Exception]) -> None:
+def test_an_answer_that_the_filter_took_is_the_services(protocol, error):
     with serving(Filtered()) as service, pytest.raises(error):
         begun(protocol, service).act(observation())
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_half_a_surrogate_pair_goes_nowhere(protocol: str) -> None:
-    with serving(Say("\ud800 lost"), Say(MOVE)) as service:
-        agent = begun(protocol, service)
-        assert agent.act(observation()) == FORWARD_3
-        # It was shown again for repair.
-        assert "lost" in json.dumps(service.requests[1]["body"])
-        assert agent.usage().cost_usd is None, "no prices"
-
-
-def test_what_is_no_count_is_none() -> None:
+def test_what_is_no_count_is_none():
     bad = Raw(b'{"choices": [{"message": {"content": "x"}}], "usage": {"prompt_tokens": 1e400}}')
     with serving(bad) as service:
         agent = begun("openai", service)
@@ -167,31 +133,31 @@ def test_what_is_no_count_is_none() -> None:
         assert (agent.usage().input_tokens, agent.usage().cost_usd) == (None, None)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("form", ["json", "tool", "text"])
-def test_the_answer_is_asked_for_as_the_option_says(protocol: str, form: str) -> None:
-    answer = '{"thought": "so", "action": "MoveUp"}'
+FORMS = {
+    ("openai", "json"): lambda body: body["response_format"]["json_schema"]["schema"],
+    ("openai", "tool"): lambda body: body["tools"][0]["function"]["parameters"],
+    ("anthropic", "json"): lambda body: body["output_config"]["format"]["schema"],
+    ("anthropic", "tool"): lambda body: body["tools"][0]["input_schema"],
+    ("openai", "text"): None,
+    ("anthropic", "text"): None,
+}
+
+
+@pytest.mark.parametrize(("protocol", "form"), FORMS)
+def test_the_answer_is_asked_for_as_the_option_says(protocol, form):
+    answer, schema_in = '{"thought": "so", "action": "MoveUp"}', FORMS[protocol, form]
     with serving(Call(answer) if form == "tool" else Say(answer)) as service:
         agent = begun(protocol, service, answer=form, actions="eight", climb_m=2)
         assert agent.act(observation()) == ACTION_NAMES.index("MoveUp2")
         body = service.requests[0]["body"]
-    schema = agent.options.action_set.schema()
-    assert schema["properties"]["action"]["enum"][0] == "Stop"
-    asked = {
-        ("openai", "json"): lambda: body["response_format"]["json_schema"]["schema"],
-        ("openai", "tool"): lambda: body["tools"][0]["function"]["parameters"],
-        ("anthropic", "json"): lambda: body["output_config"]["format"]["schema"],
-        ("anthropic", "tool"): lambda: body["tools"][0]["input_schema"],
-    }
-    if form == "text":
+    if schema_in is None:
         assert not {"response_format", "tools", "output_config"} & set(body)
     else:
-        assert asked[protocol, form]() == schema
+        assert schema_in(body) == agent.options.action_set.schema()
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_the_check_settles_how_answers_are_asked_for(protocol: str) -> None:
-    def only(*refused: str) -> Any:
+def test_the_check_settles_how_answers_are_asked_for(protocol):
+    def only(*refused):
         return lambda body: Status(400, "unknown field") if set(refused) & set(body) else None
 
     with serving() as service:
@@ -217,8 +183,7 @@ def test_the_check_settles_how_answers_are_asked_for(protocol: str) -> None:
         assert agent.tells_tokens == (protocol == "anthropic")
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_the_key_stays_out_of_answers_and_logs(protocol: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_key_stays_out_of_answers_and_logs(protocol, caplog):
     echo = json.dumps({"thought": f"your key is {KEY}", "action": "Stop"})
     with caplog.at_level(logging.DEBUG), serving(Status(500), Say(echo), Say("no")) as service:
         agent = begun(protocol, service, request_retries=1)
@@ -234,8 +199,7 @@ def test_the_key_stays_out_of_answers_and_logs(protocol: str, caplog: pytest.Log
     assert KEY not in caplog.text
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_keys_come_from_the_environment(protocol: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keys_come_from_the_environment(protocol, monkeypatch):
     variable = f"{protocol.upper()}_API_KEY"
     with serving() as service:
         monkeypatch.delenv(variable)
@@ -256,27 +220,21 @@ def test_keys_come_from_the_environment(protocol: str, monkeypatch: pytest.Monke
     [
         ({}, "model"),
         ({"model": "m", "extra_body": "sk-live-0123456789abcdef0123"}, r"extra_body = .*\[redacted\]"),
-        ({"model": "m", "move_m": 2}, "move_m"),
-        ({"model": "m", "base_url": "http://[::1/v1"}, "base_url.*not a URL"),
         ({"model": "m", "modle": "x"}, "unknown key 'modle': did you mean 'model'"),
         ({"model": "m", "temperature": 3}, "temperature"),
-        ({"model": "m", "views": "front,back"}, "views"),
         ({"model": "m", "base_url": "ftp://x/v1"}, "base_url.*not a URL"),
         ({"model": "m", "base_url": "https://user:pw@x/v1"}, "base_url.*keys come from the environment"),
         ({"model": "m", "base_url": "https://x/v1?key=1"}, "base_url.*keys come from the environment"),
     ],
 )
-def test_wrong_options_are_named_in_one_line(options: dict[str, Any], message: str) -> None:
+def test_wrong_options_are_named_in_one_line(options, message):
     with pytest.raises(UsageError, match=message) as failure:
         load_agent("openai", **options)
     assert "\n" not in str(failure.value)
     assert ":pw@" not in str(failure.value)
 
 
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_a_missing_package_is_named_with_the_extra_that_has_it(
-    protocol: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_is_named_with_its_extra(protocol, monkeypatch):
     monkeypatch.setitem(sys.modules, protocol, None)
     with pytest.raises(MissingPackage, match=rf"lacks the package {protocol}: pip install 'aerialdojo-gen\[llm\]'"):
         load_agent(protocol, model="m")

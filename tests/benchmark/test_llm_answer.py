@@ -1,7 +1,5 @@
 """Answers of a model, read strictly; the prompt; the pictures."""
 
-from __future__ import annotations
-
 import base64
 import json
 
@@ -12,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerialdojo_gen.base.pictures import Picture, colour_picture, depth_picture
+from aerialdojo_gen.base.pictures import colour_picture, depth_picture
 from aerialdojo_gen.benchmark.agents.base import InvalidAnswer
 from aerialdojo_gen.benchmark.agents.goal import Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.llm.answer import SIXTEEN, eight, parse_answer
@@ -21,23 +19,15 @@ from aerialdojo_gen.benchmark.llm.prompt import Turn, goal_text, repair_text, st
 from aerialdojo_gen.store.schemas import ACTION_NAMES, APPROACH
 
 
-def test_every_action_is_read_and_approach_is_none() -> None:
-    said = [parse_answer(json.dumps({"thought": "so", "action": name})) for name in ACTION_NAMES[:16]]
-    assert [SIXTEEN.ids[answer.action] for answer in said] == list(range(16))
-    assert ACTION_NAMES[APPROACH] not in SIXTEEN.names
-
-
 @pytest.mark.parametrize(
     "text",
     [
-        '{"action": "Stop"}',
         '  \n{"action": "Stop"}\n',
         '```json\n{"action": "Stop"}\n```',
-        '```\n{"action": "Stop"}\n```',
         '<think>It is there.\n{"action": "MoveUp1"}</think>\n\n{"action": "Stop", "thought": "there"}',
     ],
 )
-def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
+def test_wrappings_that_are_not_part_of_the_answer_come_off(text):
     assert parse_answer(text).action == "Stop"
 
 
@@ -48,9 +38,6 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         ("Stop", "not one JSON object"),
         ('I would go on: {"action": "Stop"}', "not one JSON object"),
         ('{"action": "Stop"} That is all.', "not one JSON object"),
-        ('{"action": "Stop"}{"action": "MoveUp1"}', "not one JSON object"),
-        ('{"action": "Stop"', "not one JSON object"),
-        ("{'action': 'Stop'}", "not one JSON object"),
         ('["Stop"]', "JSON, but no object: list"),
         ("{}", "action: Field required"),
         ('{"action": 0}', "action: Input should be a valid string"),
@@ -69,7 +56,7 @@ def test_wrappings_that_are_not_part_of_the_answer_come_off(text: str) -> None:
         (" " * 20_001, "20,001 characters"),
     ],
 )
-def test_anything_else_is_refused_with_the_reason(text: str, why: str) -> None:
+def test_anything_else_is_refused_with_the_reason(text, why):
     with pytest.raises(InvalidAnswer, match=why.replace("(", r"\(")) as refused:
         parse_answer(text)
     # The reason goes back to the model, over HTTP.
@@ -77,7 +64,7 @@ def test_anything_else_is_refused_with_the_reason(text: str, why: str) -> None:
 
 
 @given(st.text(max_size=60) | st.recursive(st.none() | st.text(), st.lists, max_leaves=5).map(json.dumps))
-def test_no_text_is_guessed_at(text: str) -> None:
+def test_no_text_is_guessed_at(text):
     with pytest.raises(InvalidAnswer):
         parse_answer(text)
 
@@ -87,31 +74,25 @@ SEMANTIC = Goal("semantic", "red van", "clock tower", "northeast", "A red van by
 IMAGE = Goal("image", "red van", "clock tower", "northeast", None, np.zeros((4, 4, 3), np.uint8), RULES)
 
 
-def test_the_prompt_holds_what_appendix_a_asks_for() -> None:
+def test_the_prompt_holds_what_appendix_a_asks_for():
     told = system_prompt(SEMANTIC, Options(model="m"))
-    for name in SIXTEEN.names:
-        assert f"- {name}: " in told
-    assert "fly 5 m forward" in told
-    assert "turn 15° to the left" in told
-    assert "sink 2 m" in told
-    assert "wheelbase of 0.25 m" in told
-    assert "within 3 m" in told
-    assert "budget of 180 actions" in told
-    assert "black at 0 m to white at 50 m" in told
-    assert "640 x 640 pixels" in told
-    assert "picture of the step before is shown again" in told
-    assert "few metres" not in told
-    assert json.dumps(SIXTEEN.schema()) in told
+    for words in (
+        *(f"- {name}: " for name in ACTION_NAMES[:APPROACH]), "fly 5 m forward", "turn 15° to the left", "sink 2 m",
+        "wheelbase of 0.25 m", "within 3 m", "budget of 180 actions", "black at 0 m to white at 50 m",
+        "640 x 640 pixels", "picture of the step before is shown again", json.dumps(SIXTEEN.schema()),
+    ):  # fmt: skip
+        assert words in told
     assert "left (looks" not in told
     assert "Approach" not in told
     assert "depth" not in system_prompt(SEMANTIC, Options(model="m", depth=False))
     assert "shown again" not in system_prompt(SEMANTIC, Options(model="m", history_images=0))
-    # Its own example of an answer is one, once the blanks are filled.
-    example = told.splitlines()[-1].replace("<one name from the list above>", "TurnLeft15")
-    assert parse_answer(example).action == "TurnLeft15"
+    # Its own example of an answer is one, once the blanks are filled: with any of the actions.
+    for k, name in enumerate(ACTION_NAMES[:APPROACH]):
+        example = told.splitlines()[-1].replace("<one name from the list above>", name)
+        assert SIXTEEN.ids[parse_answer(example).action] == k
 
 
-def test_the_papers_eight_actions_have_common_magnitudes() -> None:
+def test_the_papers_eight_actions_have_common_magnitudes():
     actions = eight(5, 2)
     assert {name: ACTION_NAMES[k] for name, k in actions.ids.items()} == {
         "Stop": "Stop", "MoveForward": "MoveForward5", "MoveLeft": "MoveLeft5", "MoveRight": "MoveRight5",
@@ -127,14 +108,14 @@ def test_the_papers_eight_actions_have_common_magnitudes() -> None:
     assert 'Call the tool "act"' in system_prompt(SEMANTIC, options, "tool")
 
 
-def test_the_goal_is_told_as_its_modality_has_it() -> None:
+def test_the_goal_is_told_as_its_modality_has_it():
     assert goal_text(SEMANTIC).endswith("Description: A red van by a hedge.")
     for goal in (SEMANTIC, IMAGE):
         assert "TARGET: red van. It lies northeast of the landmark nearest to it: clock tower." in goal_text(goal)
     assert "None" not in goal_text(IMAGE)
 
 
-def test_a_step_tells_the_budget_the_history_and_a_refusal() -> None:
+def test_a_step_tells_the_budget_the_history_and_a_refusal():
     turns = [Turn(5, "MoveUp1", "Higher."), Turn(6, None)]
     said = step_text(Observation(7, 173, refused=True), turns)
     assert "- step 5: MoveUp1. Higher." in said
@@ -144,12 +125,13 @@ def test_a_step_tells_the_budget_the_history_and_a_refusal() -> None:
     assert step_text(Observation(0, 180), []).startswith("NOW: step 0; 180 actions left")
 
 
-def decoded(picture: Picture, flag: int) -> np.ndarray:
+def decoded(picture, flag):
     return cv2.imdecode(np.frombuffer(base64.b64decode(picture.base64), np.uint8), flag)
 
 
 @given(arrays(np.float32, (6, 9), elements=st.floats(0.0, 65.0, width=32)))
-def test_depth_comes_back_from_its_picture_as_the_prompt_says(depth_m: np.ndarray) -> None:
+def test_depth_comes_back_from_its_picture_as_the_prompt_says(depth_m):
+    depth_m[0, 0] = np.inf
     grey = decoded(depth_picture(depth_m, 50.0, 64), cv2.IMREAD_UNCHANGED)
     assert (grey.shape, grey.dtype) == (depth_m.shape, np.uint8)
     near = (depth_m > 0) & (depth_m < 50)
@@ -157,7 +139,7 @@ def test_depth_comes_back_from_its_picture_as_the_prompt_says(depth_m: np.ndarra
     assert (grey[(depth_m == 0) | (depth_m >= 50)] == 255).all()
 
 
-def test_pictures_keep_their_colours_and_are_scaled_down_but_never_up() -> None:
+def test_pictures_keep_their_colours_and_are_scaled_down_but_never_up():
     rgb = np.zeros((100, 200, 3), np.uint8)
     rgb[:, :100] = (250, 10, 10)
     small = cv2.cvtColor(decoded(colour_picture(rgb, 50), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
@@ -166,5 +148,3 @@ def test_pictures_keep_their_colours_and_are_scaled_down_but_never_up() -> None:
     assert np.abs(small[12, 45].astype(int)).max() < 12
     assert decoded(colour_picture(rgb, 640), cv2.IMREAD_COLOR).shape == (100, 200, 3)
     assert colour_picture(rgb, 50).data_url.startswith("data:image/jpeg;base64,/9j/")
-    far = np.full((10, 10), np.inf, np.float32)
-    assert (decoded(depth_picture(far, 50.0, 64), cv2.IMREAD_UNCHANGED) == 255).all()

@@ -1,28 +1,24 @@
 """The report of a log written by hand: two agents and a floor, four families, both partitions; figures by hand."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 from support.run_logs import episode
 
 from aerialdojo_gen.base import rng
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.base.paper_figures import results
 from aerialdojo_gen.base.table_formats import as_text
-from aerialdojo_gen.base.text_table import BEST, SECOND, TextTable
+from aerialdojo_gen.base.text_table import BEST, SECOND
 from aerialdojo_gen.benchmark import intervals, paired, registry, score_rows
 from aerialdojo_gen.benchmark.metrics import PROFILES, summarize
-from aerialdojo_gen.benchmark.runs import Run, group_runs, load_runs, with_baselines
+from aerialdojo_gen.benchmark.runs import group_runs, load_runs, with_baselines
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
@@ -52,44 +48,34 @@ LOG = {
 SCENES = ["U_Mall_0", "U_Mall_1", "N_Coast_0", "N_Coast_1", "I_Harbor_0", "I_Harbor_1", "D_Flood_0", "D_Flood_1"]
 
 
-def write(data: Path, run: str, agent: str, ends: list[str], more: str = "") -> None:
+def write(data, run, agent, ends, more=""):
     for scene, codes in zip(SCENES, ends, strict=True):
-        rows: list[dict[str, Any]] = []
-        steps: list[dict[str, Any]] = []
+        euclidean_m, rows, steps = 8.0 if scene.endswith("_0") else 9.0, [], []
         for k, code in enumerate(codes + more):
             final_m, least_m, how = ENDS[code]
-            row = episode(run, "random", scene, k, rng.generator(0, "known-log"))
-            euclidean_m = 8.0 if scene.endswith("_0") else 9.0
-            row |= {
+            row = episode(run, "random", scene, k, rng.generator(0, "known-log")) | {
                 "agent": agent, "setting": "base", "action_budget": 90, "stop_called": how == "stop",
                 "collision": how == "collision", "termination": how, "final_distance_m": final_m,
                 "min_distance_m": least_m, "final_horizontal_distance_m": final_m,
                 "min_horizontal_distance_m": least_m, "path_length_m": 12.5, "reference_length_m": 10.0,
                 "euclidean_m": euclidean_m, "n_actions": 90 if how == "budget" else 7,
                 "success": how == "stop" and final_m <= 3.0, "oracle_success": least_m <= 3.0,
+                "start_x_m": 0.0, "start_y_m": 0.0, "start_z_m": euclidean_m,
             }  # fmt: skip
-            # The goal is at the origin: from (−2, 2.8) to (2, 2.8), then away to (10, 0).
-            start = (0.0, 0.0, euclidean_m)
-            ways = [(-2.0, 2.8, 0.0), (2.0, 2.8, 0.0), (10.0, 0.0, 0.0)] if code == "P" else [start]
-            row |= dict(zip(("start_x_m", "start_y_m", "start_z_m"), start, strict=True))
             rows.append(row)
+            # The goal is at the origin: from (−2, 2.8) to (2, 2.8), then away to (10, 0).
+            past = [(-2.0, 2.8, 0.0), (2.0, 2.8, 0.0), (10.0, 0.0, 0.0)]
+            own = {"run_id": run, "task_id": row["task_id"], "scene": scene, "action": 1, "refused": False}
             steps += [
-                {
-                    "run_id": run, "task_id": row["task_id"], "scene": scene, "step": n, "action": 1,
-                    "refused": False,
-                    "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.0, "distance_m": math.hypot(x, y, z),
-                    "answer": None,
-                }
-                for n, (x, y, z) in enumerate(ways)
-            ]  # fmt: skip
-        for table, spec, written in (
-            ("episodes", schemas.EPISODES, rows), ("steps", schemas.STEPS, steps), ("failures", schemas.FAILURES, [])
-        ):  # fmt: skip
-            store.write_shard(data, table, scene, 0, from_rows(spec, written), run=run)
+                own | {"step": n, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.0, "distance_m": math.hypot(x, y, z)}
+                for n, (x, y, z) in enumerate(past if code == "P" else [(0.0, 0.0, euclidean_m)])
+            ]
+        for spec, written in ((schemas.EPISODES, rows), (schemas.STEPS, steps), (schemas.FAILURES, [])):
+            store.write_shard(data, spec.name, scene, 0, from_rows(spec, written), run=run)
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def log(tmp_path_factory):
     data = tmp_path_factory.mktemp("known")
     write(data, "alpha", "package:Alpha", LOG["alpha"])
     write(data, "beta", "package:Beta", LOG["beta"])
@@ -99,38 +85,37 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def runs(log: Path) -> list[Run]:
+def runs(log):
     return group_runs(with_baselines(log, load_runs(log, ["alpha", "beta"])))
 
 
-def made(name: str, runs: list[Run], data: Path = Path("no-release"), **options: Any) -> TextTable:
+def made(name, runs, data=Path("no-release"), **options):
     (table,) = registry.report_tables(ReportRequest(open_root(data), runs, [AT_3], **options), [name])
     return table
 
 
-def cells(table: TextTable, label: str) -> tuple[str, ...]:
+def cells(table, label):
     return next(row for name, row in table.rows if name == label)
 
 
-def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log: Path, runs: list[Run]) -> None:
+def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
     assert [(run.name, run.group, len(run.episodes)) for run in runs] == [
         ("alpha", "agents", 18), ("beta", "agents", 18), ("floor", "baselines", 18)
     ]  # fmt: skip
     # Of the floor's own tasks, alpha has flown a part: it is no floor's business.
     alone = with_baselines(log, load_runs(log, ["floor"]))
     assert [run.name for run in alone] == ["floor"]
-    write(log.parent / "other", "alpha", "package:Alpha", LOG["alpha"], more="M")
-    write(log.parent / "other", "floor", "stop", LOG["stop"])
-    assert [run.name for run in with_baselines(log.parent / "other", load_runs(log.parent / "other", ["alpha"]))] == [
-        "alpha"
-    ]
+    other = log.parent / "other"
+    write(other, "alpha", "package:Alpha", LOG["alpha"], more="M")
+    write(other, "floor", "stop", LOG["stop"])
+    assert [run.name for run in with_baselines(other, load_runs(other, ["alpha"]))] == ["alpha"]
     groups = {"open": ["alpha"], "closed": ["package:Beta"]}
     assert [run.group for run in group_runs(runs, groups)] == ["open", "closed", "baselines"]
     with pytest.raises(UsageError, match="group 'open': no run 'gamma': there are alpha, beta, floor"):
         group_runs(runs, {"open": ["gamma"]})
 
 
-def test_tables_4_and_5(runs: list[Run]) -> None:
+def test_tables_4_and_5(runs):
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
     overall, table = registry.report_tables(request)
     assert overall.title == "Overall"
@@ -171,7 +156,17 @@ def test_tables_4_and_5(runs: list[Run]) -> None:
     assert max(map(len, text.splitlines())) <= 120
 
 
-def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) -> None:
+def test_tables_of_parts(runs, log):
+    # Episodes outside the malls: Natural ¼, Infrastructure ½, Disaster 0.
+    overall = made("overall", runs)
+    assert "without the two malls (33 % of the episodes)" in overall.sections.values()
+    outside = [row for name, row in overall.rows if name == "package:Alpha"][-1]
+    assert (outside[:2], outside[2].split(" ± ")[0]) == (("12", "none"), "25.00")
+    assert cells(made("family", runs), "package:Alpha")[::5] == ("12.50", "25.00", "50.00", "0.00")
+    assert cells(made("scene", runs), "U_Mall_0")[0] == "25.00"
+    setting, modality = (made(name, runs) for name in ("setting", "modality"))
+    assert [head for head, _ in setting.groups] == ["Base", "Standard", "Long-Horizon"]
+    assert cells(setting, "package:Alpha")[::5] == ("21.88", "–", "–")
     # ID scenes: ¼, ½, 0, 0; OOD scenes: 0, 0, 1, 0.
     partition = cells(made("partition", runs), "package:Alpha")
     assert (partition[0], partition[5], partition[10]) == ("18.75", "25.00", "+6.25")
@@ -180,6 +175,7 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
     # Semantic goals: Mall_0 1 of 2, Coast_0 1, Harbor_1 1; image goals: Harbor_1 1.
     goal = cells(made("goal", runs), "package:Alpha")
     assert (goal[0], goal[5], goal[10]) == ("31.25", "12.50", "−18.75")
+    assert cells(modality, "package:Alpha") == goal[:10]
     # 4 of 18 tasks, 10 of 18 visits.
     average = cells(made("averages", runs), "package:Alpha")
     assert (average[0], average[5], average[1], average[6]) == ("21.88", "22.22", "59.38", "55.56")
@@ -201,7 +197,7 @@ def test_partitions_goals_averages_and_difficulty(runs: list[Run], log: Path) ->
     assert cells(seen, "package:Alpha")[0] == "31.25"
 
 
-def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> None:
+def test_radii_gains_reversals_and_what_lies_between_poses(runs):
     table = made("radius", runs, radii_m=(5.0, 3.0))
     heads = [f"{group} {name}" for group, names in table.groups for name in names]
     alpha, beta = (dict(zip(heads, cells(table, f"package:{name}"), strict=True)) for name in ("Alpha", "Beta"))
@@ -223,7 +219,7 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs: list[Run]) -> N
     assert min(runs[0].path_clearance_to_goal_m[runs[0].episodes.scene == "N_Coast_1"]) == pytest.approx(2.8)
 
 
-def test_a_log_without_steps_has_no_distances_along_the_way(log: Path, tmp_path: Path) -> None:
+def test_a_log_without_steps_has_no_distances_along_the_way(log, tmp_path):
     write(tmp_path, "alpha", "package:Alpha", LOG["alpha"])
     store.shard_path(tmp_path, "steps", "U_Mall_1", run="alpha").unlink()
     (run,) = load_runs(tmp_path)
@@ -231,19 +227,17 @@ def test_a_log_without_steps_has_no_distances_along_the_way(log: Path, tmp_path:
     assert not any("along the way" in group for group, _ in made("radius", [run]).groups)
 
 
-def test_a_paired_comparison_is_of_common_tasks_and_exact(log: Path, runs: list[Run]) -> None:
+def test_a_paired_comparison_is_of_common_tasks_and_exact(log, runs):
     table = paired.paired_tables(runs[:2], [AT_3])[0]
     row = cells(table, "SR ↑")
     # Scene by scene beta solves ¼ less, ½ more and 1 less: of the eight signs of these, six make as much as 0.75.
-    assert row[:3] == ("21.88", "12.50", "−9.38")
-    assert row[4] == "0.750"
+    assert (*row[:3], row[4]) == ("21.88", "12.50", "−9.38", "0.750")
     # alpha alone solves three, beta alone one: 2 · (1 + 4) / 16.
     assert "alone: 3; by package:Beta alone: 1 (McNemar's exact p 0.625" in table.notes[1]
     assert table.notes[0].startswith("18 tasks of 8 scenes")
     # In the other order the same with the sign turned round.
-    back = paired.paired_tables(runs[1::-1], [AT_3])[0]
-    assert cells(back, "SR ↑")[2] == "+9.38"
-    assert cells(back, "SR ↑")[4] == "0.750"
+    back = cells(paired.paired_tables(runs[1::-1], [AT_3])[0], "SR ↑")
+    assert (back[2], back[4]) == ("+9.38", "0.750")
     whole = load_runs(log, ["floor", "alpha"])
     assert paired.paired_tables(whole, [AT_3])[0].notes[0].startswith("18 tasks")
     with pytest.raises(UsageError, match="two runs, not 3"):
@@ -253,24 +247,17 @@ def test_a_paired_comparison_is_of_common_tasks_and_exact(log: Path, runs: list[
         paired.paired_tables(apart, [AT_3])
 
 
-def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
+def test_intervals_are_the_exact_ones(runs):
     found = intervals.score_intervals(summarize(runs[0].episodes, AT_3))
     families = [part[:, 0].tolist() for part in intervals.scene_scores(summarize(runs[0].episodes, AT_3))]
     assert families == [[0.25, 0.0], [0.5, 0.0], [0.0, 1.0], [0.0, 0.0]]
     # Every draw of two scenes a family, all alike likely.
-    means = sorted(
-        sum(sum(draw) / 2 for draw in drawn) / 4
-        for drawn in product(*(list(product(scenes, repeat=2)) for scenes in families))
-    )
+    draws = product(*(list(product(scenes, repeat=2)) for scenes in families))
+    means = sorted(sum(sum(draw) / 2 for draw in drawn) / 4 for drawn in draws)
     low, high = found[0]
     assert np.mean(np.array(means) < low - 1e-9) <= 0.03 <= 0.2
     assert low == pytest.approx(np.quantile(means, 0.025), abs=0.016)
     assert high == pytest.approx(np.quantile(means, 0.975), abs=0.016)
-    theirs = stats.bootstrap(
-        tuple(np.array(part) for part in families), lambda *parts: sum(np.mean(p) for p in parts) / len(parts),
-        method="percentile", n_resamples=4000, vectorized=False, rng=np.random.default_rng(5),
-    ).confidence_interval  # fmt: skip
-    assert (low, high) == (pytest.approx(theirs.low, abs=0.016), pytest.approx(theirs.high, abs=0.016))
     np.testing.assert_equal(found, intervals.score_intervals(summarize(runs[0].episodes, AT_3)))
     # The log does not say SR-view: that has no interval, and the others have theirs.
     assert [math.isnan(low) for low, _ in found] == [False, True, False, False, False, False]
@@ -279,7 +266,7 @@ def test_intervals_are_scipys_and_the_exact_ones(runs: list[Run]) -> None:
     assert all(math.isnan(end) for ends in intervals.score_intervals(summarize(one, AT_3)) for end in ends)
 
 
-def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
+def test_tables_are_chosen_by_name(log, runs):
     wanted = ReportRequest(open_root(log), runs, [AT_3, AT_5])
     titles = [table.title for table in registry.report_tables(wanted, ["visits", "overall", "visits"])]
     assert titles == ["Overall", "Where visits are lost, 3 m"]
@@ -288,7 +275,7 @@ def test_tables_are_chosen_by_name(log: Path, runs: list[Run]) -> None:
         registry.report_tables(wanted, ["visit"])
 
 
-def test_the_csv_has_the_papers_rows_beside_ours(runs: list[Run]) -> None:
+def test_the_csv_has_the_papers_rows_beside_ours(runs):
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
     rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
     keys = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name")

@@ -11,8 +11,8 @@ from aerialdojo_gen import make_env
 from aerialdojo_gen.base.errors import UsageError
 from aerialdojo_gen.benchmark.tasks import TaskSampler, mesh_of
 from aerialdojo_gen.learning.vector import OwnScenes
+from aerialdojo_gen.scenes import context
 from aerialdojo_gen.scenes.context import context_of, open_contexts, open_scene, prefetch_mesh, release_scene
-from aerialdojo_gen.scenes.context import release_scenes as let_go
 from aerialdojo_gen.store.root import open_root
 
 YARDS = ("U_Courtyard_0", "U_Courtyard_1")
@@ -21,75 +21,56 @@ BLIND = {"views": (), "rgb": False, "depth": False}
 
 @pytest.fixture(autouse=True)
 def nothing_open():
-    let_go()
+    context.release_scenes()
     yield
-    let_go()
+    context.release_scenes()
 
 
-def flown(env, episodes, seed=3):
-    """The tasks that are drawn, and what is seen after a step of each."""
-    ids, seen = [], []
+def flown(smoke, episodes=8, seed=3, **options):
+    """Tasks that an environment draws, and what is seen after a step of each."""
+    env, seen = make_env(smoke, **options), []
     for k in range(episodes):
-        env.reset(seed=seed if k == 0 else None)
-        ids.append(env.task.row["task_id"])
-        seen.append((env.task.row["scene"], env.step(14)[0]))
-    return ids, seen
+        env.reset(seed=None if k else seed)
+        seen.append((env.task.row, env.step(14)[0]))
+    env.close()
+    return seen
 
 
 def test_reading_ahead_changes_no_task_and_no_picture(smoke):
-    options = {"views": "front", "width": 48, "height": 48, "episodes_per_scene": 2}
-    plain = make_env(smoke, scenes_in_memory=1, **options)
-    ids, seen = flown(plain, 12)
-    plain.close()
-    ahead = make_env(smoke, scenes_in_memory=1, prefetch=True, **options)
-    again, there = flown(ahead, 12)
-    ahead.close()
-    assert ids == again
-    assert {scene for scene, _ in seen} == set(YARDS), "the draw goes from one to the other"
-    for (_, one), (_, other) in zip(seen, there, strict=True):
-        assert (one["rgb"]["front"] == other["rgb"]["front"]).all()
-        assert (one["depth_m"]["front"] == other["depth_m"]["front"]).all()
+    options = {"views": "front", "width": 48, "height": 48, "episodes_per_scene": 2, "scenes_in_memory": 1}
+    plain, ahead = (flown(smoke, 10, prefetch=prefetch, **options) for prefetch in (False, True))
+    assert {task["scene"] for task, _ in plain} == set(YARDS), "the draw goes from one to the other"
+    np.testing.assert_equal(ahead, plain)
 
 
 def test_one_episode_a_scene_is_the_draw_of_old(smoke):
-    env = make_env(smoke, **BLIND)
-    ids, _ = flown(env, 8)
     draw = np.random.Generator(np.random.PCG64(np.random.SeedSequence(3)))
-    rows = env._rows["task_id"].to_pylist()
-    assert ids == [rows[int(draw.integers(len(rows)))] for _ in range(8)]
+    ids = make_env(smoke, **BLIND)._rows["task_id"].to_pylist()
+    assert [task["task_id"] for task, _ in flown(smoke, **BLIND)] == [ids[draw.integers(len(ids))] for _ in range(8)]
 
 
 @pytest.mark.parametrize("run_length", [1, 2, 5])
 def test_episodes_come_in_blocks_of_a_scene_and_all_tasks_as_often(run_length):
     scenes = ["a"] * 6 + ["b"] * 3 + ["c"]
     tasks, draw = TaskSampler(scenes, run_length), np.random.default_rng(0)
-    drawn = [tasks.next(draw) for _ in range(20_000)]
-    for k in range(0, len(drawn), run_length):
-        assert len({scenes[at] for at in drawn[k : k + run_length]}) == 1
+    assert tasks.coming is None
+    drawn, coming = zip(*((tasks.next(draw), tasks.coming) for _ in range(20_000)), strict=True)
+    blocks = [{scenes[at] for at in drawn[k : k + run_length]} for k in range(0, len(drawn), run_length)]
+    assert blocks[1:] == [{scene} for scene in coming[:-run_length:run_length]], "what comes is known"
     counts = Counter(drawn)
     # Blocks of five make a fifth as many independent draws of a scene: four standard deviations of that.
     off = 4.0 * np.sqrt(len(drawn) * run_length / len(scenes))
     assert all(abs(counts[at] - len(drawn) / len(scenes)) < off for at in range(len(scenes)))
 
 
-def test_what_comes_is_known_and_a_seed_begins_anew():
-    tasks = TaskSampler(["a", "b", "c", "d"] * 5, 3)
-    assert tasks.coming is None
-    first = np.random.default_rng(1)
-    for _ in range(30):
-        tasks.next(first)
-        coming = tasks.coming
-        for _ in range(2):
-            tasks.next(first)
-        assert tasks._scenes[tasks.next(first)] == coming
-        for _ in range(2):
-            tasks.next(first)
-    tasks.restart()
-    once = [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
-    tasks.restart()
-    assert once == [tasks.next(draw) for draw in [np.random.default_rng(7)] for _ in range(9)]
+def test_a_seed_begins_anew_and_scenes_can_be_chosen():
+    tasks, drawn = TaskSampler(["a", "b", "c", "d"] * 5, 3), []
+    for _ in range(2):
+        tasks.restart()
+        draw = np.random.default_rng(7)
+        drawn.append([tasks.next(draw) for _ in range(10)])
+    assert drawn[0] == drawn[1]
     tasks.restrict(["b"])
-    draw = np.random.default_rng(0)
     assert {tasks._scenes[tasks.next(draw)] for _ in range(20)} == {"b"}
     with pytest.raises(UsageError, match="in e"):
         tasks.restrict(["e"])
@@ -100,8 +81,6 @@ def test_scenes_stay_open_as_many_as_were_asked_for(smoke):
     digests = {mesh_of(root, scene)[1]: scene for scene in YARDS}
 
     def kept():
-        from aerialdojo_gen.scenes import context
-
         return [digests[key] for key in context._contexts if key in digests]
 
     ids = make_env(smoke, **BLIND)._rows.select(["task_id", "scene"]).to_pylist()
@@ -130,8 +109,8 @@ def test_what_is_read_ahead_is_taken_up_and_keeps_nobody_waiting(smoke):
     here, there = (mesh_of(root, scene) for scene in YARDS)
     begun, go_on, made = threading.Event(), threading.Event(), []
 
-    def make(context):
-        context.part("slow", lambda: (begun.set(), go_on.wait(60), made.append(context)))
+    def make(own):
+        own.part("slow", lambda: (begun.set(), go_on.wait(60), made.append(own)))
 
     ahead = threading.Thread(target=prefetch_mesh, args=(*there, make), daemon=True)
     ahead.start()
@@ -139,9 +118,9 @@ def test_what_is_read_ahead_is_taken_up_and_keeps_nobody_waiting(smoke):
     worked = threading.Event()
 
     def work():
-        context = open_scene(*here, 1)
-        context.part("quick", lambda: 1)
-        assert context_of(context.scene) is context
+        quick = open_scene(*here, 1)
+        quick.part("quick", lambda: 1)
+        assert context_of(quick.scene) is quick
         open_scene(*here, 1)
         worked.set()
 
@@ -164,8 +143,8 @@ def test_a_closed_environment_says_so_and_leaves_no_thread(smoke):
     before = threading.active_count()
     env = make_env(smoke, prefetch=True, **BLIND)
     env.reset(seed=0)
-    env.close()
-    env.close()
+    for _ in range(2):
+        env.close()
     assert threading.active_count() == before
     assert not open_contexts()
     with pytest.raises(RuntimeError, match="closed: make another"):

@@ -1,69 +1,55 @@
 """SR-view: a Stop at any viewpoint with the target in sight is a success, one behind a wall is none."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
 import shutil
-from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.extended import without_columns
-from support.walled import SCENE, VIEWPOINTS, walled, write_walled
+from support.walled import VIEWPOINTS, walled, write_walled
 
 from aerialdojo_gen.base.errors import StoreError, UsageError
-from aerialdojo_gen.base.safe_parse import loads_json
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.flight import view_of
 from aerialdojo_gen.benchmark.metrics import PROFILES
 from aerialdojo_gen.benchmark.registry import report_tables
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
-from aerialdojo_gen.benchmark.score_rows import as_csv, as_json
+from aerialdojo_gen.benchmark.score_rows import as_csv
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.rendering.casters import in_sight
-from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
 AT_3, AT_5 = PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]
 NEW = ("success_view", "viewpoint_distance_m", "target_in_sight", "told")
 
 
-def flown(data: Path, out: Path, actions: str, run: str = "r") -> pd.DataFrame:
+def flown(data, out, actions, run="r"):
     evaluate(data, Evaluation(run, "constant", {"actions": actions}), out=out)
     return read_run(out, run).to_pandas().set_index("nav_id")
 
 
-def test_behind_a_wall_and_above_a_roof_the_papers_rule_sees_success_and_a_person_none(
-    court: Path, tmp_path: Path
-) -> None:
+def test_a_stop_is_judged_by_sight_and_by_any_viewpoint(court, tmp_path):
+    # Behind a wall and above a roof the paper's rule sees success, and a person none.
     rows = flown(court, tmp_path, "Stop")
-    for nav_id in ("behind", "above"):
-        row = rows.loc[nav_id]
-        assert row.final_distance_m <= 3.0
-        assert (row.success, row.target_in_sight, row.success_view) == (True, False, False)
-    assert (rows.loc["open"].success, rows.loc["open"].success_view) == (False, False)
-    assert rows.loc["open"].target_in_sight
-
-
-def test_before_another_side_of_the_target_a_stop_is_a_success_at_a_viewpoint(court: Path, tmp_path: Path) -> None:
+    assert (rows.final_distance_m[["behind", "above"]] <= 3.0).all()
+    told = rows.loc[["behind", "above", "open"], ["success", "target_in_sight", "success_view"]].to_numpy().tolist()
+    assert told == [[True, False, False]] * 2 + [[False, True, False]]
     # Facing west, round the southern end of the wall and under the roof to the crate's western side.
-    row = flown(court, tmp_path, "MoveLeft5,MoveForward5,MoveForward1,MoveForward1,MoveRight3,Stop").loc["behind"]
+    way = "MoveLeft5,MoveForward5,MoveForward1,MoveForward1,MoveRight3,Stop"
+    row = flown(court, tmp_path, way, "around").loc["behind"]
     assert row.final_distance_m == pytest.approx(math.dist((-3.0, -2.0, 0.5), VIEWPOINTS[0]))
     assert row.viewpoint_distance_m == pytest.approx(2.5)
     assert (row.success, row.target_in_sight, row.success_view) == (False, True, True)
 
 
-def test_no_stop_and_a_collision_are_no_success_however_near(court: Path, tmp_path: Path) -> None:
+def test_no_stop_and_a_collision_are_no_success_however_near(court, tmp_path):
     spun = flown(court, tmp_path, ",".join(["TurnLeft15"] * 90), "spun")
     assert (spun.termination == "budget").all()
     assert not spun.success_view.any()
@@ -82,7 +68,7 @@ places = st.tuples(st.floats(-11, 11), st.floats(-11, 11), st.floats(0.1, 7.9))
 BOXES = [((2.6, -3.0, 0.0), (2.7, 3.0, 5.0)), ((-4.0, -4.0, 2.6), (2.6, 4.0, 2.7))]
 
 
-def meets(p: np.ndarray, q: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> np.ndarray:
+def meets(p, q, low, high):
     """Whether segments from p to every q pass through a box, by its slabs."""
     d = np.where(np.abs(q - p) < 1e-12, 1e-12, q - p)
     a, b = (np.array(low) - p) / d, (np.array(high) - p) / d
@@ -92,30 +78,27 @@ def meets(p: np.ndarray, q: np.ndarray, low: tuple[float, ...], high: tuple[floa
 
 @given(places)
 @settings(max_examples=120)
-def test_in_sight_is_what_solid_geometry_says(place: tuple[float, float, float]) -> None:
-    p = np.array(place)
+def test_in_sight_is_what_solid_geometry_says(place):
     # Every point of the crate's surface, densely.
     side = np.linspace(-0.5, 0.5, 15)
     u, v = (w.ravel() for w in np.meshgrid(side, side))
     faces = [np.insert(np.column_stack([u, v]), axis, value, axis=1) for axis in range(3) for value in (-0.5, 0.5)]
     surface = np.concatenate(faces) + np.array([0.0, 0.0, 0.5])
-    free = np.ones(len(surface), dtype=bool)
-    for low, high in BOXES:
-        free &= ~meets(p, surface, low, high)
-    inside = any(all(a - 0.05 <= v <= b + 0.05 for a, v, b in zip(*ends, strict=True))
-                 for ends in ((low, place, high) for low, high in BOXES))  # fmt: skip
-    if inside or all(abs(v) <= 0.55 for v in (p[0], p[1], p[2] - 0.5)):
-        return
-    if free.mean() == 0.0:
+    p = np.array(place)
+    crate = ((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0))
+    for low, high in np.array([*BOXES, crate]):
+        assume(((p < low - 0.05) | (p > high + 0.05)).any())
+    seen = ~np.any([meets(p, surface, *ends) for ends in BOXES], axis=0)
+    if not seen.any():
         assert not in_sight(_WALLED, "crate", place)
-    elif free.mean() > 0.1:
+    elif seen.mean() > 0.1:
         assert in_sight(_WALLED, "crate", place)
 
 
 _WALLED = walled()
 
 
-def test_the_goal_is_a_viewpoint_in_any_case_and_a_node_that_is_not_there_is_named() -> None:
+def test_the_goal_is_a_viewpoint_in_any_case_and_a_node_that_is_not_there_is_named():
     view = view_of(_WALLED, "crate", np.empty((0, 3)), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
     assert (view.viewpoint_distance_m, view.target_in_sight) == (2.0, True)
     farther = view_of(_WALLED, "crate", np.array([[9.0, 9.0, 0.5]]), (1.5, 0.0, 0.5), (1.5, 2.0, 0.5))
@@ -124,11 +107,9 @@ def test_the_goal_is_a_viewpoint_in_any_case_and_a_node_that_is_not_there_is_nam
         in_sight(_WALLED, "barrel", (0.0, 0.0, 5.0))
 
 
-def test_a_release_without_viewpoints_has_no_such_rate_and_says_so_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    data = write_walled(tmp_path / "older", viewpoints=False)
-    evaluate(data, Evaluation("r", "stop"), reporter=Reporter())
+def test_a_release_without_viewpoints_has_no_such_rate_and_with_them_is_other_data(court, tmp_path, capsys):
+    data, job = write_walled(tmp_path, viewpoints=False), Evaluation("r", "stop")
+    evaluate(data, job, reporter=Reporter())
     said = [line for line in capsys.readouterr().err.splitlines() if "viewpoints/" in line]
     assert said == ["the release has no viewpoints/, which an older version did not write: SR-view stays empty"]
     rows = read_run(data, "r")
@@ -136,68 +117,48 @@ def test_a_release_without_viewpoints_has_no_such_rate_and_says_so_once(
     (overall,) = report_tables(ReportRequest(open_root(data), load_runs(data), [AT_3]), ["overall"])
     assert "SR-view ↑" not in overall.groups[1][1]
     assert any(note.startswith("No SR-view of stop: flown by an older version or on a") for note in overall.notes)
-
-
-def test_a_release_that_gains_viewpoints_is_other_data(tmp_path: Path) -> None:
-    data = write_walled(tmp_path / "data", viewpoints=False)
-    job = Evaluation("r", "stop", selection=Selection(limit=1))
-    evaluate(data, job, out=tmp_path / "out")
-    anchors = write_walled(tmp_path / "other")
-    shutil.copytree(anchors / "release" / "viewpoints", data / "release" / "viewpoints")
+    shutil.copytree(court / "release" / "viewpoints", data / "release" / "viewpoints")
     with pytest.raises(UsageError, match="run 'r' was begun with other data"):
-        evaluate(data, job, out=tmp_path / "out")
+        evaluate(data, job)
 
 
 @pytest.fixture(scope="module")
-def viewed_smoke(smoke: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def viewed_smoke(smoke, tmp_path_factory):
     """The log of three agents on the smoke release."""
     out = tmp_path_factory.mktemp("viewed")
     for agent in ("oracle", "random", "constant"):
-        evaluate(smoke, Evaluation(agent, agent, selection=Selection(modalities=("semantic",), limit=150)), out=out)
+        evaluate(smoke, Evaluation(agent, agent, selection=Selection(modalities=("semantic",), limit=60)), out=out)
     return out
 
 
-def test_relations_hold_on_real_episodes(viewed_smoke: Path) -> None:
-    runs = load_runs(viewed_smoke)
-    for run in runs:
+def test_relations_hold_on_real_episodes(viewed_smoke):
+    for run in load_runs(viewed_smoke):
         rows = run.table.to_pandas()
         near = rows.viewpoint_distance_m <= 3.0
         assert (rows.viewpoint_distance_m <= rows.final_distance_m + 1e-12).all()
         assert (rows.success_view == ((rows.termination == "stop") & near & rows.target_in_sight)).all()
-        assert rows.success_view[rows.success & rows.target_in_sight].all()
-        assert not (rows.success_view & rows.collision).any()
-    oracle = next(run for run in runs if run.agent == "oracle").table.to_pandas()
-    assert oracle.success.all()
-    assert oracle.target_in_sight.mean() > 0.95
+        if run.agent == "oracle":
+            assert rows.success.all()
+            assert rows.target_in_sight.mean() > 0.95
 
 
-def test_the_report_has_it_beside_sr_with_intervals(viewed_smoke: Path) -> None:
-    runs = load_runs(viewed_smoke, ["random", "constant"])
+def test_the_report_has_it_beside_sr_with_intervals(viewed_smoke):
+    runs = load_runs(viewed_smoke, ["random"])
     wanted = ReportRequest(open_root(viewed_smoke), runs, [AT_3, AT_5])
     for table in report_tables(wanted, ["overall", "results", "family", "goal", "difficulty"]):
         heads = [head for _, names in table.groups for head in names if head in ("SR ↑", "SR-view ↑")]
-        assert heads.count("SR-view ↑") == heads.count("SR ↑")
-        assert all(after == "SR-view ↑" for before, after in pairwise(heads) if before == "SR ↑")
-    rows = {
-        (row["run"], row["profile"], row["scope"], row["setting"], row["modality"]): row
-        for row in csv.DictReader(io.StringIO(as_csv(wanted)))
-        if row["scope"] == "overall"
-    }
-    scenes = runs[0].table.to_pandas().groupby("scene").success_view.mean()
-    row = rows["random", "aerialdojo", "overall", "all", "all"]
+        assert heads[::2] == ["SR ↑"] * (len(heads) // 2)
+        assert heads[1::2] == ["SR-view ↑"] * (len(heads) // 2)
+    rows = [row for row in csv.DictReader(io.StringIO(as_csv(wanted))) if row["scope"] == "overall"]
+    at_3, at_5 = (row for row in rows if row["setting"] == row["modality"] == "all")
     # The smoke scenes are of one family.
-    assert float(row["sr_view"]) == pytest.approx(scenes.mean())
-    assert float(row["sr_view_low95"]) <= float(row["sr_view"]) <= float(row["sr_view_high95"])
-    assert float(rows["random", "aerialdojo-5m", "overall", "all", "all"]["sr_view"]) >= float(row["sr_view"])
-    same = [
-        r
-        for r in loads_json(as_json(replace(wanted, profiles=[AT_3])))
-        if r["scope"] == "overall" and r["setting"] == "all"
-    ]
-    assert {r["run"]: r["sr_view"] for r in same if r["modality"] == "all"}["random"] == float(row["sr_view"])
+    scenes = runs[0].table.to_pandas().groupby("scene").success_view.mean()
+    assert float(at_3["sr_view"]) == pytest.approx(scenes.mean())
+    assert float(at_3["sr_view_low95"]) <= float(at_3["sr_view"]) <= float(at_3["sr_view_high95"])
+    assert float(at_5["sr_view"]) >= float(at_3["sr_view"])
 
 
-def test_a_log_of_an_older_version_is_reported_beside_a_new_one(viewed_smoke: Path, tmp_path: Path) -> None:
+def test_a_log_of_an_older_version_is_reported_beside_a_new_one(viewed_smoke, tmp_path):
     shutil.copytree(viewed_smoke / "episodes", tmp_path / "episodes")
     shutil.copytree(viewed_smoke / "failures", tmp_path / "failures")
     for path in (tmp_path / "episodes" / "random").glob("*.parquet"):
@@ -210,14 +171,4 @@ def test_a_log_of_an_older_version_is_reported_beside_a_new_one(viewed_smoke: Pa
     assert cells["random"][at - 1] != "–"
     assert cells["constant"][at] != "–"
     assert sum("No SR-view of random:" in note for note in overall.notes) == 1
-    assert store.read_scene(tmp_path, "episodes", runs[0].table["scene"][0].as_py(), ["told"], "random")[
-        "told"
-    ].null_count
-
-
-def test_damaged_viewpoints_are_named(tmp_path: Path) -> None:
-    data = write_walled(tmp_path)
-    path = data / "release" / "viewpoints" / f"part-{SCENE}.parquet"
-    path.write_bytes(path.read_bytes()[:60])
-    with pytest.raises(StoreError, match=f"viewpoints/part-{SCENE}.parquet is damaged"):
-        evaluate(data, Evaluation("r", "stop"))
+    assert runs[0].hints == ""

@@ -1,10 +1,7 @@
 """The environment over worlds from seeds: real worlds, made by real processes, in a cache of the test's own."""
 
-from __future__ import annotations
-
 import subprocess
 import time
-from pathlib import Path
 
 import gymnasium
 import pytest
@@ -16,7 +13,7 @@ from aerialdojo_gen.benchmark.worlds import WorldMaker
 GIVEN = {"worlds": "N_Snowfield", "num_worlds": 2, "episodes_per_world": 2, "n_objects": 6, "views": ()}
 
 
-def episodes(env: gymnasium.Env, n: int) -> list[tuple[str, str]]:
+def episodes(env, n):
     """Worlds and tasks of some episodes, each ended at once."""
     found = []
     for k in range(n):
@@ -28,7 +25,7 @@ def episodes(env: gymnasium.Env, n: int) -> list[tuple[str, str]]:
 
 
 @pytest.mark.slow
-def test_episodes_go_through_worlds_that_are_made_once(worlds_cache: Path) -> None:
+def test_episodes_go_through_worlds_that_are_made_once(worlds_cache):
     env = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
     first = episodes(env, 6)
     env.close()
@@ -52,7 +49,7 @@ def test_episodes_go_through_worlds_that_are_made_once(worlds_cache: Path) -> No
     } == made
 
 
-def test_closing_stops_the_process_that_makes_a_world(tmp_path: Path) -> None:
+def test_closing_stops_the_process_that_makes_a_world(tmp_path):
     maker = WorldMaker("N_Snowfield", folder=tmp_path)
     maker.prepare(maker.worlds[0])
     deadline = time.monotonic() + 60
@@ -68,7 +65,7 @@ def test_closing_stops_the_process_that_makes_a_world(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("[0-9a-f][0-9a-f]/*")), "nothing half-made is kept"
 
 
-def test_a_world_that_cannot_be_made_says_why(tmp_path: Path) -> None:
+def test_a_world_that_cannot_be_made_says_why(tmp_path):
     maker = WorldMaker("N_Snowfield", knobs={"storeys": 3.0}, folder=tmp_path)
     with pytest.raises(AerialDojoError, match=r"N_Snowfield-1000 could not be made: .*storeys"):
         maker.root(maker.worlds[0])
@@ -85,6 +82,6 @@ def test_a_world_that_cannot_be_made_says_why(tmp_path: Path) -> None:
         ({"worlds": "N_Snowfield", "episodes_per_world": 0}, "episodes_per_world"),
     ],
 )
-def test_requests_that_make_no_sense(given: dict[str, object], said: str) -> None:
+def test_requests_that_make_no_sense(given, said):
     with pytest.raises(UsageError, match=said):
         gymnasium.make("AerialDojo-v0", **given)

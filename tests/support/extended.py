@@ -1,4 +1,4 @@
-"""What a release of this version has, added to one that lacks it: viewpoints, agents' actions, difficulty."""
+"""What a release of this version has, added to one that lacks it: viewpoints, difficulty."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from support.planting import Planted
 
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import decode, encode
-from aerialdojo_gen.store.schemas import APPROACH, VIEWPOINTS
-from aerialdojo_gen.store.schemas.columns import list_of
+from aerialdojo_gen.store.schemas import VIEWPOINTS
 from aerialdojo_gen.store.tables import column_digests, content_digest, from_rows
 
 KEYS = ("train", "test")
@@ -43,13 +42,6 @@ def set_columns(planted: Planted, key: str, **columns: pa.Array) -> None:
     for name, values in columns.items():
         table = with_column(table, name, values)
     planted.write_table(key, table)
-
-
-def set_agent_actions(planted: Planted) -> None:
-    """Give every route its actions without the Approach as `agent_action`."""
-    for side in KEYS:
-        lists = [[a for a in row["action"] if a != APPROACH] for row in planted.rows(f"routes/{side}")]
-        set_columns(planted, f"routes/{side}", agent_action=pa.array(lists, list_of(pa.int8())))
 
 
 def set_difficulty(planted: Planted) -> None:

@@ -84,31 +84,15 @@ Act = Say | Call | Filtered | Status | Raw | Endless | Drip | Trickle | Hang | C
 
 @dataclass
 class Service:
-    """What the server does next, and what it was asked.
+    """What the server does next, and what it was asked: path, headers (lower case) and JSON body of every request."""
 
-    Attributes
-    ----------
-    url : str
-        Where it is, without a path.
-    script : list of Act
-        Done one a request; the last one for ever.
-    requests : list of dict
-        Path, headers (lower case) and JSON body of every request of a flight.
-    checks : list of dict
-        The same of the checks before a run.
-    policy : callable, optional
-        Answers instead of the script, from the request's body: by a text, or by an act.
-    refuses : callable, optional
-        What a check is answered with, from its body, in place of a proper answer.
-    """
-
-    url: str
-    script: list[Act]
-    requests: list[dict[str, Any]]
+    url: str  # Without a path
+    script: list[Act]  # Done one a request; the last one for ever
+    requests: list[dict[str, Any]]  # Of a flight
     stop: threading.Event
-    policy: Callable[[dict[str, Any]], str | Act] | None = None
-    checks: list[dict[str, Any]] = field(default_factory=list)
-    refuses: Callable[[dict[str, Any]], Act | None] | None = None
+    policy: Callable[[dict[str, Any]], str | Act] | None = None  # Answers by the body, in place of the script
+    checks: list[dict[str, Any]] = field(default_factory=list)  # The requests of checks before a run
+    refuses: Callable[[dict[str, Any]], Act | None] | None = None  # Answers a check by its body
 
     def next(self) -> Act:
         return self.script.pop(0) if len(self.script) > 1 else self.script[0]

@@ -108,14 +108,9 @@ class LanguageModelAgent(AgentBase, ABC):
         self._asked = False  # Whether `ask_for` has settled the form
         self.sensors = Sensors(o.views, depth=o.depth, width=o.image_size_px, height=o.image_size_px)
         self.service = Connection(
-            self.package,
-            o.base_url,
-            o.timeout_s,
-            o.request_retries,
-            secrets=self._secrets,
-            key_variable=o.key_env,
+            self.package, o.base_url, o.timeout_s, o.request_retries, secrets=self._secrets, key_variable=o.key_env,
             model=o.model,
-        )
+        )  # fmt: skip
         self._begin()
 
     @property
