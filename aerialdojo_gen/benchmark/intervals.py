@@ -20,12 +20,12 @@ LEVEL = 0.95
 
 def bootstrap(scenes: Sequence[Floats]) -> tuple[Floats, Floats]:
     """95 % percentile intervals, low and high (m,), of the families' mean; scenes are resampled within a family."""
-    from scipy.stats import bootstrap as resampled
-
     width = scenes[0].shape[1] if scenes else len(METRICS)
     ends = np.full((2, width), math.nan)
     if not scenes or min(map(len, scenes)) < 2:
         return ends[0], ends[1]
+    from scipy.stats import bootstrap as resampled
+
     # A measure that is not known of a scene has no interval, and leaves the others theirs.
     known = np.all([np.isfinite(part).all(axis=0) for part in scenes], axis=0)
 

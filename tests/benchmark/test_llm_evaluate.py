@@ -218,7 +218,8 @@ def test_requests_keep_their_pace(smoke, tmp_path):
     # Sent 0.25 s apart at least; a slow machine only makes it longer.
     assert len(times) == 4
     assert times[-1] - times[0] > 2 * 0.25
-    refused = called("evaluate", "--requests-per-minute", "60", "--data", smoke, "--out", tmp_path)
+    more = ("--requests-per-minute", "60", "--workers", "1")
+    refused = called("evaluate", *more, "--data", smoke, "--out", tmp_path)
     assert (refused.returncode, "agent 'random' has no attribute pace" in refused.stderr) == (2, True)
 
 

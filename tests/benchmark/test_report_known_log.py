@@ -66,8 +66,9 @@ def write(data, run, agent, ends, more=""):
             # The goal is at the origin: from (−2, 2.8) to (2, 2.8), then away to (10, 0).
             past = [(-2.0, 2.8, 0.0), (2.0, 2.8, 0.0), (10.0, 0.0, 0.0)]
             own = {"run_id": run, "task_id": row["task_id"], "scene": scene, "action": 1, "refused": False}
+            own |= {"yaw_rad": 0.0, "answer": None}
             steps += [
-                own | {"step": n, "x_m": x, "y_m": y, "z_m": z, "yaw_rad": 0.0, "distance_m": math.hypot(x, y, z)}
+                own | {"step": n, "x_m": x, "y_m": y, "z_m": z, "distance_m": math.hypot(x, y, z)}
                 for n, (x, y, z) in enumerate(past if code == "P" else [(0.0, 0.0, euclidean_m)])
             ]
         for spec, written in ((schemas.EPISODES, rows), (schemas.STEPS, steps), (schemas.FAILURES, [])):

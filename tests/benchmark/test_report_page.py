@@ -12,15 +12,19 @@ from support.browser import errors
 
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.benchmark.episodes import read_run
+from aerialdojo_gen.benchmark.figures import encode_figure, radius_curve
 from aerialdojo_gen.benchmark.metrics import PROFILES, outcomes, summarize
+from aerialdojo_gen.benchmark.registry import named_tables
 from aerialdojo_gen.benchmark.replay import choose_tasks, replays
-from aerialdojo_gen.benchmark.report import write_report
+from aerialdojo_gen.benchmark.report import html
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.runs import load_runs
 from aerialdojo_gen.benchmark.tables import ReportRequest
 from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.schemas import ACTION_NAMES
+
+AT_3 = PROFILES["aerialdojo"]
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +47,10 @@ def shown(smoke, log, runs):
 
 def test_the_metrics_judge_a_log_as_the_runner_did(runs):
     for run in runs:
-        judged = outcomes(run.episodes, PROFILES["aerialdojo"])
+        judged = outcomes(run.episodes, AT_3)
         assert judged.success.tolist() == run.table["success"].to_pylist()
         assert judged.oracle_success.tolist() == run.table["oracle_success"].to_pylist()
-    summary = summarize(runs[0].episodes, PROFILES["aerialdojo"]).overall
+    summary = summarize(runs[0].episodes, AT_3).overall
     assert (summary.sr, summary.osr, summary.cr) == (1.0, 1.0, 0.0)
     assert summary.spl >= 0.99
 
@@ -97,9 +101,12 @@ MOVE = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event(
 def test_the_page_works_in_a_browser_and_asks_for_nothing(smoke, runs, shown, tmp_path, browser):
     shown[0].task["target_name"] = "</h3><script>alert(1)</script>"
     shown[0].flights[1].answers[1] = '</script><img src=x onerror="document.title=1">'
-    wanted = ReportRequest(smoke, runs, [PROFILES["aerialdojo"], PROFILES["aerialdojo-5m"]])
-    page = write_report(tmp_path, wanted, shown)[0]
-    text = page.read_text()
+    wanted = ReportRequest(smoke, runs, [AT_3])
+    curve = encode_figure(radius_curve(runs, AT_3), "svg")
+    figures = dict.fromkeys(("families", "radar", "radius"), curve)
+    text = html(wanted, shown, figures, named_tables(wanted, ["overall"]))
+    page = tmp_path / "report.html"
+    page.write_text(text)
     assert text.count("</script>") == 1 + len(shown)
     assert not re.search(r'(?:src|href)="(?!data:)', text)
     browser.get(page.as_uri())
