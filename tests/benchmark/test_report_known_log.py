@@ -116,7 +116,7 @@ def test_the_floors_that_flew_the_same_tasks_are_added_and_cut_down(log, runs):
         group_runs(runs, {"open": ["gamma"]})
 
 
-def test_tables_4_and_5(runs):
+def test_tables_4_and_5_with_the_papers_rows(runs):
     request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
     overall, table = registry.report_tables(request)
     assert overall.title == "Overall"
@@ -153,8 +153,15 @@ def test_tables_4_and_5(runs):
     assert [rows[row + 1] for row in order] == ["", "", ""]
     assert table.rows[order[2] + 1][1][:2] == ("", "0.00–0.00")
     assert made("results", runs, intervals=False).rows[1][0] == "package:Beta"
-    text = as_text(table, 120)
-    assert max(map(len, text.splitlines())) <= 120
+    assert max(map(len, as_text(table, 120).splitlines())) <= 120
+    # As CSV.
+    found = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
+    keys = ("agent", "radius_m", "setting", "scope", "name")
+    by_key = {tuple(row[key] for key in keys): row for row in found if row["modality"] == "all"}
+    opus = by_key["Claude Opus 5", "3.0", "base", "overall", "overall"]
+    assert (opus["run"], opus["osr"], opus["dts_m_sd"]) == ("paper", "0.0784", "5.97")
+    assert sum(row["run"] == "paper" for row in found) == 22
+    assert by_key["package:Alpha", "3.0", "all", "partition", "OOD"]["sr"] == "0.25"
 
 
 def test_tables_of_parts(runs, log):
@@ -274,14 +281,3 @@ def test_tables_are_chosen_by_name(log, runs):
     assert len(registry.report_tables(wanted, ["all"])) == 14
     with pytest.raises(UsageError, match="no table 'visit': did you mean 'visits'"):
         registry.report_tables(wanted, ["visit"])
-
-
-def test_the_csv_has_the_papers_rows_beside_ours(runs):
-    request = ReportRequest(open_root("no-release"), runs, [AT_3, AT_5], paper_results=results())
-    rows = list(csv.DictReader(io.StringIO(score_rows.as_csv(request))))
-    keys = ("run", "agent", "profile", "radius_m", "setting", "modality", "scope", "name")
-    found = {tuple(row[key] for key in keys): row for row in rows}
-    opus = found["paper", "Claude Opus 5", "aerialdojo", "3.0", "base", "all", "overall", "overall"]
-    assert (opus["osr"], opus["dts_m_sd"]) == ("0.0784", "5.97")
-    assert sum(row["run"] == "paper" for row in rows) == 22
-    assert found["alpha", "package:Alpha", "aerialdojo", "3.0", "all", "all", "partition", "OOD"]["sr"] == "0.25"

@@ -1,10 +1,8 @@
 """The environment over worlds from seeds: real worlds, made by real processes, in a cache of the test's own."""
 
-import subprocess
-import time
-
 import gymnasium
 import pytest
+from support.browser import until
 
 import aerialdojo_gen.benchmark  # noqa: F401 - registers the environment
 from aerialdojo_gen.base.errors import AerialDojoError, UsageError
@@ -34,9 +32,12 @@ def test_episodes_go_through_worlds_that_are_made_once(worlds_cache):
     assert worlds[0] == worlds[1]
     assert worlds[2] == worlds[3] != worlds[0]
     assert all(task.startswith(world) for world, task in first)
-    tasks = "*/*/data/release/tasks/**/*.parquet"
-    made = {path: path.stat().st_mtime_ns for path in worlds_cache.glob(tasks)}
-    assert made
+
+    def made():
+        return {path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/tasks/**/*.parquet")}
+
+    before = made()
+    assert before
     again = gymnasium.make("AerialDojo-v0", **GIVEN, cache=worlds_cache)
     assert episodes(again, 6) == first, "the seed alone decides worlds and tasks"
     again.reset(options={"world": "N_Snowfield-1001"})
@@ -44,20 +45,14 @@ def test_episodes_go_through_worlds_that_are_made_once(worlds_cache):
     with pytest.raises(UsageError, match="no world 'N_Snowfield-1002'"):
         again.reset(options={"world": "N_Snowfield-1002"})
     again.close()
-    assert {
-        path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/tasks/**/*.parquet")
-    } == made
+    assert made() == before
 
 
 def test_closing_stops_the_process_that_makes_a_world(tmp_path):
     maker = WorldMaker("N_Snowfield", folder=tmp_path)
     maker.prepare(maker.worlds[0])
-    deadline = time.monotonic() + 60
-    while maker._child is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    child: subprocess.Popen[str] = maker._child
-    coming = maker._coming[maker.worlds[0].name]
+    until("a process", lambda: maker._child)
+    child, coming = maker._child, maker._coming[maker.worlds[0].name]
     maker.close()
     assert child.poll() is not None
     with pytest.raises(AerialDojoError, match="N_Snowfield-1000"):
