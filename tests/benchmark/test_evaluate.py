@@ -102,15 +102,19 @@ def test_the_log_tells_what_happened(smoke, tmp_path):
 
 
 SLOW = """
-import os, pathlib, signal, time
+import os, signal, time
+from pathlib import Path
 from aerialdojo_gen.benchmark.agents.simple import RandomAgent
 class Slow(RandomAgent):
     left = 9
     def reset(self, goal):
         super().reset(goal)
+        Path(f"worker-{os.getpid()}").touch()
+        while len(list(Path().glob("worker-*"))) < int(os.environ.get("WORKERS", 0)):
+            time.sleep(0.01)
         time.sleep(0.03)
         self.left -= 1
-        if not self.left and pathlib.Path("interrupt").exists():
+        if not self.left and Path("interrupt").exists():
             os.kill(os.getpid(), signal.SIGINT)
 """
 
@@ -130,7 +134,7 @@ def test_killed_and_interrupted_and_gone_on_with_it_ends_with_the_same_bytes(pro
                 ids |= {record["task_id"] for record in read_journal(path)}
         return ids
 
-    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}"}
+    env = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{project}", "WORKERS": "2"}
     process = subprocess.Popen(
         [sys.executable, "-m", "aerialdojo_gen.cli", *command, "2"], cwd=tmp_path, env=env, start_new_session=True
     )
