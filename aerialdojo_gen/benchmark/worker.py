@@ -111,12 +111,13 @@ def _add_usage(a: Usage | None, b: Usage | None) -> Usage | None:
     if a is None or b is None:
         return a or b
 
-    def both(name: str, total: Callable[[list[Any]], Any] = sum) -> Any:
+    def both(name: str) -> Any:
         known = [v for v in (getattr(a, name), getattr(b, name)) if v is not None]
-        return total(known) if known else None
+        return sum(known) if known else None
 
     sums = {name: both(name) for name in ("requests", "input_tokens", "output_tokens", "cost_usd", "request_s")}
-    return Usage(**sums, longest_request_s=both("longest_request_s", max))
+    longest = [v for v in (a.longest_request_s, b.longest_request_s) if v is not None]
+    return Usage(**sums, longest_request_s=max(longest, default=None))
 
 
 def _usage_columns(used: Usage | None) -> dict[str, Any]:

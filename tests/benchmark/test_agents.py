@@ -23,7 +23,7 @@ from aerialdojo_gen.benchmark.agents.depth_map import DepthMap
 from aerialdojo_gen.benchmark.agents.explorer import ExplorerAgent
 from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Observation, Rules, Sensors
 from aerialdojo_gen.benchmark.agents.load import read_options
-from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, OracleAgent
+from aerialdojo_gen.benchmark.agents.simple import BEST_CONSTANT, ConstantAgent, OracleAgent, RandomAgent, StopAgent
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
 from aerialdojo_gen.benchmark.tasks import Selection
@@ -128,7 +128,7 @@ def test_an_option_that_cannot_be_converted_is_named(option, text, what):
     ],
 )
 def test_the_constant_agent_does_the_same_whatever_it_is_told_and_then_stops(options, expected):
-    agent = load_agent("constant", **options)
+    agent = ConstantAgent(**options)
     for told in (goal(), goal(name="blue bench", budget=300)):
         agent.reset(told)
         assert flown(agent, 6) == (expected + [schemas.STOP] * 6)[:6]
@@ -143,7 +143,7 @@ def test_the_oracle_leaves_the_approach_out_and_stops_at_the_end():
 
 def test_random_draws_depend_on_seed_and_goal_alone():
     def draws(name="red van", **options):
-        agent = load_agent("random", **options)
+        agent = RandomAgent(**options)
         agent.reset(goal(name=name))
         return flown(agent, 90)
 
@@ -152,7 +152,7 @@ def test_random_draws_depend_on_seed_and_goal_alone():
     assert draws() != draws("blue van")
     assert {a for name in range(20) for a in draws(str(name))} == set(range(16))
     assert 0 not in draws(stop_probability=0.0)
-    assert set(draws(stop_probability=1.0)) == {0}
+    assert draws(stop_probability=1.0) == flown(StopAgent(), 90) == [0] * 90
 
 
 class Seer:
