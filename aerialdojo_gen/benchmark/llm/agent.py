@@ -172,7 +172,7 @@ class LanguageModelAgent(AgentBase, ABC):
         except ServiceDown as error:
             raise ServiceDown(f"checked before the run, nothing flown: {error}") from None
         except AgentUnavailable as error:
-            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try repair later')}"
+            mend = "" if str(error).endswith("?") else f": {_BY_KIND.get(error.kind, 'try again later')}"
             raise AerialDojoError(f"checked before the run, nothing flown: {error}{mend}") from None
         self.tells_tokens = reply.input_tokens is not None and reply.output_tokens is not None
         counted = "" if self.tells_tokens else ", tells no tokens"
