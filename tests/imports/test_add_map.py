@@ -2,6 +2,7 @@
 
 import re
 import sys
+from collections import Counter
 
 import jsonschema
 import numpy as np
@@ -9,16 +10,24 @@ import pytest
 import shapely
 from shapely.geometry import Point, Polygon
 from support import maps
+from support.layout_checks import catalogue
 
+from aerialdojo_gen.annotations.landmarks import choose_landmarks
+from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
-from aerialdojo_gen.base.shipped import home
+from aerialdojo_gen.imports import map_buildings, map_ground
 from aerialdojo_gen.imports.earth import size_m, tile_bboxes
+from aerialdojo_gen.imports.map_furniture import plan_of
 from aerialdojo_gen.imports.map_plan import TownOptions
-from aerialdojo_gen.imports.osm import read_into, read_maps
+from aerialdojo_gen.imports.map_props import _thing
+from aerialdojo_gen.imports.map_tags import bearing_deg
+from aerialdojo_gen.imports.osm import Feature, read_into, read_maps
 from aerialdojo_gen.imports.places import add_map
+from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
+from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.plans.schema import plan_schema
 
 
@@ -32,19 +41,17 @@ def town(extract, tmp_path_factory):
     return add_map("Town", extract, tmp_path_factory.mktemp("mine"), bbox=[maps.box()])[0]
 
 
+KINDS = {"tall": "apartment_building", "levels": "office_building", "house": "house", "hall": "building"}
+
+
 def built(place):
     """Buildings as the map has them: name, the instance that stands there."""
-    kinds = {"tall": "apartment_building", "levels": "office_building", "house": "house", "hall": "building"}
+    bounds = {name: np.reshape(Polygon(maps.BUILDINGS[name][0]).bounds, (2, 2)) for name in KINDS}
     return {
-        name: next(i for i in place.scene.instances if i.category == kind and near(i, maps.BUILDINGS[name][0]))
-        for name, kind in kinds.items()
-    }
-
-
-def near(instance, outline):
-    low, high = instance.bounds[:, :2]
-    x0, y0, x1, y1 = Polygon(outline).bounds
-    return np.abs(np.array([*low, *high]) - (x0, y0, x1, y1)).max() < 1.0
+        name: next(i for i in place.scene.instances
+                   if i.category == kind and np.abs(i.bounds[:, :2] - bounds[name]).max() < 1.0)
+        for name, kind in KINDS.items()
+    }  # fmt: skip
 
 
 def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
@@ -55,9 +62,7 @@ def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
     assert tops["house"] == pytest.approx(8.0, abs=0.01)
     assert tops["hall"] == pytest.approx(30 * 0.3048, abs=0.01)
     for name in ("tall", "levels"):
-        low, high = found[name].bounds[:, :2]
-        x0, y0, x1, y1 = Polygon(maps.BUILDINGS[name][0]).bounds
-        assert np.abs(np.array([*low, *high]) - (x0, y0, x1, y1)).max() < 0.02
+        assert np.abs(found[name].bounds[:, :2].ravel() - Polygon(maps.BUILDINGS[name][0]).bounds).max() < 0.02
     # A hip's ridge is the highest line of it, and its eaves are 3 m below.
     hall = found["hall"]
     z = hall.vertices[:, 2]
@@ -67,23 +72,16 @@ def test_buildings_are_as_high_and_as_wide_as_their_tags_say(town):
 
 
 def test_streets_lie_on_the_ground_with_marks_and_a_crossing(town):
-    ground = town.scene["ground"]
     by_material = {}
-    for part in ground.parts:
+    for part in town.scene["ground"].parts:
         by_material.setdefault(part.material.split(":")[0], []).append(part)
-    asphalt = shapely.union_all(
-        [Polygon(part.vertices[face][:, :2]) for part in by_material["asphalt"] for face in part.faces]
-    )
+
+    def area(material):
+        return shapely.union_all([Polygon(p.vertices[f][:, :2]) for p in by_material[material] for f in p.faces])
+
     # The secondary street's two lanes of 3.2 m, from border to border.
-    assert asphalt.buffer(0.02).contains(
-        shapely.box(-59, -3.1, 59, 3.1)
-        .difference(Point(0, 0).buffer(8))
-        .difference(
-            shapely.union_all(
-                [Polygon(p.vertices[f][:, :2]) for p in by_material["marking"] for f in p.faces]
-            ).buffer(0.02)
-        )
-    )
+    street = shapely.box(-59, -3.1, 59, 3.1) - Point(0, 0).buffer(8) - area("marking").buffer(0.02)
+    assert area("asphalt").buffer(0.02).contains(street)
     marks = np.concatenate([part.vertices for part in by_material["marking"]])
     assert np.abs(marks[:, 2]).max() < 1e-6
     stripes = marks[(np.abs(marks[:, 0]) < 2) & (np.abs(marks[:, 1]) < 3.3)]
@@ -131,19 +129,15 @@ def test_the_same_map_makes_the_same_bytes_whatever_the_order_of_its_things(town
     assert other.read_bytes() != extract.read_bytes()
     again = add_map("Town", other, tmp_path / "a", bbox=[maps.box()])[0]
     assert again.recipe.read_bytes() == town.recipe.read_bytes()
-    rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
-    assert [i.node for i in rebuilt.instances] == [i.node for i in town.scene.instances]
-    assert all(np.array_equal(a.vertices, b.vertices)
-               for a, b in zip(rebuilt.instances, town.scene.instances, strict=True))  # fmt: skip
+    assert maps.same_scene(build_scene(again.recipe, catalogue()), town.scene)
 
 
 def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
     west, south, east, north = maps.box(90.0)
     dem = tmp_path / "hill.npz"
     np.savez(dem, heights_m=maps.heights(2.0, 90.0), bbox_deg=[west, south, east, north])
-    place = add_map(
-        "Town", extract, tmp_path / "mine", bbox=[maps.box()], options=TownOptions(attribution="A survey"), dem=dem
-    )[0]
+    options = TownOptions(attribution="A survey")
+    (place,) = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()], options=options, dem=dem)
     datum = maps.origin_z(place)
     places = np.random.default_rng(5).uniform(-55, 55, size=(300, 2))
     z = maps.ground_z(place.scene, places) + datum
@@ -162,11 +156,6 @@ def test_on_a_height_model_everything_stands_on_the_ground(extract, tmp_path):
     assert "A survey" in place.scene.attribution
 
 
-def test_what_is_written_is_a_plan_as_the_schema_has_it(town):
-    validator = jsonschema.Draft202012Validator(plan_schema())
-    assert not [error.message for error in validator.iter_errors(maps.plan_of(town))]
-
-
 def test_what_a_person_changes_in_the_plan_is_what_is_built(town, tmp_path):
     text = town.recipe.read_text()
     assert "# Added by rule: parked and driving vehicles\n" in text
@@ -175,7 +164,7 @@ def test_what_a_person_changes_in_the_plan_is_what_is_built(town, tmp_path):
     # All that rules add, without which only the map is left.
     changed = changed.partition("\n# Added by rule")[0] + "\n"
     (tmp_path / "Town.toml").write_text(changed)
-    scene = build_scene(tmp_path / "Town.toml", load_catalogue(home() / "scene_assets"))
+    scene = build_scene(tmp_path / "Town.toml", catalogue())
     assert scene["bench_000"].centroid[:2] == pytest.approx((-44.0, 7.6), abs=0.3)
     assert max(float(i.bounds[1, 2]) for i in scene.instances) == pytest.approx(24.7, abs=0.01)
     left = {i.category for i in scene.instances}
@@ -194,13 +183,12 @@ def test_beyond_the_most_that_a_scene_has_things_are_left_out_and_counted(extrac
 def test_a_recipe_of_an_older_version_says_what_to_run(tmp_path):
     (tmp_path / "Town.toml").write_text('layout = "town"\nsize_m = [60, 60]\nceiling_m = 20\n[parameters]\n')
     with pytest.raises(AssetError, match=r"run add-map again, with --force$"):
-        build_scene(tmp_path / "Town.toml", load_catalogue(home() / "scene_assets"))
+        build_scene(tmp_path / "Town.toml", catalogue())
 
 
-def test_whose_data_it_is_stands_in_the_mesh_and_in_the_table(town, tmp_path):
-    from aerialdojo_gen.pipeline.stages.work.build_scenes import scene_row
-    from aerialdojo_gen.scenes.glb import read_glb, write_glb
-
+def test_what_is_written_is_a_plan_as_the_schema_has_it_and_says_whose_data_it_is(town, tmp_path):
+    validator = jsonschema.Draft202012Validator(plan_schema())
+    assert not [error.message for error in validator.iter_errors(maps.plan_of(town))]
     assert town.scene.attribution.startswith("© OpenStreetMap contributors, Open Database License")
     write_glb(town.scene, tmp_path / "town.glb")
     assert b'"copyright":"\xc2\xa9 OpenStreetMap contributors' in (tmp_path / "town.glb").read_bytes()
@@ -222,12 +210,8 @@ def test_a_box_is_cut_into_tiles_with_a_shared_frame(extract, tmp_path):
     assert np.round(np.column_stack([x, y])).tolist() == [[-30, -30], [30, -30], [-30, 30], [30, 30]]
     # The street runs on from one to the next.
     for place, side in ((places[0], 30.0), (places[2], -30.0)):
-        assert (
-            shapely.union_all(
-                [shapely.LineString(one["line"]) for one in maps.made_by(place, "street_network")["streets"]]
-            ).distance(Point(-10, side))
-            < 0.1
-        )
+        lines = [shapely.LineString(one["line"]) for one in maps.made_by(place, "street_network")["streets"]]
+        assert shapely.union_all(lines).distance(Point(-10, side)) < 0.1
 
 
 def test_several_boxes_are_read_at_once_as_each_by_itself(extract):
@@ -241,13 +225,6 @@ def test_several_boxes_are_read_at_once_as_each_by_itself(extract):
         window = shapely.box(*box)
         assert all(window.intersects(f.shape) for f in (*found.points, *found.lines, *found.areas))
     assert {len(found.points) for found in together} != {len(maps.POINTS)}
-
-
-def test_a_map_is_read_in_bounded_memory(extract, tmp_path):
-    with pytest.raises(AssetError) as found:
-        read_maps(extract, [maps.box()], max_memory_bytes=96 << 20)
-    assert str(found.value).startswith(f"{extract}: needs more than 96 MB of memory to read: cut a part out of it")
-    assert "\n" not in str(found.value)
 
 
 @pytest.mark.parametrize(
@@ -291,3 +268,67 @@ def test_without_osmium_it_says_what_to_install(extract, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "osmium", None)
     with pytest.raises(MissingPackage, match=r"lacks the package osmium: pip install 'aerialdojo-gen\[maps\]'"):
         add_map("X", extract, tmp_path / "mine", bbox=[maps.box()])
+
+
+def test_landmarks_of_a_town_without_the_catalogues_are_large_and_their_names_fit_nothing_else(tmp_path):
+    outlines = [([*o, o[0]], tags) for o, tags in maps.BUILDINGS.values()]
+    extract = maps.write_map(tmp_path / "town.osm.pbf", [*maps.LINES, *outlines])
+    (place,) = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()])
+    scene, vocabulary = place.scene, Vocabulary(place.scene, catalogue())
+    assert [i for i in scene.instances if i.bounds[0, 2] > 8.0], "a roof with something on it, higher than most"
+    marks = choose_landmarks(vocabulary, 2, at_most=True)
+    assert marks
+    for mark in (*marks, *choose_landmarks(vocabulary, 1, at_most=True)):
+        assert np.ptp(scene[mark.node].bounds, axis=0).min() >= 3.0
+        words = set(mark.name.split())
+        # "A building" would be any of them, an office building, too.
+        fits = [i.node for i, noun in zip(scene.instances, vocabulary.nouns, strict=True)
+                if words <= {*noun.name.split(), *noun.short.split(), *noun.adjectives}]  # fmt: skip
+        assert fits in ([mark.node], [])
+
+
+SITE = rectangle(-60, -60, 60, 60)
+
+
+# One or two of 70 outlines cross themselves when they are merely rounded.
+@pytest.mark.parametrize("seed", [2, 13, 26])
+def test_what_is_built_is_simple_polygons_that_cover_what_the_map_has(seed):
+    summary, rings = Counter(), maps.crowded(seed)
+    town = [Feature(f"{k:03d}", Polygon(ring), tags) for k, (ring, tags) in enumerate(rings)]
+    bodies = [b for one in map_buildings.buildings(town, [], SITE, summary) for b in one["bodies"]]
+    assert all(plan_of(b).is_valid for b in bodies)
+    mapped = shapely.union_all([f.shape for f in town]).intersection(SITE)
+    assert shapely.union_all([plan_of(b) for b in bodies]).symmetric_difference(mapped).area < 0.05 * mapped.area
+    parks = [Feature(f.key, f.shape, {"leisure": "park"}) for f in town]
+    areas = map_ground.areas(parks, [], SITE, summary)
+    assert all(plan_of(a).is_valid for a in areas)
+    assert shapely.union_all([plan_of(a) for a in areas]).symmetric_difference(mapped).area < 0.05 * mapped.area
+    assert not [line for line in summary if "left out" in line]
+
+
+def test_a_crowded_town_is_made_and_what_cannot_be_is_counted(tmp_path):
+    zigzag = shapely.Point(0, 0).buffer(30).exterior.segmentize(0.15).coords[:-1]
+    zigzag = [(x * (1 + 0.03 * (k % 2)), y * (1 + 0.03 * (k % 2))) for k, (x, y) in enumerate(zigzag)]
+    ways = [([*ring, ring[0]], tags) for ring, tags in [*maps.crowded(2), (zigzag, {"leisure": "park"})]]
+    extract = maps.write_map(tmp_path / "town.osm.pbf", ways)
+    (place,) = add_map("Town", extract, tmp_path / "mine", bbox=[maps.box()])
+    assert "40 buildings" in place.notes
+    assert "1 outlines left out: self-intersecting or with too many corners" in place.notes
+    assert len(maps.made_by(place, "buildings")["buildings"]) == 40
+
+
+@pytest.mark.parametrize(
+    ("said", "bearing"),
+    [
+        ("0", 0.0), ("N", 0.0), ("360", 360.0), ("92.5", 92.5), ("180°", 180.0), ("sw", 225.0), (" NNW ", 337.5),
+        ("361", None), ("-90", None), ("forward", None), ("90-120", None), ("1e2", None), ("", None),
+    ],
+)  # fmt: skip
+def test_directions_are_degrees_or_points_of_the_compass(said, bearing):
+    assert bearing_deg({"direction": said}, "direction") == bearing
+
+
+def test_a_bench_that_faces_north_is_turned_to_it():
+    assert _thing("bench", Point(1, 2), {"direction": "0"})["yaw"] == 90.0
+    assert _thing("bench", Point(1, 2), {"direction": "E"})["yaw"] == 0.0
+    assert "yaw" not in _thing("bench", Point(1, 2), {"direction": "both"})

@@ -20,9 +20,8 @@ from aerialdojo_gen.imports.drafting import draft_scene
 from aerialdojo_gen.imports.files import check_glb, read_mesh
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.raw import RawNode, default_colours
-from aerialdojo_gen.imports.three_ds import read_3ds
 from aerialdojo_gen.scenes.colours import colour_name
-from aerialdojo_gen.scenes.glb import read_glb, write_glb
+from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import shards as store
 
 
@@ -67,10 +66,6 @@ def test_axes_and_units():
     scene, _ = import_mesh("Box", [raw(box)], MeshOptions(up="y", scale=0.01))
     (body,) = things(scene)
     np.testing.assert_allclose(body.bounds[1] - body.bounds[0], [20, 10, 3], atol=1e-4)
-    with pytest.raises(UsageError, match=r"--up 'x'"):
-        import_mesh("Box", [raw(box)], MeshOptions(up="x"))
-    with pytest.raises(UsageError, match="--scale"):
-        import_mesh("Box", [raw(box)], MeshOptions(scale=float("nan")))
 
 
 def test_what_is_inside_out_is_turned_and_what_is_open_is_there_from_both_sides():
@@ -86,7 +81,7 @@ def test_what_is_inside_out_is_turned_and_what_is_open_is_there_from_both_sides(
     assert all(scene.materials[p.material].double_sided for i in things(scene) for p in i.parts)
 
 
-def test_what_has_no_place_is_dropped_and_said():
+def test_what_has_no_place_is_dropped_and_said_and_nothing_left_is_an_error():
     box = trimesh.creation.box((10, 10, 4))
     vertices = np.vstack([box.vertices, [[np.nan, 0, 0], [np.inf, 1, 1]]])
     faces = np.vstack([box.faces, [[8, 0, 1], [9, 0, 1], [0, 0, 1]]])
@@ -96,17 +91,14 @@ def test_what_has_no_place_is_dropped_and_said():
     text = "\n".join(repairs.lines)
     assert "2 triangles of the mesh with no place" in text
     assert "1 triangles of the mesh without area" in text
-
-
-def test_nothing_left_is_an_error():
     empty = RawNode("", np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), default_colours(0))
     for node in (empty, RawNode("", np.full((3, 3), np.nan), np.array([[0, 1, 2]]), default_colours(1))):
         with pytest.raises(AssetError, match="empty or degenerate"):
             import_mesh("Nothing", [node])
 
 
-def test_a_million_degenerate_triangles_take_bounded_memory():
-    n = 1_000_000
+def test_many_degenerate_triangles_take_bounded_memory():
+    n = 200_000
     vertices = np.zeros((n + 8, 3))
     vertices[:n, 0] = np.arange(n) % 7
     box = trimesh.creation.box((20, 20, 5))
@@ -118,44 +110,29 @@ def test_a_million_degenerate_triangles_take_bounded_memory():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert sum(len(i.faces) for i in things(scene)) == 12
-    assert "1,000,000 triangles of the mesh without area dropped" in repairs.lines
-    assert peak < 600e6
+    assert "200,000 triangles of the mesh without area dropped" in repairs.lines
+    assert peak < 120e6
 
 
-@pytest.mark.parametrize(("edge", "word"), [(40_000.0, "too large"), (0.5, "too small")])
-def test_an_extent_that_cannot_be_metres(edge, word):
-    with pytest.raises(AssetError, match=rf"{word}.*--scale"):
-        import_mesh("Odd", [raw(trimesh.creation.box((edge, edge, edge / 10)))])
+def test_an_extent_that_cannot_be_metres():
+    with pytest.raises(AssetError, match=r"too small.*--scale"):
+        import_mesh("Odd", [raw(trimesh.creation.box((0.5, 0.5, 0.05)))])
 
 
-def test_a_glb_that_asks_for_terabytes_is_refused_before_it_gets_them(tmp_path):
+def test_a_glb_that_asks_for_terabytes_or_less_than_nothing_is_refused_before_it_gets_them(tmp_path):
     document = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "accessors": [{"componentType": 5126, "count": 2_000_000_000, "type": "VEC3"}],
-    }
-    path = tmp_path / "bomb.glb"
-    path.write_bytes(foreign.glb(json.dumps(document).encode()))
-    with pytest.raises(AssetError, match="asks for"):
-        check_glb(path)
-    # One small mesh that a hundred thousand nodes show.
-    document["accessors"] = [{"componentType": 5126, "count": 3000, "type": "VEC3"}]
-    document["nodes"] = [{"mesh": 0}] * 100_000
-    path.write_bytes(foreign.glb(json.dumps(document).encode()))
-    with pytest.raises(AssetError, match=r"100,000,000 triangles"):
-        check_glb(path)
-
-
-@pytest.mark.parametrize("count", [-1, -(2**40)])
-def test_a_negative_count_is_a_damaged_file(tmp_path, count):
-    document = json.loads(foreign.village().export(file_type="gltf")["model.gltf"])
-    document["accessors"][0]["count"] = count
-    (tmp_path / "a.glb").write_bytes(foreign.glb(json.dumps(document).encode()))
-    with pytest.raises(AssetError, match=f"^is a damaged GLB file: an array of {count:,} numbers$"):
-        check_glb(tmp_path / "a.glb")
+    }  # fmt: skip
+    many = {"nodes": [{"mesh": 0}] * 100_000}  # one small mesh that a hundred thousand nodes show
+    for count, change, said in (
+        (2_000_000_000, {}, "asks for"), (3000, many, "100,000,000 triangles"),
+        (-(2**40), {}, f"^is a damaged GLB file: an array of {-(2**40):,} numbers$"),
+    ):  # fmt: skip
+        accessors = {"accessors": [{"componentType": 5126, "count": count, "type": "VEC3"}]}
+        (tmp_path / "a.glb").write_bytes(foreign.glb(json.dumps(document | accessors | change).encode()))
+        with pytest.raises(AssetError, match=said):
+            check_glb(tmp_path / "a.glb")
 
 
 def test_a_reader_that_wants_too_much_is_ended(village):
@@ -163,19 +140,13 @@ def test_a_reader_that_wants_too_much_is_ended(village):
         read_mesh(village / "village.glb", max_memory_bytes=64 << 20)
 
 
-def test_a_cut_3ds_is_named(village):
-    data = (village / "village.3ds").read_bytes()
-    for cut in (7, 30, len(data) // 2, len(data) - 3):
-        with pytest.raises(AssetError):
-            read_3ds(data[:cut])
-
-
 def test_a_file_reads_nothing_outside_its_folder(tmp_path):
     folder = tmp_path / "mesh"
     folder.mkdir()
     box = trimesh.creation.box((10, 10, 5)).export(file_type="obj", include_normals=False)
-    for library, place, is_read in (("../secret.mtl", tmp_path, False), ("secret.mtl", folder, True)):
+    for place, is_read in ((tmp_path, False), (folder, True)):
         (place / "secret.mtl").write_text("newmtl wall\nKd 1 0 0\n")
+        library = "secret.mtl" if is_read else "../secret.mtl"
         (folder / "box.obj").write_text(f"mtllib {library}\nusemtl wall\n{box}")
         (body,) = things(import_mesh("Box", read_here(folder / "box.obj"))[0])
         assert (body.attributes["colour"] == "red") == is_read
@@ -198,33 +169,23 @@ def test_a_scene_is_added_once_and_whole(village, tmp_path):
         add_scene("V2", village / "village.glb", tmp_path / "mine", MeshOptions(), annotations=other)
 
 
-def planned(tmp_path, name, mesh, n_objects, **options):
-    """Add a scene, draft its annotations, plan its tasks; gives the verdicts."""
-    project, data = tmp_path / "mine", tmp_path / "data"
-    added = add_scene(name, mesh, project, MeshOptions(**options))
-    pipeline, roots = open_pipeline(added.pipeline, data)
-    draft_scene(name, pipeline, roots, DraftOptions(n_landmarks=2, n_objects=n_objects, max_per_category=30))
-    run_pipeline(added.pipeline, data, stages=["filter"], scenes=[name], workers=1)
-    return added, store.read_scene(data, "verdicts", name)
-
-
-@pytest.mark.pipeline
-def test_helsinki_up_to_planned_tasks(tmp_path):
-    assert foreign.helsinki(tmp_path / "helsinki.glb") == 486
-    added, verdicts = planned(tmp_path, "Helsinki", tmp_path / "helsinki.glb", 8, up="z", crop_m=(628.0, 97.0, 110.0))
-    assert {i.category for i in things(added.scene)} == {"building"}
-    assert verdicts.num_rows > 50
-    assert pc.sum(verdicts["keep"]).as_py() > 10
-
-
 @pytest.mark.nightly
-def test_the_monastery_up_to_planned_tasks(tmp_path):
-    whole, _ = import_mesh("Monastery", read_mesh(foreign.monastery()), MeshOptions(up="y"))
-    assert whole.n_triangles > 100_000
-    # The middle of it: drafting asks every one of its 1,400 bodies for viewpoints, and 32 m of it take three minutes.
-    added, verdicts = planned(tmp_path, "Monastery", foreign.monastery(), 4, up="y", crop_m=(-7.0, 1.0, 14.0))
+@pytest.mark.parametrize("place", ["Helsinki", "Monastery"])
+def test_a_real_place_up_to_planned_tasks(tmp_path, place):
+    if place == "Helsinki":
+        mesh, n_objects, options = tmp_path / "helsinki.glb", 8, MeshOptions(crop_m=(628.0, 97.0, 110.0))
+        assert foreign.helsinki(mesh) == 486
+    else:
+        # The middle of it: drafting asks every one of its 1,400 bodies for viewpoints, and 32 m take three minutes.
+        mesh, n_objects, options = foreign.monastery(), 4, MeshOptions(up="y", crop_m=(-7.0, 1.0, 14.0))
+        assert import_mesh(place, read_mesh(mesh), MeshOptions(up="y"))[0].n_triangles > 100_000
+    added, data = add_scene(place, mesh, tmp_path / "mine", options), tmp_path / "data"
     assert len(things(added.scene)) > 20
-    assert pc.sum(verdicts["keep"]).as_py() > 10
+    assert place == "Monastery" or {i.category for i in things(added.scene)} == {"building"}
+    pipeline, roots = open_pipeline(added.pipeline, data)
+    draft_scene(place, pipeline, roots, DraftOptions(n_landmarks=2, n_objects=n_objects, max_per_category=30))
+    run_pipeline(added.pipeline, data, stages=["filter"], scenes=[place], workers=1)
+    assert pc.sum(store.read_scene(data, "verdicts", place)["keep"]).as_py() > 10
 
 
 @pytest.mark.parametrize(
@@ -235,35 +196,3 @@ def test_the_monastery_up_to_planned_tasks(tmp_path):
 )  # fmt: skip
 def test_colours_have_everyday_names(rgb, word):
     assert colour_name(rgb) == word
-
-
-def reordered(glb: bytes, order) -> bytes:
-    """The same GLB with its nodes in another order, and its last two meshes as two primitives of one node."""
-    length = int.from_bytes(glb[12:16], "little")
-    document, rest = json.loads(glb[20 : 20 + length]), glb[20 + length :]
-    shown = [n for n in document["nodes"] if "mesh" in n]
-    *singles, keeper, given = sorted(shown, key=lambda n: n["name"])
-    meshes = document["meshes"]
-    both = [dict(p) for n in (keeper, given) for p in meshes[n["mesh"]]["primitives"]]
-    meshes[keeper["mesh"]] = meshes[keeper["mesh"]] | {"primitives": both[:: 1 if order(1) else -1]}
-    nodes = sorted([*singles, keeper], key=lambda n: order(n["mesh"]))
-    document["nodes"] = nodes
-    document["scenes"] = [{"nodes": list(range(len(nodes)))}]
-    document["scene"] = 0
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    head = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
-    return head + len(text).to_bytes(4, "little") + b"JSON" + text + rest
-
-
-def test_the_same_file_gives_the_same_bytes_in_whatever_order_its_nodes_come(village, tmp_path):
-    glb, made = (village / "village.glb").read_bytes(), set()
-    for order in (lambda n: n, lambda n: n, lambda n: -n, lambda n: 7 * n % 5):
-        (tmp_path / "village.glb").write_bytes(reordered(glb, order))
-        # What was two bodies is one node of two materials, and no category is made of a reader's random digits.
-        scene, _ = import_mesh("Village", read_here(tmp_path / "village.glb"))
-        assert len(things(scene)) == 8
-        assert {i.category for i in things(scene)} <= {"clock_tower", "house"}
-        write_glb(scene, tmp_path / "scene.glb")
-        made.add((tmp_path / "scene.glb").read_bytes())
-    assert len(made) == 1

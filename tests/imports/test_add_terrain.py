@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 from support import maps
+from support.layout_checks import ASSETS, catalogue
 
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
-from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.dem import read_dem
-from aerialdojo_gen.imports.earth import LocalFrame
 from aerialdojo_gen.imports.places import add_terrain
 from aerialdojo_gen.imports.relief import ReliefOptions
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
-
-UTM = "EPSG:32635"
 
 
 @pytest.fixture(scope="module")
@@ -84,10 +80,7 @@ def test_it_is_painted_by_slope_and_height_and_grows_what_such_ground_has(added)
 def test_the_same_file_makes_the_same_bytes(hill, added, tmp_path):
     again = add_terrain("Hill", hill, tmp_path / "other", ReliefOptions(water_m=98.5, snow_m=113.0))
     assert again.recipe.read_bytes() == added.recipe.read_bytes()
-    rebuilt = build_scene(again.recipe, load_catalogue(home() / "scene_assets"))
-    for a, b in zip(rebuilt.instances, added.scene.instances, strict=True):
-        assert a.node == b.node
-        assert np.array_equal(a.vertices, b.vertices)
+    assert maps.same_scene(build_scene(again.recipe, catalogue()), added.scene)
 
 
 def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path):
@@ -96,12 +89,11 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
 
     place = add_terrain("Hill", hill, tmp_path / "mine", ReliefOptions(bare=True))
     table = place.recipe.with_name("Hill.heights.asc")
-    assets = home() / "scene_assets"
-    assert table in scene_sources(ProjectPaths(tmp_path, assets, table.parent, tmp_path), "Hill")
+    assert table in scene_sources(ProjectPaths(tmp_path, ASSETS, table.parent, tmp_path), "Hill")
     # An ESRI ASCII grid, that this program reads as any other one.
     assert np.abs(read_dem(table).heights_m + maps.origin_z(place) - maps.heights(2.0, 60.0)).max() < 0.0051
     text = table.read_text()
-    head, first, rest = text.split("\n", 6)[:5], text.split("\n", 6)[5], text.split("\n", 6)[6]
+    *head, first, rest = text.split("\n", 6)
     faults = {
         "is it truncated": text[: len(text) // 2],
         "ncols": text.replace("ncols", "columns"),
@@ -111,48 +103,25 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
     for said, wrong in faults.items():
         table.write_text(wrong)
         with pytest.raises(AssetError, match=said) as found:
-            build_scene(place.recipe, load_catalogue(assets))
+            build_scene(place.recipe, catalogue())
         assert str(found.value).startswith(f"{place.recipe}: [ground] steps[0] 'surveyed_heights': ")
         assert "\n" not in str(found.value)
     table.unlink()
     with pytest.raises(AssetError, match=r"Hill\.heights\.asc cannot be read .*: it belongs beside the plan"):
-        build_scene(place.recipe, load_catalogue(assets))
+        build_scene(place.recipe, catalogue())
     (tmp_path / "elsewhere.asc").write_text(text)
     table.symlink_to(tmp_path / "elsewhere.asc")
     with pytest.raises(AssetError, match="points outside its folder"):
-        build_scene(place.recipe, load_catalogue(assets))
+        build_scene(place.recipe, catalogue())
 
 
-def test_a_geotiff_in_degrees_and_one_in_metres_are_the_same_relief(tmp_path):
-    """One hill in two coordinate systems: the heights above a place on earth are the same."""
-    from rasterio import warp
-
-    frame = LocalFrame(27.0, 60.2)  # on the middle meridian of zone 35, where its north is north
-    east, north = frame.metres_a_degree
-    z = maps.heights(2.0, 60.0)
-    n = len(z)
-    degrees = maps.write_geotiff(
-        tmp_path / "degrees.tif", z, "EPSG:4326", 27.0 - 61.0 / east, 60.2 + 61.0 / north, 2.0 / east, 2.0 / north
-    )
-    (x0,), (y0,) = warp.transform("EPSG:4326", UTM, [27.0], [60.2])
-    metres = maps.write_geotiff(tmp_path / "metres.tif", z, UTM, x0 - n, y0 + n, 2.0, 2.0)
-    a, b = read_dem(degrees), read_dem(metres)
-    lon, lat = frame.degrees(*np.random.default_rng(1).uniform(-50, 50, size=(2, 200)))
-    difference = np.abs(a.at_degrees(lon, lat) - b.at_degrees(lon, lat))
-    # The zone's scale is 0.9996: two centimetres over 50 m, on a slope of less than 1.
-    assert difference.max() < 0.03
-    one = add_terrain(
-        "Degrees",
-        degrees,
-        tmp_path / "mine",
-        ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey"),
-    )
-    two = add_terrain("Metres", metres, tmp_path / "mine", ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True))
-    places = np.random.default_rng(2).uniform(-39, 39, size=(100, 2))
-    za = maps.ground_z(one.scene, places) + maps.origin_z(one)
-    zb = maps.ground_z(two.scene, places) + maps.origin_z(two)
-    assert np.abs(za - zb).max() < 0.03
-    assert one.scene.attribution == "A survey"
+def test_a_geotiff_in_degrees_is_the_same_relief_in_metres(tmp_path):
+    options = ReliefOptions(size_m=(80.0, 80.0), cell_m=4.0, bare=True, attribution="A survey")
+    place = add_terrain("Degrees", maps.hill_tif(tmp_path / "x.tif"), tmp_path / "mine", options)
+    x, y = np.meshgrid(np.arange(-36.0, 37.0, 8.0), np.arange(-36.0, 37.0, 8.0))
+    found = maps.ground_z(place.scene, np.column_stack([x.ravel(), y.ravel()])) + maps.origin_z(place)
+    np.testing.assert_allclose(found, maps.hill(x, y).ravel(), atol=0.05)
+    assert place.scene.attribution == "A survey"
 
 
 def test_missing_heights_are_the_nearest_ones(tmp_path):
@@ -169,34 +138,28 @@ def test_missing_heights_are_the_nearest_ones(tmp_path):
 
 
 def tif(folder, z=None, crs="EPSG:4326", dx=1e-5, nodata=None):
-    return maps.write_geotiff(
-        folder / "x.tif", maps.heights(2.0, 60.0) if z is None else z, crs, 24.9, 60.2, dx, dx, nodata
-    )
+    z = maps.heights(2.0, 60.0) if z is None else z
+    return maps.write_geotiff(folder / "x.tif", z, crs, 24.9, 60.2, dx, dx, nodata)
 
 
-FAULTS = {
-    "nothing but nodata": (
-        lambda d: tif(d, np.full((9, 9), -5.0), nodata=-5.0),
-        {},
-        "contains no heights: every cell is nodata",
-    ),
-    "no coordinate system": (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
-    "feet": (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),
-    "too large": (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 crops to its centre"),
-    "elsewhere": (
-        lambda d: tif(d),
-        {"bbox": (10.0, 50.0, 10.001, 50.001)},
-        "has no height: x.tif covers 24.9000",
-    ),
-    "too fine": (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
-    "no such file": (lambda d: d / "none.tif", {}, "No such file"),
-    "no height model": (lambda d: d / "x.png", {}, "a height model is a file .tif"),
-}
+def nothing(folder):
+    return tif(folder, np.full((9, 9), -5.0), nodata=-5.0)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_one_line(fault, tmp_path):
-    make, options, said = FAULTS[fault]
+@pytest.mark.parametrize(
+    ("make", "options", "said"),
+    [
+        (nothing, {}, "contains no heights: every cell is nodata"),
+        (lambda d: tif(d, crs=""), {}, "has no coordinate system"),
+        (lambda d: tif(d, crs="EPSG:2263", dx=2.0), {}, "not in metres or degrees"),  # feet
+        (lambda d: tif(d, dx=1e-3), {}, "--size 400 400 crops to its centre"),
+        (tif, {"bbox": (10.0, 50.0, 10.001, 50.001)}, "has no height: x.tif covers 24.9000"),
+        (lambda d: tif(d, dx=5e-5), {"cell_m": 0.3}, "take cells of"),
+        (lambda d: d / "none.tif", {}, "No such file"),
+        (lambda d: d / "x.png", {}, "a height model is a file .tif"),
+    ],
+)
+def test_a_fault_is_one_line(make, options, said, tmp_path):
     with pytest.raises((AssetError, UsageError)) as found:
         add_terrain("X", make(tmp_path), tmp_path / "mine", ReliefOptions(**options))
     assert said in str(found.value)
@@ -204,19 +167,36 @@ def test_a_fault_is_one_line(fault, tmp_path):
     assert not (tmp_path / "mine" / "scenes").exists()
 
 
-def test_a_file_cut_short_is_one_line(tmp_path):
-    whole = tif(tmp_path).read_bytes()
-    for part in (0, 60, len(whole) // 2):
-        (tmp_path / "cut.tif").write_bytes(whole[:part])
-        with pytest.raises(AssetError, match=r"cut\.tif cannot be read as a GeoTIFF, or is cut short"):
-            read_dem(tmp_path / "cut.tif")
-    (tmp_path / "cut.asc").write_text("ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n")
-    with pytest.raises(AssetError, match="says 4 by 4 heights and has 3: is it truncated"):
-        read_dem(tmp_path / "cut.asc")
-    np.savez(tmp_path / "cut.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
-    (tmp_path / "cut.npz").write_bytes((tmp_path / "cut.npz").read_bytes()[:80])
-    with pytest.raises(AssetError, match=r"cut\.npz cannot be read"):
-        read_dem(tmp_path / "cut.npz")
+def asc(head, numbers):
+    return f"{head}xllcorner 0\nyllcorner 0\ncellsize 1\n{numbers}\n".encode()
+
+
+def cut_npz(folder):
+    np.savez(folder / "whole.npz", heights_m=np.zeros((4, 4)), cell_m=1.0)
+    return (folder / "whole.npz").read_bytes()[:80]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        *(("x.tif", lambda d, part=part: tif(d).read_bytes()[:part], "as a GeoTIFF, or is cut short")
+          for part in (0, 60, 7000)),
+        ("x.npz", cut_npz, "x.npz cannot be read"),
+        ("x.asc", asc("ncols 4\nnrows 4\n", "1 2 3"), "says 4 by 4 heights and has 3: is it truncated"),
+        ("x.asc", asc("ncols inf\nnrows 4\n", "1 2 3 4"), "is not an ESRI ASCII grid"),
+        ("x.asc", asc("ncols -2\nnrows -2\n", "1 2 3 4"), "is not an ESRI ASCII grid"),
+    ],
+)  # fmt: skip
+def test_a_file_cut_short_or_with_sizes_that_are_none_is_one_line(name, content, said, tmp_path):
+    raw = content if isinstance(content, bytes) else content(tmp_path)
+    (tmp_path / name).write_bytes(raw)
+    with pytest.raises(AssetError, match=said):
+        read_dem(tmp_path / name)
+
+
+def test_heights_that_are_no_numbers_are_none(tmp_path):
+    (tmp_path / "x.asc").write_bytes(asc("ncols 2\nnrows 2\n", "1 inf 1e300 nan"))
+    assert np.nanmax(read_dem(tmp_path / "x.asc").heights_m) == 1.0
 
 
 def test_a_geotiff_is_no_way_to_other_files(tmp_path):
@@ -245,24 +225,6 @@ def test_arrays_far_larger_than_their_file_are_refused_before_they_are_made(tmp_
                     file.write(bytes(8 * max(1, int(np.prod(shape)))))
         with pytest.raises(AssetError, match=rf"{name} has 17,592,186,044,416 numbers"):
             read_dem(path)
-
-
-@pytest.mark.parametrize(
-    ("head", "numbers"),
-    [
-        ("ncols inf\nnrows 4\n", "1 2 3 4"),
-        ("ncols -2\nnrows -2\n", "1 2 3 4"),
-        ("ncols 2\nnrows 2\n", "1 inf 1e300 nan"),
-    ],
-)
-def test_numbers_that_are_none_are_one_line_or_no_height(head, numbers, tmp_path):
-    path = tmp_path / "x.asc"
-    path.write_text(f"{head}xllcorner 0\nyllcorner 0\ncellsize 1\n{numbers}\n")
-    if numbers.endswith("nan"):
-        assert np.nanmax(read_dem(path).heights_m) == 1.0
-        return
-    with pytest.raises(AssetError, match="is not an ESRI ASCII grid"):
-        read_dem(path)
 
 
 def test_a_files_name_cannot_write_into_the_recipe(hill, tmp_path):

@@ -5,14 +5,13 @@ import pytest
 import shapely
 from shapely.geometry import LineString, Point
 from support import maps
+from support.layout_checks import catalogue
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.imports.places import add_map
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 
 UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 
@@ -162,4 +161,4 @@ def test_a_plan_that_cannot_be_is_one_line(town, tmp_path):
     ):
         (tmp_path / "Wrong.toml").write_text(wrong)
         with pytest.raises(AssetError, match=said):
-            build_scene(tmp_path / "Wrong.toml", load_catalogue(home() / "scene_assets"))
+            build_scene(tmp_path / "Wrong.toml", catalogue())

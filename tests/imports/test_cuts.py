@@ -1,6 +1,5 @@
 """Parts of large meshes: triangles are cut at the border, closed bodies closed again, tiles lie side by side."""
 
-import json
 import re
 
 import numpy as np
@@ -47,9 +46,8 @@ def outside(region: Region, xy: np.ndarray) -> float:
 
 def volume_within(region: Region, mesh: trimesh.Trimesh) -> float:
     for normal, offset in region.planes:
-        mesh = trimesh.intersections.slice_mesh_plane(
-            mesh, -np.array([*normal, 0.0]), np.array([*(normal * offset), 0.0]), cap=True
-        )
+        inwards, at = -np.array([*normal, 0.0]), np.array([*(normal * offset), 0.0])
+        mesh = trimesh.intersections.slice_mesh_plane(mesh, inwards, at, cap=True)
     return float(mesh.volume)
 
 
@@ -64,7 +62,7 @@ def welded(corners: np.ndarray, apart_m: float) -> trimesh.Trimesh:
     return made
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @example(12408, True)  # ends of the rim that are hardly apart
 @example(1976, True)  # and on two sides of a border of the grid: a whole side was left open
 @given(st.integers(0, 10**6), st.booleans())
@@ -113,14 +111,9 @@ def test_a_part_without_anything_says_what_lies_where():
     nodes = city()
     with pytest.raises(AssetError, match=r"--crop 900 900 5: contains no part of the mesh: x is -5 to 185, y -5 to"):
         import_mesh("City", nodes, MeshOptions(crop_m=(900.0, 900.0, 5.0)))
-    with pytest.raises(
-        AssetError, match=r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
-    ):
+    large = r"too large to plan in.*--box X0 Y0 X1 Y1.*--tiles 200.*x is -250 to 9250, y"
+    with pytest.raises(AssetError, match=large):
         import_mesh("City", nodes, MeshOptions(scale=50.0))
-    for wrong in ({"crop_m": (0.0, 0.0, -5.0)}, {"box_m": (0.0, 0.0, 0.0, 9.0)}, {"crop_m": (0.0, float("nan"), 5.0)},
-                  {"crop_m": (0.0, 0.0, 9.0), "box_m": (0.0, 0.0, 9.0, 9.0)}):  # fmt: skip
-        with pytest.raises(UsageError, match=r"--crop|--box"):
-            import_mesh("City", nodes, MeshOptions(**wrong))
 
 
 def test_tiles_lie_side_by_side_in_one_frame(tmp_path):
@@ -171,7 +164,7 @@ def test_axis_and_unit_are_guessed_by_form(up, scale, unit):
     assert [name for _, name in found.units].index(unit) <= (unit == "millimetres")
 
 
-@pytest.mark.parametrize("wide_m", [51.0, 90.0, 150.0, 250.0, 900.0])
+@pytest.mark.parametrize("wide_m", [51.0, 150.0, 900.0])
 def test_a_file_in_centimetres_is_not_taken_for_one_in_inches(wide_m):
     """Between 50 and 157 m wide it was, as 250 m are the usual width."""
     box = trimesh.creation.box((100 * wide_m, 60 * wide_m, 1500.0))
@@ -194,16 +187,15 @@ def test_what_is_in_no_unit_has_its_size_in_plain_digits(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("word", "options"),
-    [
-        ("--up", ["--up", "Y"]), ("--up", ["--up", "w"]), ("--scale", ["--up", "z", "--scale", "-1"]),
-        ("--light", ["--up", "z", "--light", "moon"]), ("--crop", ["--up", "z", "--crop", "0", "0", "0"]),
-        ("--box", ["--up", "z", "--box", "1", "0", "1", "9"]),
-    ],
+    "options",
+    ["--up Y", "--scale -1", "--scale nan", "--light moon", "--crop 0 0 0", "--crop 0 nan 5", "--box 1 0 1 9",
+     "--crop 0 0 9 --box 0 0 9 9"],
 )  # fmt: skip
-def test_wrong_options_are_refused_before_the_mesh_is_read(tmp_path, capsys, word, options):
-    for how in ([], ["--tiles", "100"], *([["--list"]] if word in ("--up", "--scale") else [])):
-        code, _, err = said(capsys, "add-scene", "A", tmp_path / "missing.glb", *options, *how, "--project", tmp_path)
+def test_wrong_options_are_refused_before_the_mesh_is_read(tmp_path, capsys, options):
+    word, *_ = given = options.split()
+    for how in ([], ["--tiles", "100"], ["--list"])[: 3 if word in ("--up", "--scale") else 2]:
+        up = [] if word == "--up" else ["--up", "z"]
+        code, _, err = said(capsys, "add-scene", "A", tmp_path / "missing.glb", *up, *given, *how)
         assert code == 2
         assert re.fullmatch(rf"error: {word} [^\n]*\n", err)
         assert "missing.glb" not in err
@@ -239,10 +231,10 @@ def test_a_list_says_what_a_file_holds_and_writes_nothing(tmp_path, capsys, monk
 
 def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_path):
     # Metres of a map: millions.
-    nodes = city(streets=4)
-    mesh = trimesh.Trimesh(nodes[0].vertices + np.array([4.1e5, 6.6e6, 12.0]), nodes[0].faces, process=False)
+    (node,) = city(streets=4)
+    mesh = trimesh.Trimesh(node.vertices + np.array([4.1e5, 6.6e6, 12.0]), node.faces, process=False)
     mesh.export(tmp_path / "city.glb")
-    place = SourceMesh.of([nodes[0].with_vertices(np.asarray(mesh.vertices))], MeshOptions())
+    place = SourceMesh.of([node.with_vertices(np.asarray(mesh.vertices))], MeshOptions())
     assert place.low == pytest.approx([4.1e5 - 5, 6.6e6 - 5, 11.0])
     options = MeshOptions(crop_m=(410060.0, 6600060.0, 40.0))
     added = add_scene("Far", tmp_path / "city.glb", tmp_path / "mine", options)
@@ -250,4 +242,4 @@ def test_a_part_of_a_place_far_from_its_origin_is_one_recipe_like_others(tmp_pat
     assert recipe.origin_m == added.repairs.origin_m
     assert recipe.origin_m[1] == pytest.approx(6600060.0, abs=1.0)
     assert np.abs(added.scene.bounds[:, :2]).max() <= 41
-    assert json.dumps(recipe.crop_m) == "[410060.0, 6600060.0, 40.0]"
+    assert recipe.crop_m == options.crop_m

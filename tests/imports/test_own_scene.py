@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from support import foreign
 from support.command_line import said
+from support.layout_checks import catalogue
 
 from aerialdojo_gen.annotations.draft import AnnotationDrafter, DraftOptions
 from aerialdojo_gen.annotations.landmarks import choose_landmarks
@@ -20,7 +21,6 @@ from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.imports.forms import form_of, grown, is_unnamed
 from aerialdojo_gen.imports.import_mesh import import_mesh
 from aerialdojo_gen.imports.naming import Naming, words_in
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.store.shards import read_scene
 
 
@@ -35,8 +35,7 @@ def pasted(text: str, begin: str) -> list[str]:
 def yard(*bodies: tuple[str, trimesh.Trimesh, tuple[float, float, float]]) -> trimesh.Scene:
     scene = trimesh.Scene()
     for name, body, place in bodies:
-        body.apply_translation(place)
-        scene.add_geometry(body, node_name=name)
+        scene.add_geometry(body.copy().apply_translation(place), node_name=name)
     return scene
 
 
@@ -61,14 +60,18 @@ def added(capsys, scene: trimesh.Scene, name: str, *options: str) -> str:
     return out
 
 
+def drafted(place, name: str) -> dict:
+    return json.loads((place / f"our scenes/annotations/{name}.json").read_text())
+
+
 @pytest.mark.pipeline
 def test_from_a_mesh_to_tasks_by_what_the_commands_advise_past_a_scene_without_annotations(place, capsys):
     out = added(capsys, foreign.village(), "Village")
-    code, drafted, err = said(capsys, *pasted(out, "next: "))
+    code, told, err = said(capsys, *pasted(out, "next: "))
     assert code == 0, err
-    assert drafted.strip() == str(place / "our scenes/annotations/Village.json")
+    assert told.strip() == str(place / "our scenes/annotations/Village.json")
     assert "up to 7 objects by 2 landmarks" in err  # eight houses and a tower
-    draft = json.loads((place / "our scenes/annotations/Village.json").read_text())
+    draft = drafted(place, "Village")
     assert len(draft["landmarks"]) == 2
     assert 2 <= len(draft["objects"]) <= 7
     run = pasted(added(capsys, foreign.village(), "Hamlet"), "then: ")
@@ -98,51 +101,38 @@ def test_from_a_mesh_to_tasks_by_what_the_commands_advise_past_a_scene_without_a
     code, _, err = said(capsys, "run", later, "--data", run[3], "--workers", "1", "--replace")
     assert code == 0, err
     assert err.count("left out: Hamlet") == 1
+    # Numbers that cannot be had are the most.
+    code, _, err = said(capsys, *shlex.split(advice[0])[1:], "--objects", "30", "--landmarks", "1", "--quiet")
+    assert code == 0, err
+    assert len(drafted(place, "Hamlet")["objects"]) >= 2
 
 
-def test_what_cannot_be_drafted_says_why_and_what_to_do(place, capsys):
-    # A barn in a shed: nothing of it can be looked at. Flat things without a name that is a word are slabs.
-    bodies = yard(
-        ("Shed", box(12, 10, 9), (0, 0, 4.5)), ("Barn", box(8, 6, 5), (1, 0, 2.5)),
-        ("Mesh_012", box(40, 40, 0.1), (0, 0, 0)),
-    )  # fmt: skip
-    code, _, err = said(capsys, *pasted(added(capsys, bodies, "Inside"), "next: "))
+BARN = ("Barn", box(8, 6, 5), (0, 0, 2.5))
+# A barn in a shed: nothing of it can be looked at. Flat things without a name that is a word are slabs.
+INSIDE = yard(("Shed", box(12, 10, 9), (0, 0, 4.5)), ("Barn", box(8, 6, 5), (1, 0, 2.5)),
+              ("Mesh_012", box(40, 40, 0.1), (0, 0, 0)))  # fmt: skip
+WHY = r"not taken: 1 of ground, slabs or scraps, 1 without 3 viewpoints at 1 m \(shut in, or below ground\)"
+
+
+@pytest.mark.parametrize(("bodies", "why"), [(INSIDE, WHY), (yard(BARN), "nothing in it can be drafted")])
+def test_what_cannot_be_drafted_says_why_and_what_to_do(place, capsys, bodies, why):
+    code, _, err = said(capsys, *pasted(added(capsys, bodies, "Odd"), "next: "))
     assert code == 1
-    why = r"not taken: 1 of ground, slabs or scraps, 1 without 3 viewpoints at 1 m \(shut in, or below ground\)"
     assert re.search(why, err), err
-    assert "aerialdojo-gen annotate --scene Inside --pipeline 'our scenes/pipeline.toml'" in err
+    assert "aerialdojo-gen annotate --scene Odd --pipeline 'our scenes/pipeline.toml'" in err
     assert not re.search(r"ask for|--objects", err)
     assert not list((place / "our scenes/annotations").iterdir())
 
 
 def test_one_thing_beside_a_landmark_is_taken_with_a_warning(place, capsys):
-    out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5)), ("Well", box(2, 2, 2), (15, 3, 1))), "Farm")
-    code, _, err = said(capsys, *pasted(out, "next: "))
+    code, _, err = said(
+        capsys, *pasted(added(capsys, yard(BARN, ("Well", box(2, 2, 2), (15, 3, 1))), "Farm"), "next: ")
+    )
     assert code == 0, err
     assert "a single object makes no task" in err
     assert "aerialdojo-gen annotate --scene Farm --pipeline 'our scenes/pipeline.toml'" in err
-    draft = json.loads((place / "our scenes/annotations/Farm.json").read_text())
+    draft = drafted(place, "Farm")
     assert {draft["landmarks"][0]["name"], draft["objects"][0]["name"].split()[-1]} == {"barn", "well"}
-
-
-def test_a_single_thing_is_no_scene_to_search(place, capsys):
-    out = added(capsys, yard(("Barn", box(8, 6, 5), (0, 0, 2.5))), "Alone")
-    code, _, err = said(capsys, *pasted(out, "next: "))
-    assert code == 1
-    assert "nothing in it can be drafted" in err
-    assert "ask for" not in err
-    assert not list((place / "our scenes/annotations").iterdir())
-
-
-def test_numbers_that_cannot_be_had_are_the_most(place, capsys):
-    added(capsys, foreign.village(), "Village")
-    draft = ["annotate-draft", "Village", "--pipeline", "our scenes/pipeline.toml"]
-    code, _, err = said(capsys, *draft, "--objects", "1")
-    assert code == 2
-    assert "'1' is neither auto nor a number from 2 on" in err
-    code, _, err = said(capsys, *draft, "--objects", "30", "--landmarks", "1", "--quiet")
-    assert code == 0, err
-    assert len(json.loads((place / "our scenes/annotations/Village.json").read_text())["objects"]) >= 2
 
 
 @pytest.mark.pipeline
@@ -166,7 +156,7 @@ def test_drafts_are_true_or_silent(place, capsys):
     draft = pasted(out, "next: ")
     code, _, err = said(capsys, *draft)
     assert code == 0, err
-    made = json.loads((place / "our scenes/annotations/Depot.json").read_text())
+    made = drafted(place, "Depot")
     texts = [entry["name"] for entry in made["objects"]]
     told = "\n".join([*texts, *(mark["name"] for mark in made["landmarks"])])
     assert not re.search(r"\b(mesh|c3e0b|ceb|c e b|a3f9c|afc|a f c|\d+)\b", told), told
@@ -195,7 +185,7 @@ def test_what_cannot_be_told_apart_says_with_what_it_is_confused(project):
     bodies = (("Tower", box(5, 5, 20), (0, 0, 10)), *crates)
     nodes = [foreign.raw(body.apply_translation(place), name) for name, body, place in bodies]
     adopted, _ = import_mesh("Stack", nodes)
-    vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), load_catalogue(project / "scene_assets"))
+    vocabulary = Vocabulary(dataclasses.replace(adopted, imported=True), catalogue())
     drafter = AnnotationDrafter(vocabulary, choose_landmarks(vocabulary, 1), DraftOptions(max_per_category=30))
     chosen = []
     made = drafter.objects(9, lambda: chosen.append(1))
@@ -217,7 +207,7 @@ def test_a_table_says_what_nodes_are_called(place, capsys):
     out = added(capsys, yard(*nodes), "Garden", "--names", "names.csv")
     code, _, err = said(capsys, *pasted(out, "next: "))
     assert code == 0, err
-    made = json.loads((place / "our scenes/annotations/Garden.json").read_text())
+    made = drafted(place, "Garden")
     names = [*(m["name"] for m in made["landmarks"]), *(entry["name"] for entry in made["objects"])]
     assert any(name.endswith("garden shed") for name in names)
     assert not any("fountain" in name for name in names)

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.foreign import raw
 from support.hills import CELL_M, Hills, hills, standing
+from support.layout_checks import catalogue
 
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
-from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.geometry.ground import Ground
 from aerialdojo_gen.imports.import_mesh import MeshOptions, import_mesh
 from aerialdojo_gen.imports.naming import Naming, NodeName, Row
@@ -19,7 +19,6 @@ from aerialdojo_gen.imports.raw import RawNode, RawSurface, default_colours, emp
 from aerialdojo_gen.imports.split_components import split_components
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
-from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 
 
@@ -34,8 +33,7 @@ def yard() -> list[RawNode]:
     return [raw(b, f"Shed.{k:03d}") for k, b in enumerate(boxes)]
 
 
-@pytest.mark.parametrize("kind", ["ball", "half", "box"])
-@pytest.mark.parametrize("name", ["SkyDome", "Sphere.001", ""])
+@pytest.mark.parametrize(("kind", "name"), [("ball", "SkyDome"), ("half", "Sphere.001"), ("box", "")])
 def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
     scene, repairs = import_mesh("Yard", [*yard(), raw(dome(kind), name)])
     assert [b.surface for b in scene.backdrop] == ["dome"]
@@ -47,14 +45,12 @@ def test_a_dome_is_drawn_and_never_in_the_way(kind, name, tmp_path):
     assert [i.node for i in scene.instances] == [i.node for i in plain_scene.instances]
     write_glb(scene, tmp_path / "yard.glb")
     again = read_glb(tmp_path / "yard.glb")
-    assert [(b.node, b.surface, len(b.faces)) for b in again.backdrop] == [
-        (b.node, b.surface, len(b.faces)) for b in scene.backdrop
-    ]
-    assert [i.surface for i in again.instances] == [i.surface for i in scene.instances]
+    for kept in ("backdrop", "instances"):
+        told = [[(i.node, i.surface, len(i.faces)) for i in getattr(one, kept)] for one in (again, scene)]
+        assert told[0] == told[1]
     assert ClearanceGrid.build(again).reachable([0.0, 8.0, 3.0])
-    assert CollisionWorld(again).distance_m([0.0, 8.0, 3.0]) == CollisionWorld(plain_scene).distance_m(
-        [0.0, 8.0, 3.0]
-    )
+    free, bare = (CollisionWorld(one).distance_m([0.0, 8.0, 3.0]) for one in (again, plain_scene))
+    assert free == bare
 
 
 def test_what_encloses_and_is_no_sky_stays():
@@ -217,6 +213,6 @@ def test_the_ground_of_a_scan_without_a_name_is_nothing_to_look_for():
     # What stands on it stays: three blocks, each to be found.
     things = [i for i in scene.instances if i.category == "object"]
     assert len(things) == 3
-    vocabulary = Vocabulary(replace(scene, imported=True), load_catalogue(home() / "scene_assets"))
+    vocabulary = Vocabulary(replace(scene, imported=True), catalogue())
     targets = {i.node for i, w in zip(scene.instances, vocabulary.words, strict=True) if w.target}
     assert targets == {i.node for i in things}

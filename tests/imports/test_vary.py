@@ -11,35 +11,20 @@ from aerialdojo_gen.dataset.build import run_pipeline
 from aerialdojo_gen.imports.worlds import VaryOptions, vary
 from aerialdojo_gen.store.root import open_root
 
-
-@pytest.mark.pipeline
-def test_a_world_runs_through_the_stages_and_tests_by_its_seed(tmp_path: Path) -> None:
-    """Worlds to train on, from seed 1000 on, do so in `tests/learning/test_several_places.py`."""
-    out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=3)
-    (one,) = vary(["U_Parking*"], range(7, 8), out, options)
-    assert one.made
-    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")}
-    (again,) = vary(["U_ParkingLot"], range(7, 8), out, options)
-    assert not again.made
-    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")} == before
-    with pytest.raises(UsageError, match="occupancy"):
-        vary(["U_ParkingLot"], range(7, 8), out, VaryOptions({"occupancy": 0.5}))
-    built, *others = run_pipeline(out / "pipeline.toml", data=out / "data", workers=1)
-    assert (built.stage, built.computed, built.shards) == ("build-scenes", 0, 1)
-    assert all(stage.computed for stage in others)
-    tables = [pq.read_table(p) for p in (out / "data/release/tasks").rglob("part-U_ParkingLot-7.parquet")]
-    assert {s for t in tables for s in t.column("subset").to_pylist()} == {"test"}
+WORLD = ["U_ParkingLot"], range(7, 8)
 
 
 def files_of(data: Path) -> dict[str, bytes]:
     return {str(p.relative_to(data)): p.read_bytes() for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
 
 
-@pytest.mark.slow
-def test_the_mesh_is_what_build_scenes_writes_until_the_plan_is_edited(tmp_path: Path) -> None:
-    out = tmp_path / "worlds"
-    vary(["U_ParkingLot"], range(8, 9), out, VaryOptions({}, n_objects=3))
-    data, name = out / "data", "U_ParkingLot-8"
+@pytest.mark.pipeline
+def test_a_world_runs_through_the_stages_by_its_mesh_until_its_plan_is_edited(tmp_path: Path) -> None:
+    """Worlds to train on, from seed 1000 on, do so in `tests/learning/test_several_places.py`."""
+    out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=3)
+    (one,) = vary(["U_Parking*"], WORLD[1], out, options)
+    assert one.made
+    data, name = out / "data", "U_ParkingLot-7"
     mesh, shard, plan = data / f"meshes/{name}.glb", data / f"scenes/{name}/part-00000.parquet", out / "scenes"
 
     def computed(where: Path = data) -> int:
@@ -51,13 +36,23 @@ def test_the_mesh_is_what_build_scenes_writes_until_the_plan_is_edited(tmp_path:
     assert computed(tmp_path / "other") == 1
     assert files_of(tmp_path / "other") == handed_over
 
-    assert computed() == 0
-    mesh.write_bytes(mesh.read_bytes()[:-1])
-    assert computed() == 1
+    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")}
+    (again,) = vary(*WORLD, out, options)
+    assert not again.made
+    assert {p: p.stat().st_mtime_ns for p in out.rglob("*.*ml")} == before
+    with pytest.raises(UsageError, match="occupancy"):
+        vary(*WORLD, out, VaryOptions({"occupancy": 0.5}))
+
+    built, *others = run_pipeline(out / "pipeline.toml", data=data, workers=1)
+    assert (built.stage, built.computed, built.shards) == ("build-scenes", 0, 1)
+    assert all(stage.computed for stage in others)
+    tables = [pq.read_table(p) for p in (data / "release/tasks").rglob(f"part-{name}.parquet")]
+    assert {s for t in tables for s in t.column("subset").to_pylist()} == {"test"}
+
     shard.unlink()
     mesh.write_bytes(b"half of a mesh")
     assert computed() == 1
-    assert files_of(data) == handed_over
+    assert {file: files_of(data)[file] for file in handed_over} == handed_over
 
     text = (plan / f"{name}.toml").read_text()
     (plan / f"{name}.toml").write_text(text.replace("\nceiling_m = ", "\nceiling_m = 1", 1))
@@ -66,7 +61,7 @@ def test_the_mesh_is_what_build_scenes_writes_until_the_plan_is_edited(tmp_path:
 
     shutil.rmtree(plan)
     with open_root(data).lock(), pytest.raises(StoreError, match="another run is writing"):
-        vary(["U_ParkingLot"], range(8, 9), out)
+        vary(*WORLD, out)
     assert list(plan.iterdir()) == []
 
 

@@ -141,6 +141,13 @@ def ground_z(scene: Scene, places: np.ndarray) -> np.ndarray:
     return 500.0 - ground.first_hit(origins, np.tile([0.0, 0.0, -1.0], (len(origins), 1)))[0]
 
 
+def same_scene(a: Scene, b: Scene) -> bool:
+    """Whether two scenes have the same nodes, to the bit."""
+    return [i.node for i in a.instances] == [i.node for i in b.instances] and all(
+        np.array_equal(one.vertices, other.vertices) for one, other in zip(a.instances, b.instances, strict=True)
+    )
+
+
 def write_geotiff(
     path: Path, z: np.ndarray, crs: str, west: float, north: float, dx: float, dy: float, nodata: float | None = None
 ) -> Path:
@@ -154,6 +161,13 @@ def write_geotiff(
     ) as file:  # fmt: skip
         file.write(z.astype(np.float32), 1)
     return path
+
+
+def hill_tif(path: Path) -> Path:
+    """Write the hill as a GeoTIFF in degrees, 2 m apart, 120 m wide."""
+    west, _, _, north = box(61.0)
+    east_m, north_m = FRAME.metres_a_degree
+    return write_geotiff(path, heights(2.0, 60.0), "EPSG:4326", west, north, 2.0 / east_m, 2.0 / north_m)
 
 
 def crowded(seed: int, n: int = 40) -> list[tuple[list[tuple[float, float]], dict[str, str]]]:
