@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -15,7 +16,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make fuzz", description=__doc__)
     parser.add_argument("-n", type=int, default=500, help="mutants of each target")
     parser.add_argument("--seed", type=int, default=0, help="another seed makes other mutants")
-    parser.add_argument("--start", type=int, default=0, help="number of the first mutant")
     parser.add_argument("--target", action="append", choices=TARGETS, help="one target, again for more")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time")
     parser.add_argument("--save", type=Path, default=Path("fuzz-faults"), help="folder for the inputs of faults")
@@ -24,10 +24,7 @@ def main() -> int:
     faults = 0
 
     def some(mine: list[str]) -> dict[str, campaign.Outcome]:
-        counts = {name: campaign.number_for(name, asked.n) for name in mine}
-        return campaign.run(
-            {name: range(asked.start, asked.start + n) for name, n in counts.items()}, seed=asked.seed
-        )
+        return campaign.run([one for name in mine for one in campaign.mutants(name, asked.n)], asked.seed)
 
     # A process takes seconds to start: small campaigns have one a job, large ones one a target.
     groups = [[name] for name in names] if asked.n > 2000 else [names[k :: asked.jobs] for k in range(asked.jobs)]
@@ -39,11 +36,11 @@ def main() -> int:
                 f"  {outcome.peak_mib:5} MiB  {len(outcome.faults)} faults",
                 flush=True,
             )
-            for (kind, where), count in outcome.kinds.most_common():
-                first = next(f for f in outcome.faults if (f["kind"], f["where"]) == (kind, where))
-                print(f"    {count:5} {kind} {where}: {first['index']}: {first['message'][:150]}", flush=True)
-            if outcome.faults:
-                campaign.save(name, asked.seed, outcome, asked.save)
+            for (kind, where), count in Counter((f["kind"], f["where"]) for f in outcome.faults).most_common():
+                alike = [f for f in outcome.faults if (f["kind"], f["where"]) == (kind, where)]
+                print(f"    {count:5} {kind} {where}: {alike[0]['index']}: {alike[0]['message'][:150]}", flush=True)
+                for fault in alike[:3]:
+                    campaign.save(name, asked.seed, fault, asked.save)
             faults += len(outcome.faults)
     print(f"{faults} faults" + (f": their inputs are in {asked.save}" if faults else ""))
     return 1 if faults else 0

@@ -20,13 +20,12 @@ from aerialdojo_gen.store.root import open_root
 
 
 def _answers() -> list[Case]:
-    texts = (
-        '{"thought": "Nothing here.", "action": "MoveForward3"}',
-        '<think>It is there.</think>\n```json\n{"action": "Stop"}\n```',
-        '{"order": [3, 1, 2, 5, 4]}',
-        '```\n{"order": [1, 2, 3, 4, 5]}\n```',
-    )
-    return [{"answer.json": text.encode()} if text[0] == "{" else {"answer.txt": text.encode()} for text in texts]
+    return [
+        {"answer.json": b'{"thought": "Nothing here.", "action": "MoveForward3"}'},
+        {"answer.txt": b'<think>It is there.</think>\n```json\n{"action": "Stop"}\n```'},
+        {"answer.json": b'{"order": [3, 1, 2, 5, 4]}'},
+        {"answer.txt": b'```\n{"order": [1, 2, 3, 4, 5]}\n```'},
+    ]
 
 
 def _read_answer(folder: Path) -> None:
@@ -52,12 +51,7 @@ def _shards() -> list[Case]:
 def _read_shard(folder: Path) -> None:
     path = next(p for p in folder.rglob("*.parquet"))
     table = next(t for t in _TABLES if store.shard_path(folder, t, court.SCENE) == path)
-    info = store.read_info(path.parent, path.name)
-    if info is not None:
-        assert isinstance(info.fingerprint, str)
-        assert isinstance(info.parts, int)
-        assert all(isinstance(k, str) and isinstance(v, int) for k, v in info.files.items())
-        json.dumps(info.summary)
+    json.dumps(vars(store.read_info(path.parent, path.name)))
     store.read_scene(folder, table, court.SCENE).to_pylist()
 
 
@@ -93,16 +87,14 @@ def _find(folder: Path) -> None:
 
 
 def _recordings() -> list[Case]:
-    camera = json.dumps(
-        {"K": [[8, 0, 8], [0, 8, 8], [0, 0, 1]], "body_from_camera": np.eye(4).tolist(), "fov_deg": 90.0}
-    )
+    matrix = [[8, 0, 8], [0, 8, 8], [0, 0, 1]]
+    camera = json.dumps({"K": matrix, "body_from_camera": np.eye(4).tolist(), "fov_deg": 90.0})
     colour = np.arange(16 * 16 * 3, dtype=np.uint8).reshape(16, 16, 3)
 
     def videos(folder: Path) -> None:
         for modality, suffix in (("rgb", "mp4"), ("depth", "mkv")):
-            with VideoWriter(
-                folder / f"front_{modality}.{suffix}", [modality], 16, 16, 15.0, comment=camera
-            ) as writer:
+            path = folder / f"front_{modality}.{suffix}"
+            with VideoWriter(path, [modality], 16, 16, 15.0, comment=camera) as writer:
                 for k in range(3):
                     writer.write({"rgb": colour + k, "depth": colour[..., 0].astype(np.uint16) + k})
 
@@ -124,11 +116,8 @@ def _read_recording(folder: Path) -> None:
 
 
 def _journals() -> list[Case]:
-    records = [
-        {"task_id": f"t{k}", "episode": {"success": True, "spl": 0.5}, "steps": {"action": [1, 2, 0]}}
-        for k in range(3)
-    ]
-    return [{"x.jsonl": b"".join(json.dumps(r).encode() + b"\n" for r in records)}]
+    record = {"episode": {"success": True, "spl": 0.5}, "steps": {"action": [1, 2, 0]}}
+    return [{"x.jsonl": b"".join(json.dumps({"task_id": f"t{k}"} | record).encode() + b"\n" for k in range(3))}]
 
 
 def _read_journal(folder: Path) -> None:
@@ -137,9 +126,7 @@ def _read_journal(folder: Path) -> None:
 
 
 TARGETS = {
-    "answer": Target(_answers, _read_answer, names_the_file=False),
-    "shard": Target(_shards, _read_shard),
-    "recording-note": Target(_notes, _find, ".json"),
-    "recording": Target(_recordings, _read_recording),
+    "answer": Target(_answers, _read_answer, names_the_file=False), "shard": Target(_shards, _read_shard),
+    "recording-note": Target(_notes, _find, ".json"), "recording": Target(_recordings, _read_recording),
     "journal": Target(_journals, _read_journal),
-}
+}  # fmt: skip

@@ -13,36 +13,30 @@ from aerialdojo_gen.base.rng import generator
 
 pytestmark = pytest.mark.slow
 
-EACH = 20
+EACH = 10
+
+
+def todo(name):
+    return campaign.mutants(name, EACH) + campaign.corpus(name)
 
 
 @pytest.fixture(scope="module")
 def outcomes():
-    inputs = [(name, folder) for name in targets.TARGETS for folder in campaign.corpus(name)]
-    assert len(inputs) > 20
-    return campaign.run({name: range(campaign.number_for(name, EACH)) for name in targets.TARGETS}, inputs)
+    return campaign.run([one for name in targets.TARGETS for one in todo(name)])
 
 
 @pytest.mark.parametrize("name", targets.TARGETS)
 def test_mutants_and_inputs_that_once_broke_a_parser_end_well_or_in_an_error_of_ours(outcomes, name):
-    assert outcomes[name].ran == campaign.number_for(name, EACH) + len(campaign.corpus(name))
+    assert outcomes[name].ran == len(todo(name))
     assert outcomes[name].faults == []
 
 
-def test_mutants_are_a_function_of_their_number(tmp_path):
-    first, again, other = (
-        [case for _, case in worker.mutants(name, seed, 0, 30)]
-        for name, seed in (("journal", 0), ("journal", 0), ("journal", 1))
-    )
-    assert first == again
-    assert first[1:] != other[1:]
-    (valid, *_), [(_, late)] = first, list(worker.mutants("journal", 0, 29, 30))
-    assert valid in targets.TARGETS["journal"].cases()
-    assert late == first[29]
-
-
-def _target(run, name="x.json"):
-    return targets.Target(lambda: [{name: b"{}"}], run)
+def test_mutants_are_a_function_of_their_number_and_all_inputs_that_broke_something_are_tried():
+    first = [worker.case_at("journal", 0, k) for k in range(30)]
+    assert [worker.case_at("journal", 0, k) for k in reversed(range(30))] == first[::-1]
+    assert [worker.case_at("journal", 1, k) for k in range(1, 30)] != first[1:]
+    assert first[0] in targets.TARGETS["journal"].cases()
+    assert len([at for name in targets.TARGETS for _, at in campaign.corpus(name)]) > 20
 
 
 def _raising(error):
@@ -64,13 +58,13 @@ def _raising(error):
     ],
 )
 def test_what_counts_as_a_fault(tmp_path, run, kind):
-    fault = worker.fault_of(_target(run), tmp_path)
+    fault = worker.fault_of(targets.Target(list, run), tmp_path)
     assert (fault and fault["kind"]) == kind
 
 
 # Without the real targets, whose imports take seconds.
 DEATHS = """
-import os, sys, types
+import os, sys, time, types
 from fuzzing.cases import Target
 targets = sys.modules["fuzzing.targets"] = types.ModuleType("fuzzing.targets")
 targets.TARGETS = {}
@@ -78,35 +72,27 @@ from fuzzing import worker
 def hang(folder):
     while True:
         pass
-def die(folder):
-    os.abort()
-def eat(folder):
-    bytearray(3 << 30)
 def run(folder):
     k = int((folder / "x.bin").read_bytes()[:1] or b"9")
-    [lambda f: None, hang, die, eat][k](folder) if k < 4 else None
+    does = [lambda f: None, hang, lambda f: os.abort(), lambda f: bytearray(3 << 30), lambda f: time.sleep(60)]
+    does[k](folder) if k < len(does) else None
 targets.TARGETS["deaths"] = Target(lambda: [{"x.bin": b"0"}], run)
-worker.HANG_S = 1.0
+worker.HANG_S, worker.STUCK_S = 0.5, 5.0
 worker.main()
 """
 
 
-def test_a_hang_a_death_and_a_glutton_are_laid_to_their_inputs(tmp_path, monkeypatch):
-    script = tmp_path / "deaths.py"
-    script.write_text(DEATHS)
-    folders = []
-    for k, what in enumerate("012030"):
-        folder = tmp_path / str(k)
-        folder.mkdir()
-        (folder / "x.bin").write_text(what)
-        folders.append(("deaths", folder))
-    monkeypatch.setattr(campaign, "COMMAND", [str(script)])
-    outcome = campaign.run({}, folders)["deaths"]
-    assert outcome.ran == 6
+def test_a_hang_a_death_a_glutton_and_a_wait_are_laid_to_their_inputs(tmp_path, monkeypatch):
+    (tmp_path / "deaths.py").write_text(DEATHS)
+    for k, what in enumerate("0120304"):
+        (tmp_path / str(k)).mkdir()
+        (tmp_path / str(k) / "x.bin").write_text(what)
+    monkeypatch.setattr(campaign, "COMMAND", [str(tmp_path / "deaths.py")])
+    outcome = campaign.run([("deaths", str(tmp_path / str(k))) for k in range(7)])["deaths"]
+    assert outcome.ran == 7
     assert [(f["index"], f["kind"]) for f in outcome.faults] == [
-        (str(folders[1][1]), "hang"),
-        (str(folders[2][1]), f"died of {-signal.SIGABRT}"),
-        (str(folders[4][1]), "MemoryError"),
+        (str(tmp_path / k), kind)
+        for k, kind in (("1", "hang"), ("2", f"died of {-signal.SIGABRT}"), ("4", "MemoryError"), ("6", "stuck"))
     ]
 
 

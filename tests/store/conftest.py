@@ -6,7 +6,7 @@ import os
 import shutil
 import urllib.request
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -79,11 +79,22 @@ def uploaded(server: str, smoke_bucket: str, tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.fixture
-def proxy(cloud: str, server: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Proxy]:
+def configure(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """A function that sets variables of the environment, for clients that are made from then on."""
+
+    def set_all(**variables: object) -> None:
+        for name, value in variables.items():
+            monkeypatch.setenv(name, str(value))
+        forget_clients()
+
+    return set_all
+
+
+@pytest.fixture
+def proxy(cloud: str, server: str, configure: Callable[..., None]) -> Iterator[Proxy]:
     """What stands before the server from now on, for this process and those that it starts."""
     made = Proxy(server)
-    monkeypatch.setenv("AWS_ENDPOINT_URL", made.url)
-    forget_clients()
+    configure(AWS_ENDPOINT_URL=made.url)
     yield made
     made.close()
 

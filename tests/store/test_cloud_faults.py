@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from support.command_line import called
 from support.roots import fill, read_folder, write
 from support.s3_server import Proxy, forget_clients
 
@@ -34,68 +35,57 @@ def test_a_fault_that_passes_is_not_seen(cloud: str, proxy: Proxy, how: int | st
     assert proxy.left() == 0
 
 
-@pytest.mark.parametrize("how", [500, "drop"])
-def test_a_part_of_an_upload_is_put_again(cloud: str, proxy: Proxy, how: int | str):
+def test_parts_of_an_upload_are_put_again(cloud: str, proxy: Proxy):
     root = open_root(cloud)
-    proxy.fail("^PUT .*partNumber=2", how)
+    proxy.fail("^PUT .*partNumber=2", 500)
+    proxy.fail("^PUT .*partNumber=3", "drop")
     write(root, "t/a/x", BIG)
     assert proxy.left() == 0
     assert root.below("t").digest("a/x", reread=True) == root.digest("t/a/x")
 
 
-def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+def test_a_download_that_breaks_off_goes_on(cloud: str, proxy: Proxy, tmp_path, configure):
     write(open_root(cloud), "t/a/x", BIG[: 4 << 20])
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
-    forget_clients()
+    configure(AERIALDOJO_CACHE=tmp_path / "another")
     proxy.fail("^GET .*t/a/x", "cut", 2)
     assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG[: 4 << 20]
     assert proxy.left() == 0
 
 
-def test_a_connection_that_falls_silent_is_made_anew(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
-    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.5")
-    forget_clients()
+def test_a_connection_that_falls_silent_is_made_anew(cloud: str, proxy: Proxy, tmp_path, configure):
+    configure(AERIALDOJO_TIMEOUT_S=0.5)
     root = open_root(cloud)
     proxy.fail("^PUT", 30.0)
     write(root, "t/a/x", BIG[: 1 << 20])
     assert sum(line.startswith("PUT") for line in proxy.seen) == 2
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
-    forget_clients()
+    configure(AERIALDOJO_CACHE=tmp_path / "another")
     proxy.fail("^GET .*t/a/x", 30.0)
     proxy.fail("^GET .*t/a/x", "stall", 2)
     assert open_root(cloud).local_copy("t/a/x").read_bytes() == BIG[: 1 << 20]
     assert sum(line.startswith("GET") and "t/a/x" in line for line in proxy.seen) == 4
 
 
-def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: str):
-    """The time limit of `run` guards against a hang; how long the command takes is not looked at."""
+def test_a_store_that_takes_connections_and_never_answers_ends_a_command(cloud: str, configure):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"http://127.0.0.1:{silent.getsockname()[1]}"
-        limits = {"AERIALDOJO_TIMEOUT_S": "0.5", "AWS_MAX_ATTEMPTS": "2", "AWS_ENDPOINT_URL": url}
-        command = [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", cloud]
-        done = subprocess.run(
-            command, env=os.environ | limits, capture_output=True, text=True, timeout=100, check=False
-        )
+        configure(AERIALDOJO_TIMEOUT_S=0.5, AWS_MAX_ATTEMPTS=2, AWS_ENDPOINT_URL=url)
+        done = called("stats", "--data", cloud)
     assert done.returncode == 1
     assert done.stderr.startswith("error: s3://")
     assert f"{url} cannot be reached, does not answer" in done.stderr
 
 
-def test_a_download_is_tried_as_often_as_the_client_tries(cloud: str, proxy: Proxy, tmp_path, monkeypatch):
+def test_a_download_is_tried_as_often_as_the_client_tries(cloud: str, proxy: Proxy, tmp_path, configure):
     write(open_root(cloud), "t/a/x", b"some bytes")
-    monkeypatch.setenv("AERIALDOJO_TIMEOUT_S", "0.3")
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
-    forget_clients()
+    configure(AERIALDOJO_TIMEOUT_S=0.3, AWS_MAX_ATTEMPTS=2, AERIALDOJO_CACHE=tmp_path / "another")
     proxy.fail("^GET .*t/a/x", 30.0, 100)
     with pytest.raises(StoreError, match="does not answer"):
         open_root(cloud).local_copy("t/a/x")
     assert proxy.left() == 98
 
 
-def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeypatch):
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "2")
-    forget_clients()
+def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, configure):
+    configure(AWS_MAX_ATTEMPTS=2)
     root = open_root(cloud)
     write(root, "t/a/x", b"old")
     fill(root, "media/S/n", {"a": b"old", "b": b"old"})
@@ -113,12 +103,10 @@ def test_what_cannot_be_put_leaves_the_old_one(cloud: str, proxy: Proxy, monkeyp
 
 
 @pytest.mark.parametrize("read", [store.count_rows, store.read_scene])
-def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy: Proxy, monkeypatch, tmp_path, read):
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+def test_a_shard_that_cannot_be_fetched_is_not_called_damaged(cloud: str, proxy: Proxy, configure, tmp_path, read):
     row = {"scene": "U_Test_0", "landmark_id": 0, "name": "tower", "mesh_node": "n", "x_m": 1, "y_m": 2, "z_m": 3}
     store.write_shard(cloud, "landmarks", "U_Test_0", 0, from_rows(schemas.LANDMARKS, [row]))
-    monkeypatch.setenv("AERIALDOJO_CACHE", str(tmp_path / "another"))
-    forget_clients()
+    configure(AWS_MAX_ATTEMPTS=1, AERIALDOJO_CACHE=tmp_path / "another")
     store._read_info.cache_clear()
     if read == store.read_scene:
         store.count_rows(cloud, "landmarks", "U_Test_0")
@@ -139,9 +127,9 @@ with root.lock():
 """
 
 
-def test_what_a_killed_run_left_is_removed_under_the_next_lock(cloud: str, proxy: Proxy, server: str, monkeypatch):
+def test_what_a_killed_run_left_is_removed_under_the_next_lock(cloud: str, proxy: Proxy, server: str, configure):
     """A real SIGKILL in the middle of an upload in parts, by a run that holds the lock."""
-    monkeypatch.setenv("AERIALDOJO_LEASE_S", "2")
+    configure(AERIALDOJO_LEASE_S=2)
     write(open_root(cloud), "t/a/x", b"old")
     proxy.fail("^PUT .*partNumber=3", 60.0, 9)
     run = subprocess.Popen([sys.executable, "-c", KILLED, cloud], stdout=subprocess.PIPE, text=True)
@@ -153,8 +141,7 @@ def test_what_a_killed_run_left_is_removed_under_the_next_lock(cloud: str, proxy
         assert run.poll() is None
     run.kill()
     run.wait()
-    monkeypatch.setenv("AWS_ENDPOINT_URL", server)
-    forget_clients()
+    configure(AWS_ENDPOINT_URL=server)
     bucket = Bucket(cloud.split("/")[2])
     uploads = bucket._client.list_multipart_uploads(Bucket=bucket.name)
     assert len(uploads.get("Uploads", [])) == 1
@@ -214,9 +201,8 @@ def test_a_bucket_that_is_not_there_is_named(cloud: str):
         open_root("s3://no-such-bucket/data").exists("t/a/x")
 
 
-def test_the_cache_is_bounded(cloud: str, monkeypatch, tmp_path):
-    monkeypatch.setenv("AERIALDOJO_CACHE_GB", "0.001")
-    forget_clients()
+def test_the_cache_is_bounded(cloud: str, configure, tmp_path):
+    configure(AERIALDOJO_CACHE_GB=0.001)
     root = open_root(cloud)
     for k in range(8):
         write(root, f"t/a/{k}", os.urandom(300_000))
@@ -232,9 +218,8 @@ def test_an_upload_by_others_is_a_folder_too(cloud: str):
     assert read_folder(open_root(cloud), "media/S/n") == {"a": b"1", "b": b"1"}
 
 
-def test_a_folder_that_is_being_written_is_not_there(cloud: str, proxy: Proxy, monkeypatch):
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
-    forget_clients()
+def test_a_folder_that_is_being_written_is_not_there(cloud: str, proxy: Proxy, configure):
+    configure(AWS_MAX_ATTEMPTS=1)
     root = open_root(cloud)
     proxy.fail("^PUT .*n/b", 503, 9)
     with pytest.raises(StoreError):

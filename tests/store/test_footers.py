@@ -1,14 +1,11 @@
 """Damage to a shard's footer: told as damage, whatever bit it is; never a traceback, never a wrong row."""
 
 import json
-import shutil
 
 import pytest
-from typer.testing import CliRunner
 
 from aerialdojo_gen.base.errors import StoreError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.store import schemas
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.footers import ShardFile, ShardInfo, _checksum, decode, encode
@@ -21,9 +18,9 @@ INFO = ShardInfo(
     {"rows_in": 3, "rows_out": 2, "counts": {"no_path": 1}},
     {"meshes/a.glb": ShardFile(7, "a" * 64), "b": ShardFile(8, "")},
 )  # fmt: skip
-DIGITS = b'{"rows": ' + b"9" * 5000 + b"}"
-NESTED = b"[" * 100_000
-STRANGE = [b"null", b"[]", b"x", b"", b"{}", b"3", b"\xff\xfe", b'{"rows": NaN}', DIGITS, NESTED]
+STRANGE = [
+    b"null", b"[]", b"", b"{}", b"\xff\xfe", b'{"rows": NaN}', b'{"rows": ' + b"9" * 5000 + b"}", b"[" * 100_000,
+]  # fmt: skip
 
 
 def flips(raw):
@@ -43,36 +40,13 @@ def shard(data, n=60):
     return store.write_shard(data, "pairs", SCENE, 0, table, fingerprint="f" * 64, summary=INFO.summary)
 
 
-def footer(path):
-    """Where a Parquet file's footer begins, and the file."""
-    raw = path.read_bytes()
-    return len(raw) - 8 - int.from_bytes(raw[-8:-4], "little"), raw
-
-
-def with_json(path, text):
-    """Give a shard another JSON of the same length in its footer, the rest of the file as it is."""
-    raw = path.read_bytes()
-    old = raw[raw.index(b'{"checksum"') :]
-    old = old[: json.JSONDecoder().raw_decode(old.decode("latin-1"))[1]]
-    assert raw.count(old) == 1
-    path.write_bytes(raw.replace(old, text.ljust(len(old))[: len(old)]))
-
-
-def test_a_footer_says_what_was_written():
-    assert decode(encode(INFO)) == INFO
-    assert encode(decode(encode(INFO))) == encode(INFO)
-
-
-def test_every_flipped_bit_of_the_json_is_found():
-    for damaged in flips(encode(INFO)):
+def test_a_footer_says_what_was_written_and_every_flipped_bit_is_found():
+    raw = encode(INFO)
+    assert decode(raw) == INFO
+    assert encode(decode(raw)) == raw
+    for damaged in (*flips(raw), *STRANGE):
         with pytest.raises(ValueError, match="its footer"):
             decode(damaged)
-
-
-@pytest.mark.parametrize("raw", STRANGE)
-def test_what_is_no_footer_is_refused(raw):
-    with pytest.raises(ValueError, match="its footer"):
-        decode(raw)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +76,8 @@ def test_a_footer_of_an_earlier_version_is_read():
 
 def test_bits_flipped_anywhere_in_the_footer_give_an_error_or_the_rows(tmp_path):
     path = shard(tmp_path)
-    begin, raw = footer(path)
+    raw = path.read_bytes()
+    begin = len(raw) - 8 - int.from_bytes(raw[-8:-4], "little")
     wanted = store.read_scene(tmp_path, "pairs", SCENE)
     drawn = generator(5, "flips", 0).choice(8 * (len(raw) - begin), 400, replace=False)
     spots = [(begin + int(k) // 8, int(k) % 8) for k in drawn]
@@ -135,20 +110,3 @@ def test_a_page_that_stands_for_another_column_is_found(tmp_path):
     with pytest.raises(StoreError, match="other rows"):
         store.read_scene(tmp_path, "pairs", SCENE, ["target_object_id"])
     assert store.read_scene(tmp_path, "pairs", SCENE, ["euclidean_m"]).num_rows == table.num_rows
-
-
-@pytest.mark.parametrize(("command", "text"), [("stats", b"null"), ("validate", b"[]"), ("evaluate", b"x")])
-def test_readers_say_in_a_line_that_a_footer_is_damaged(smoke, tmp_path, command, text):
-    data = tmp_path / "data"
-    shutil.copytree(smoke / "release", data / "release")
-    shutil.copytree(smoke / "meshes", data / "meshes")
-    path = store.shard_path(data, "routes/train", "U_Courtyard_0")
-    with_json(path, text)
-    more = {"validate": ["U_Courtyard_0", "--workers", "1"], "evaluate": ["--agent", "stop", "--split", "id_train"]}
-    done = CliRunner().invoke(app, [command, "--data", str(data), *more.get(command, [])])
-    said = done.output + str(done.exception or "")
-    assert done.exit_code == 1
-    assert "Traceback" not in said
-    assert isinstance(done.exception, SystemExit | StoreError), done.exception
-    assert str(path.relative_to(data / "release")) in said
-    assert "damaged" in said
