@@ -30,13 +30,12 @@ def call(capsys):
 
 
 @pytest.mark.parametrize("name", [*STAGE_NAMES, "run", "gallery", "annotate", "annotate-draft", *OF_A_RELEASE])
-@pytest.mark.parametrize("how", ["position", "option"])
-def test_scenes_are_named_by_position_and_by_option(name, how, smoke, call, tmp_path):
-    scene = ["U_Nowhere_0"] if how == "position" else ["--scene", "U_Nowhere_0"]
+def test_scenes_are_named_by_position_and_by_option(name, smoke, call):
     data = ["--data", smoke] if name in OF_A_RELEASE else []
-    code, _, said = call(name, *NEEDED.get(name, []), *scene, *data)
-    assert code == 2
-    assert "no scene 'U_Nowhere_0'" in said.replace("has no scene", "no scene")
+    for scene in ["U_Nowhere_0"], ["--scene", "U_Nowhere_0"]:
+        code, _, said = call(name, *NEEDED.get(name, []), *scene, *data)
+        assert code == 2
+        assert "no scene 'U_Nowhere_0'" in said
 
 
 def test_names_by_position_and_by_option_are_joined(smoke, call):
@@ -134,10 +133,8 @@ def test_what_is_printed_fits_80_columns(smoke, call, monkeypatch, project):
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(project)
     asked = [
-        ("stats", "--data", smoke),
-        ("config", "show"),
-        ("stats", "--pool", "--data", smoke, "--pipeline", "smoke"),
-    ]
+        ("stats", "--data", smoke), ("config", "show"), ("stats", "--pool", "--data", smoke, "--pipeline", "smoke"),
+    ]  # fmt: skip
     commands = typer.main.get_command(cli.app).commands
     for arguments in [*asked, ("--help",), *((name, "--help") for name in commands)]:
         code, out, said = call(*arguments)
@@ -146,19 +143,8 @@ def test_what_is_printed_fits_80_columns(smoke, call, monkeypatch, project):
 
 
 def test_an_agent_whose_packages_are_an_extra_names_it():
-    text = """
-import sys
-sys.modules["tenacity"] = None  # as where it is not installed
-from aerialdojo_gen.benchmark.agents import load_agent
-from aerialdojo_gen.base.errors import AerialDojoError
-for agent in ("openai", "anthropic"):
-    try:
-        load_agent(agent)
-    except AerialDojoError as error:
-        print(error.exit_code, error)
-"""
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines() == [
-        f"1 agent {agent!r} lacks the package tenacity: pip install 'aerialdojo-gen[llm]'"
-        for agent in ("openai", "anthropic")
-    ], done
+    # As where it is not installed.
+    code = "import sys; sys.modules['tenacity'] = None; from aerialdojo_gen.benchmark.agents import load_agent; "
+    done = subprocess.run([sys.executable, "-c", f"{code}load_agent('openai')"], capture_output=True, text=True)
+    told = "MissingPackage: agent 'openai' lacks the package tenacity: pip install 'aerialdojo-gen[llm]'\n"
+    assert done.stderr.endswith(told)

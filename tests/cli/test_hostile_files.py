@@ -13,8 +13,6 @@ from support.layout_checks import catalogue
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.rendering import finished
-from aerialdojo_gen.rendering.codecs import PngWriter
-from aerialdojo_gen.rendering.reader import read_recording
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
@@ -31,21 +29,11 @@ ROOF = {"shape": "block", "role": "roof_tiles", "corners": [-6, -6, 0, 0], "z": 
 POST = {"name": "post", "roles": {"body": "#808080"}, "params": {"h": 2}}
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("a." * 50_000 + "a = 1", "line 1, column 130: a key of more than 64 parts"),
-        ("name = 'x'\nseed = " + "[" * 50_000, "line 2, column 72: nested more than 64 deep"),
-        ("name = 'x'\nseed = " + "7" * 5000, "line 2, column 8: a number of 5,000 digits"),
-        ("[render]\nwidth = 100000000", "[render] width = 100000000: Input should be less than or equal to 4096"),
-        ('scene_assets = "a\\u0000b"', "scene_assets: has a NUL character"),
-    ],
-)
-def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_path, capsys, text, place):
+def test_a_command_names_the_place_in_a_pipeline_that_no_parser_survives(tmp_path, capsys):
     path = tmp_path / "p.toml"
-    path.write_text(text)
+    path.write_text("name = 'x'\nseed = " + "[" * 50_000)
     code, _, err = said(capsys, "plan", "--pipeline", path, "--data", tmp_path / "d")
-    assert (code, err) == (2, f"error: {path}: {place}\n")
+    assert (code, err) == (2, f"error: {path}: line 2, column 72: nested more than 64 deep\n")
     assert not (tmp_path / "d").exists()
 
 
@@ -68,7 +56,6 @@ def drawn(*parts):
     ("change", "says"),
     [
         ({"size_m": [float("nan"), 30]}, "size_m[0]: is nan, no finite number"),
-        ({"sun": [0, 0, float("inf")]}, "sun[2]: is inf, no finite number"),
         ({"size_m": [1e9, 30]}, "size_m.0 = 1000000000.0: Input should be less than or equal to 1000"),
         ({"seed": 10**30}, "seed: is an integer beyond 64 bits"),
         ({"seed": Raw("[" * 40_000)}, "nested more than 64 deep"),
@@ -95,22 +82,12 @@ def assert_refused(path, says, place=""):
     assert says in str(refused.value)
 
 
-def assert_named(message, start, place):
-    """A message names the key by its table and last keys, its value, and what is wrong with it."""
-    key, _, said = place.rpartition(": ")
-    assert message.startswith(start), message
-    assert key.replace(".", " ").split() == [k for k in key.replace(".", " ").split() if k in message], message
-    assert said in message, message
-
-
 @pytest.mark.parametrize(
     ("entry", "says"),
     [
         ({"paint": ["nan", -6, 0, 0], "material": "mud"}, "(paint): paint = ['nan', -6, 0, 0]: 'nan' uses"),
-        ({"paint": [0, 0, float("inf"), 9], "material": "mud"}, ".paint[2]: is inf, no finite number"),
         ({"paint": [-6, False, 0, 0], "material": "mud"}, "expected a number or an expression, got False"),
         ({"paint": [-6, -1e-300, 0, 0], "material": "mud"}, "a rectangle must be 0.01 m wide and deep or more"),
-        (drawn({"corners": ["nan", -6, 0, 0]}), "parts[0] (block): 'nan' uses"),
         (drawn({"corners": [-6, -1e-300, 0, 0]}), "parts[0] (block): the outline has no area"),
         (WALLS | {"lines": [[[1, 1], [1, 1]]]}, "consecutive points of a line must be 0.01 m apart"),
         (WALLS | {"lines": [[[0, 0], [1e7, 0]]]}, "must lie within 2,000"),
@@ -142,16 +119,12 @@ def test_the_sun_of_an_imported_scene_stands_above_too(tmp_path):
 @pytest.mark.parametrize(
     ("part", "place"),
     [
-        ({"shape": "cylinder", "radius": 1, "height": 1, "segments": 100_000_000}, "segments must be 3 to 256"),
         ({"shape": "cylinder", "radius": 1, "height": 1, "segments": "h*1e9"}, "segments must be 3 to 256"),
-        ({"shape": "torus", "radius": 1, "tube": 0.1, "sides": 1e16}, "sides must be 3 to 64"),
-        ({"shape": "sphere", "radius": 1, "subdivisions": 1e6}, "subdivisions must be 0 to 4"),
         ({"shape": "sphere", "radius": 1, "subdivisions": 1e6, "half": True}, "subdivisions must be 0 to 4"),
         ({"shape": "sweep", "path": [[0, 0, 0], [0, 0, 1]], "radius": 1, "sides": "1e15"}, "sides must be 3 to 64"),
         ({"shape": "lathe", "points": [[1, 0]] * 2001}, "points must be 2 to 2,000 points"),
         ({"shape": "box", "size": [1, 1, 1e300]}, "size must lie within 10,000"),
         ({"shape": "box", "size": [1, 1, True]}, "size must be a number"),
-        ({"shape": "box", "size": [1, [1], 1]}, "size must be a number"),
         ({"shape": "box", "size": {"x": 1}}, "is neither a number nor an expression"),
         ({"shape": "box", "size": ["1/0", 1, 1]}, "division by zero"),
         ({"shape": "box", "size": ["min(1)", 1, 1]}, "min does not take 1 arguments"),
@@ -209,17 +182,6 @@ def test_a_recording_json_of_other_types_is_rendered_again(tmp_path, rows):
     for text in ("[" * 50_000, "[]", '"x"', "1" * 5000, '{"fingerprint": NaN}'):
         note.write_text(text)
         assert finished.find(open_root(tmp_path), FOLDER, FINGERPRINT) is None
-
-
-def test_a_recording_is_read_by_its_path_as_text(tmp_path):
-    for modality in ("rgb", "depth"):
-        shape = (16, 16, 3) if modality == "rgb" else (16, 16)
-        with PngWriter(tmp_path / f"front_{modality}", modality, comment='{"fov_deg": 90.0}') as writer:
-            writer.write({modality: np.full(shape, 7, np.uint8 if modality == "rgb" else np.uint16)})
-    for path in (tmp_path, str(tmp_path)):
-        recording = read_recording(path)
-        assert recording.cameras == {"front": {"fov_deg": 90.0}}
-        assert recording.rgb["front"][0].shape == (16, 16, 3)
 
 
 def test_a_texture_that_asks_for_far_more_pixels_than_bytes_is_not_decoded(tmp_path):

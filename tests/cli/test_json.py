@@ -65,21 +65,13 @@ def test_estimate_is_of_the_selection(smoke, project, capsys):
 
 
 def test_validate_lists_every_fault_and_ends_as_it_does_without(planted, project, capsys):
-    options = (
-        "--pipeline",
-        project / "pipelines/smoke.toml",
-        "--no-meshes",
-        "--workers",
-        "1",
-        "--scene",
-        planted.scene,
-    )
+    pipeline = project / "pipelines/smoke.toml"
+    options = (*f"--no-meshes --workers 1 --scene {planted.scene} --pipeline".split(), pipeline)
     whole = document(capsys, "validate", "--data", planted.data, *options)
     assert whole["faults"] == []
     assert sum(check["judged"] for check in whole["checks"]) > 1000
-    shutil.copy(
-        next((planted.data / "release/scenes").rglob("*.parquet")), planted.data / "release/scenes/more.parquet"
-    )
+    tables = planted.data / "release/scenes"
+    shutil.copy(next(tables.rglob("*.parquet")), tables / "more.parquet")
     broken = document(capsys, "validate", "--data", planted.data, *options, code=1)
     assert broken["faults"]
     assert sum(check["faults"] for check in broken["checks"]) == len(broken["faults"])
