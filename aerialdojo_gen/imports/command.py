@@ -46,14 +46,9 @@ class AddedScene:
 
 
 def add_scene(
-    name: str,
-    mesh: Path,
-    project: Path,
-    options: MeshOptions,
-    *,
-    annotations: Path | None = None,
+    name: str, mesh: Path, project: Path, options: MeshOptions, *, annotations: Path | None = None,
     force: bool = False,
-) -> AddedScene:
+) -> AddedScene:  # fmt: skip
     """Make a scene from a mesh file in a project folder."""
     check_free([name], project, force)
     text = None if annotations is None else _annotations(annotations, name)

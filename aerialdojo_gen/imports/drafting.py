@@ -41,24 +41,16 @@ _FEW_THINGS = 8
 # A task needs a start and a target object.
 MIN_OBJECTS = 2
 _CAUSES = {
-    "no_surface": "no surface 1 m away",
-    "out_of_bounds": "outside the flight volume",
-    "in_collision": "too close to something else",
-    "unreachable": "shut in, or below ground",
+    "no_surface": "no surface 1 m away", "out_of_bounds": "outside the flight volume",
+    "in_collision": "too close to something else", "unreachable": "shut in, or below ground",
     "not_visible": "hidden by something else",
-}
+}  # fmt: skip
 
 
 def draft_scene(
-    name: str,
-    pipeline: Pipeline,
-    roots: ProjectPaths,
-    options: DraftOptions | None = None,
-    *,
-    force: bool = False,
-    reporter: Reporter | None = None,
-    scene: Scene | None = None,
-) -> Path:
+    name: str, pipeline: Pipeline, roots: ProjectPaths, options: DraftOptions | None = None, *, force: bool = False,
+    reporter: Reporter | None = None, scene: Scene | None = None,
+) -> Path:  # fmt: skip
     """Draft a scene's annotations and write them to the annotations folder; builds the scene unless it is given."""
     path, reporter = roots.annotations / f"{name}.json", reporter or Reporter(quiet=True)
     options = options or DraftOptions()

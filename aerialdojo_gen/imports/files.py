@@ -139,11 +139,8 @@ def _object_of(name: str, named: Mapping[str, str], path: Path) -> str:
 
 
 def check_glb(path: Path) -> None:
-    """Refuse a GLB or glTF file whose arrays would be far larger than the file, before any of them is made.
-
-    An accessor without a buffer view is all zeros and costs the file nothing, and several nodes may show one mesh: a
-    few hundred bytes can ask for terabytes.
-    """
+    """Refuse a GLB or glTF file whose arrays would be far larger than the file, before any of them is made."""
+    # An accessor without a buffer view costs the file nothing, and several nodes may show one mesh.
     with path.open("rb") as file:
         text = file.read(MAX_FILE_BYTES // 4) if path.suffix.lower() == ".gltf" else _glb_json(file)
         try:

@@ -364,8 +364,7 @@ def _is_terrain(body: RawNode, extent: Floats) -> bool:
     size = np.ptp(body.vertices, axis=0)
     if (size[:2] < 0.5 * extent[:2]).any() or not 0.05 * size[:2].max() <= size[2] < 0.25 * size[:2].min():
         return False
-    a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = body.normals
     level = np.abs(normal[:, 2]).sum() >= _LEVEL_SHARE * np.linalg.norm(normal, axis=1).sum()
     return bool(level) and not connected_bodies(body.faces, len(body.vertices))[1].all()
 

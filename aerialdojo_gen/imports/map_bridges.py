@@ -63,12 +63,10 @@ class Bridge:
         name = next((f.tags["name"] for f in self.members if f.tags.get("name")), "")[:80]
         points = [self.axis.interpolate(s) for s in at]
         return {
-            **({"name": name} if name else {}),
-            "depth_m": _DEPTH_M[self.kind],
-            "span_m": [round(s, 2) for s in self.span_m],
-            "line": [[round(p.x, 2), round(p.y, 2)] for p in points],
+            **({"name": name} if name else {}), "depth_m": _DEPTH_M[self.kind],
+            "span_m": [round(s, 2) for s in self.span_m], "line": [[round(p.x, 2), round(p.y, 2)] for p in points],
             "heights_m": [round(h, 2) for h in self.heights_m],
-        }
+        }  # fmt: skip
 
 
 def bridges(

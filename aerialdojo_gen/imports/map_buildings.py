@@ -128,15 +128,10 @@ def _building(area: Feature, bodies: list[dict[str, Any]], shops: BaseGeometry |
     pitched = any(b["roof"] != "flat" for b in bodies)
     named = {"name": area.tags.get("name", "")[:80], "street": area.tags.get("addr:street", "")[:80]}
     return {
-        "category": kind,
-        **{k: v for k, v in named.items() if v},
-        "wall": wall,
-        "roofing": _roofing(area, pitched, kind),
-        **({"colour": word} if word else {}),
-        **({"shops": True} if lets else {}),
-        **({"canopy": True} if kind == "canopy" else {}),
-        "bodies": bodies,
-    }
+        "category": kind, **{k: v for k, v in named.items() if v}, "wall": wall,
+        "roofing": _roofing(area, pitched, kind), **({"colour": word} if word else {}),
+        **({"shops": True} if lets else {}), **({"canopy": True} if kind == "canopy" else {}), "bodies": bodies,
+    }  # fmt: skip
 
 
 def _bodies(

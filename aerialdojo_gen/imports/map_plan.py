@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -24,7 +25,6 @@ from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M, HeightTable, Pl
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
 from aerialdojo_gen.scenes.kit.street_decks import Bridge
 from aerialdojo_gen.scenes.kit.street_network import Street, lay_out
-from aerialdojo_gen.scenes.site import Site
 
 # Streets extend beyond the border, to hide their ends.
 _BEYOND_M = 15.0
@@ -32,7 +32,6 @@ _HEADROOM_M, _LOWEST_CEILING_M = 6.0, 15.0
 # Built-up share above which the ground is paved.
 _PAVED = 0.12
 _MAX_ITEMS, _MAX_BUILDINGS = 1000, 3000
-_SETTLE_M = 0.5
 
 
 @dataclass(frozen=True)
@@ -51,35 +50,25 @@ class TownOptions:
             raise UsageError(f"--drive-on {self.drive_on[:20]!r}: right or left")
 
 
-@dataclass(frozen=True)
-class TownPlan:
-    """The plan of a town, but what is placed where the built streets leave room."""
-
-    plan: PlacePlan
-    town: Mapping[str, list[Any]]  # What the map has, in metres
-    drive_on: str
-
-    def place_things(self, site: Site) -> Placer:
-        """Place things on the site that the plan has built."""
-        streets = [Street(**_points(table)) for table in map(_street, self.town["roads"])]
-        bridges = [Bridge(**_points(table)) for table in self.town["bridges"]]
-        layout = lay_out(site, streets, bridges, self.town["crossings"])
-        level = [
-            road for road, street in zip(self.town["roads"], streets, strict=True)
-            if street.kind != "path" and layout.on_ground(street)
-        ]  # fmt: skip
-        found = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
-        placer = Placer(site, None if self.plan.heights is None else _SETTLE_M)
-        furniture = Furniture(placer, self.town, found, self.drive_on)
-        furniture.place_mapped()
-        furniture.place_by_rule()
-        return placer
+def _place_things(placer: Placer, town: Mapping[str, list[Any]], drive_on: str) -> None:
+    """Place what the map has, and what such streets have by rule, where the built streets leave room."""
+    streets = [Street(**_points(table)) for table in map(_street, town["roads"])]
+    bridges = [Bridge(**_points(table)) for table in town["bridges"]]
+    layout = lay_out(placer.site, streets, bridges, town["crossings"])
+    level = [
+        road for road, street in zip(town["roads"], streets, strict=True)
+        if street.kind != "path" and layout.on_ground(street)
+    ]  # fmt: skip
+    found = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
+    furniture = Furniture(placer, town, found, drive_on)
+    furniture.place_mapped()
+    furniture.place_by_rule()
 
 
 def town_plan(
     found: Map, bbox: Bbox, source: str, options: TownOptions,
     heights: Callable[[LocalFrame, tuple[float, float]], HeightTable] | None,
-) -> tuple[TownPlan, Counter[str]]:  # fmt: skip
+) -> tuple[PlacePlan, Counter[str]]:  # fmt: skip
     """Make the plan of a town; its origin is the centre of the bounding box (degrees)."""
     width, depth = (float(math.floor(s * 100 + 0.5) / 100) for s in size_m(bbox))
     if not (min(width, depth) >= SMALLEST_M and max(width, depth) <= LARGEST_M):
@@ -115,7 +104,8 @@ def town_plan(
         f"Made by add-map of {source}, --bbox {' '.join(f'{v:.7g}' for v in bbox)}.",
         "Metres about the middle of the box, x east, y north. Change what is not so, and run again.",
     )
-    return TownPlan(PlacePlan(plan, sections, comments, table), town, options.drive_on), summary
+    place_things = partial(_place_things, town=town, drive_on=options.drive_on)
+    return PlacePlan(plan, sections, comments, table, place_things), summary
 
 
 def _town(

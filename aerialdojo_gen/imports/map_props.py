@@ -24,16 +24,13 @@ _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 def props(points: Sequence[Feature], lines: Sequence[Feature], areas: Sequence[Feature], site: Polygon,
            built: BaseGeometry, summary: Counter[str]) -> list[dict[str, Any]]:  # fmt: skip
-    """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas.
-
-    What lies in a building is no street furniture, and is counted as left out; what is drawn within its wall's
-    thickness is put before the wall.
-    """
+    """Make the plan's things: points of the map, rows of trees and bollards, small things drawn as areas."""
     out = []
     for feature in points:
         category = _category(feature.tags)
         if category is None or below_ground(feature.tags) or not site.contains(feature.shape):
             continue
+        # What lies in a building is no street furniture.
         at = _move_before_wall(feature.shape, built)
         if at is None:
             summary["things inside buildings left out"] += 1

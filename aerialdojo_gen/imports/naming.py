@@ -137,11 +137,9 @@ def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
     """Tell the noun of a name from its attributes."""
     spelling, materials = _lists()["spelling"], _lists()["materials"]
     kinds = {
-        "colour": word_list("colours"),
-        "size": word_list("sizes"),
-        "material": materials,
+        "colour": word_list("colours"), "size": word_list("sizes"), "material": materials,
         "state": word_list("states"),
-    }
+    }  # fmt: skip
     said: dict[str, str] = {}
     rest: list[str] = []
     for k, word in enumerate(words):
@@ -178,13 +176,7 @@ def _node_name(name: str, category: str, group: str, attributes: Mapping[str, st
 
 
 def read_names(path: Path) -> Naming:
-    """Read a table of names: CSV with the columns ``pattern``, ``name``, ``category`` and ``plural``, or TOML.
-
-    A pattern is a glob on the file's names of nodes and materials, case and all. ``name`` is what a person says;
-    ``category`` its kind, made of the name where empty; ``plural`` is ``yes`` where the name is of many ("leaves"),
-    or the words that make one thing of them ("a row of"). Category and plural may be left out. In TOML a pattern is
-    a key: ``"Mesh_0*" = "garden shed"``, or a table of the other columns.
-    """
+    """Read a table of names: CSV with the columns ``pattern``, ``name``, ``category`` and ``plural``, or TOML."""
     try:
         check_regular(path)
         raw = path.read_bytes()[: _MAX_BYTES + 1]

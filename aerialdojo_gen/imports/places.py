@@ -12,10 +12,11 @@ from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.imports.command import check_free
 from aerialdojo_gen.imports.dem import read_dem
 from aerialdojo_gen.imports.earth import Bbox, check_bbox, tile_bboxes
-from aerialdojo_gen.imports.map_plan import TownOptions, TownPlan, town_plan
+from aerialdojo_gen.imports.map_plan import TownOptions, town_plan
 from aerialdojo_gen.imports.osm import read_maps
+from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.project import PIPELINE, make_project
-from aerialdojo_gen.imports.relief import ReliefOptions, ReliefPlan, ground_sampler, relief_plan
+from aerialdojo_gen.imports.relief import PlacePlan, ReliefOptions, ground_sampler, relief_plan
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
@@ -27,6 +28,8 @@ from aerialdojo_gen.store.atomic import atomic_file
 # Margin around the box: streets continue, and building parts may lie outside.
 _MARGIN_DEG = 0.0006
 _MAX_SCENES = 100
+# Things are settled on uneven ground by so large a circle.
+_SETTLE_M = 0.5
 
 
 @dataclass(frozen=True)
@@ -80,20 +83,20 @@ def add_terrain(
     return _write_place(name, relief, project, tuple(notes))
 
 
-def _write_place(name: str, place: TownPlan | ReliefPlan, project: Path, notes: tuple[str, ...]) -> AddedPlace:
+def _write_place(name: str, place: PlacePlan, project: Path, notes: tuple[str, ...]) -> AddedPlace:
     """Build a plan, place things where that leaves room, build it whole, and write it if that succeeds."""
     catalogue = load_catalogue(home() / "scene_assets")
-    plan, sections = dict(place.plan.plan), dict(place.plan.sections)
+    plan, sections, table = dict(place.plan), dict(place.sections), place.heights
     # File names may contain any character, newlines too.
-    comments = "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in place.plan.comments)
-    table = place.plan.heights
+    comments = "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in place.comments)
     with tempfile.TemporaryDirectory() as folder:
         trial = Path(folder) / f"{name}.toml"
         if table is not None:
             (Path(folder) / f"{name}{HEIGHTS_SUFFIX}").write_text(table.text(), encoding="ascii")
         try:
             site, _ = build_site(name, plan, catalogue, f"{name}.toml", Path(folder))
-            placer = place.place_things(site)
+            placer = Placer(site, None if table is None else _SETTLE_M)
+            place.place_things(placer)
             things, more = placer.entries()
             sections |= {len(plan["site"]) + k: text for k, text in more.items()}
             plan["site"] = [*plan["site"], *things]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -54,18 +54,20 @@ class RawNode:
     corners: NDArray[np.float32] | None = None  # (m, 3, 5) float32 or None
     surfaces: tuple[RawSurface, ...] = ()
 
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Normal of each face, (m, 3), as long as twice its area."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
     def select_faces(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
         """Return the node with a subset of its faces; vertices stay."""
-        return RawNode(
-            self.name, self.vertices, self.faces[rows], self.colours[rows],
-            None if self.surface is None else self.surface[rows],
-            None if self.corners is None else self.corners[rows], self.surfaces,
-        )  # fmt: skip
+        of_faces = {name: getattr(self, name) for name in ("faces", "colours", "surface", "corners")}
+        return replace(self, **{name: None if all_ is None else all_[rows] for name, all_ in of_faces.items()})
 
     def with_vertices(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
         """Return the node with other vertices, and optionally other indices."""
-        faces = self.faces if faces is None else faces
-        return RawNode(self.name, vertices, faces, self.colours, self.surface, self.corners, self.surfaces)
+        return replace(self, vertices=vertices, faces=self.faces if faces is None else faces)
 
 
 def extract_faces(body: RawNode, rows: NDArray[np.int64] | NDArray[np.bool_]) -> RawNode:
@@ -108,11 +110,7 @@ def empty_corners(n: int) -> NDArray[np.float32]:
 
 
 def sort_by_position(bodies: Sequence[RawNode]) -> list[RawNode]:
-    """Sort nodes by where they are: a file's nodes come in an order that depends on its reader and writer.
-
-    West before east, then south before north, then low before high, by their lower corners; nodes of one corner by a
-    digest of their triangles. Vertices must be finite.
-    """
+    """Sort nodes by their lower corners, then by a digest: their order in a file is its writer's. All are finite."""
     return sorted(bodies, key=lambda body: (body.vertices.min(axis=0).tolist(), _digest(body)))
 
 

@@ -20,7 +20,6 @@ from aerialdojo_gen.imports.map_tags import TABLES
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.scenes.grammar import Pose, poisson_disc
 from aerialdojo_gen.scenes.kit.town_buildings import surface_areas
-from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, heights_text
 
 Floats = NDArray[np.float64]
@@ -31,7 +30,6 @@ MAX_CELLS = 40_000
 _FINEST_M = 0.25
 _MIN_SHARE = 0.5
 _HEADROOM_M = 25.0
-_SETTLE_M = 0.5
 _ROCK_SLOPE = 0.75
 
 
@@ -102,7 +100,8 @@ class PlacePlan:
     plan: dict[str, Any]
     sections: dict[int, str]  # Comments of the entries that sections begin with
     comments: tuple[str, ...]  # At the top
-    heights: HeightTable | None = None
+    heights: HeightTable | None
+    place_things: Callable[[Placer], None]  # Places things on the site that the plan has built
 
 
 _COUNTRY = TABLES["country"]
@@ -155,23 +154,6 @@ def _level_places(placer: Placer, grass: BaseGeometry) -> list[tuple[float, floa
     return [(x, y) for x, y, _ in sorted(spots, key=tilt)[: 2 * len(_CAMP)]]
 
 
-@dataclass(frozen=True)
-class ReliefPlan:
-    """The plan of a relief, but what is placed on the ground that it builds."""
-
-    plan: PlacePlan
-    surfaces: dict[str, float]  # What shows where, as the plan has it
-    water_z_m: float | None
-    bare: bool
-
-    def place_things(self, site: Site) -> Placer:
-        """Place things on the site that the plan has built."""
-        placer = Placer(site, _SETTLE_M)
-        if not self.bare:
-            _grow_things(placer, self.surfaces, self.water_z_m)
-        return placer
-
-
 def native_cell_m(dem: Dem, frame: LocalFrame | None) -> float:
     """Cell size of a model, metres, the larger of both axes."""
     if not dem.geographic:
@@ -196,7 +178,7 @@ class ReliefOptions:
     attribution: str = ""
 
 
-def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[ReliefPlan, list[str]]:
+def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[PlacePlan, list[str]]:
     """Make the plan of a relief, and notes for the user."""
     frame, middle, size = _place(dem, options)
     if not (min(size) >= SMALLEST_M and max(size) <= LARGEST_M):
@@ -245,8 +227,12 @@ def relief_plan(dem: Dem, options: ReliefOptions) -> tuple[ReliefPlan, list[str]
             f"{missing:,} of {dem.heights_m.size:,} heights of the file are nodata: filled with the nearest height"
         )
     comments = (f"Made by add-terrain of {dem.path.name}: {notes[0]}.", notes[1] + ".")
-    whole = PlacePlan(plan, {0: "What shows by slope and height"}, comments, table)
-    return ReliefPlan(whole, surfaces, water, options.bare), notes
+
+    def place_things(placer: Placer) -> None:
+        if not options.bare:
+            _grow_things(placer, surfaces, water)
+
+    return PlacePlan(plan, {0: "What shows by slope and height"}, comments, table, place_things), notes
 
 
 def _place(dem: Dem, options: ReliefOptions) -> tuple[LocalFrame | None, tuple[float, float], tuple[float, float]]:

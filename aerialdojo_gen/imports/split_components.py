@@ -131,10 +131,7 @@ def _is_ground_surface(body: RawNode, low: Floats, high: Floats) -> bool:
     if (size < _GROUND_SHARE * (high - low)[:2]).any() or (size < 10.0).any():
         return False
     _, closed = connected_bodies(body.faces, len(body.vertices))
-    normal = np.cross(
-        body.vertices[body.faces[:, 1]] - body.vertices[body.faces[:, 0]],
-        body.vertices[body.faces[:, 2]] - body.vertices[body.faces[:, 0]],
-    )
+    normal = body.normals
     level = np.abs(normal[:, 2]).sum() >= 0.3 * np.linalg.norm(normal, axis=1).sum()
     return bool(not closed.all() and level)
 
@@ -185,24 +182,16 @@ def _floor(body: RawNode) -> tuple[Floats, Plan]:
 
 
 def _is_thing(body: RawNode, rows: Ints) -> bool:
-    corners = body.vertices[body.faces[rows]]
-    size = np.ptp(corners.reshape(-1, 3), axis=0)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.ptp(body.vertices[body.faces[rows]].reshape(-1, 3), axis=0)
+    normal = body.select_faces(rows).normals
     area = np.linalg.norm(normal, axis=1)
     steep = area[np.abs(normal[:, 2]) < _STEEP * area].sum() / max(float(area.sum()), 1e-12)
-    return bool(
-        size[2] >= _THING_M
-        and np.abs(normal[:, 2]).sum() / 2 >= _THING_M2
-        and steep >= _WALLS
-        and (size[:2] <= _WIDE_M).all()
-    )
+    covers = np.abs(normal[:, 2]).sum() / 2 >= _THING_M2
+    return bool(size[2] >= _THING_M and covers and steep >= _WALLS and (size[:2] <= _WIDE_M).all())
 
 
 def _group_pieces(pieces: Sequence[RawNode]) -> list[RawNode]:
-    """Assign pieces within the box of a larger one, and above or at it, to the smallest such piece.
-
-    What carries a wider piece is a part of it: a trunk of its crown, walls of their roof.
-    """
+    """Assign pieces to the smallest larger one around them, and what carries a wider one to it: a trunk, walls."""
     if not pieces:
         return []
     low = np.array([p.vertices.min(axis=0) for p in pieces])

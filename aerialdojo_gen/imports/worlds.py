@@ -66,30 +66,8 @@ def vary(
 ) -> list[VariedWorld]:  # fmt: skip
     """Write the worlds of some types (names or globs) and seeds; those that are there already stay.
 
-    Parameters
-    ----------
-    types : sequence of str
-        Names of types, or globs: ``"U_*"``.
-    seeds : range
-    project : Path
-        Folder for ``scenes/``, ``annotations/``, ``pipeline.toml`` and ``draws.csv``, the table of refused draws;
-        ``data/`` in it gets the meshes, as `build-scenes` writes them.
-    options : VaryOptions, optional
-    workers : int, optional
-        Processes; all of a Ray cluster's cores where None.
-    executor, address : str, optional
-        ``"ray"``, and ``HOST:PORT`` of a cluster whose machines share `project`.
-    on_done : callable
-        Called with each world when it is written.
-
-    Raises
-    ------
-    UsageError
-        No such type, no seed, or too many worlds.
-    AssetError
-        A knob is unknown or out of its range, or no draw of a seed makes a sound scene.
-    StoreError
-        A run is writing to ``data/``.
+    `project` gets ``scenes/``, ``annotations/``, ``pipeline.toml``, ``draws.csv``, the table of refused draws, and in
+    ``data/`` the meshes, as `build-scenes` writes them. Its path is shared by all machines of a Ray cluster.
     """
     options = options or VaryOptions({})
     names = choose_scenes(list(types), type_names(home() / "scene_assets"), "type")

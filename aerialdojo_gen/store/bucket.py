@@ -10,14 +10,13 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
-from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from aerialdojo_gen.base.environment_errors import number_of
 from aerialdojo_gen.base.errors import MissingPackage, StoreError, no_package
@@ -30,6 +29,7 @@ _TRIES = 6
 # A connection that is silent for so long is given up and made anew, unless ``$AERIALDOJO_TIMEOUT_S`` says otherwise:
 # well below the time that a lock holds.
 _SILENT_S = 15.0
+Write = Callable[[bytes], object]
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class Bucket:
 
     def read(self, key: str, begin: int, end: int, etag: str) -> bytes:
         """Read an object's bytes from `begin` to before `end`, of the version with this tag."""
-        sink = BytesIO()
-        self._fetch(key, sink, begin, end, etag)
-        return sink.getvalue()
+        blocks: list[bytes] = []
+        self._fetch(key, blocks.append, begin, end, etag)
+        return b"".join(blocks)
 
     def read_small(self, key: str) -> Content:
         """Read an object with its tag and its age."""
@@ -70,11 +70,11 @@ class Bucket:
             data = answer["Body"].read()
         return Content(data, answer["ETag"], _age_s(answer))
 
-    def download(self, key: str, file: BinaryIO, entry: Entry) -> None:
-        """Write an object to a file; where the connection drops, the rest is asked for."""
-        self._fetch(key, file, 0, entry.size, entry.etag, whole=True)
+    def download(self, key: str, write: Write, entry: Entry) -> None:
+        """Give an object's blocks to a function; where the connection drops, the rest is asked for."""
+        self._fetch(key, write, 0, entry.size, entry.etag, whole=True)
 
-    def _fetch(self, key: str, sink: BinaryIO, begin: int, end: int, etag: str, *, whole: bool = False) -> None:
+    def _fetch(self, key: str, write: Write, begin: int, end: int, etag: str, *, whole: bool = False) -> None:
         at, tries = begin, 0
         while at < end:
             # Of a whole object the client compares the checksum that the store has of it.
@@ -84,7 +84,7 @@ class Bucket:
                 answer = self._client.get_object(Bucket=self.name, Key=key, IfMatch=etag, **part)
                 try:
                     for block in answer["Body"].iter_chunks(_BLOCK):
-                        sink.write(block)
+                        write(block)
                         at += len(block)
                 except Exception as error:
                     if not is_transient(error) or tries + 1 >= _TRIES:

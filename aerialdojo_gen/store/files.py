@@ -41,10 +41,7 @@ def sha256_of(path: Path) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file's bytes, hexadecimal; OSError where it cannot be read.
-
-    A file is read once in a process, and again when it is another one or has been written to.
-    """
+    """SHA-256 of a file, hexadecimal, read once in a process while it stays as it is; OSError where it cannot be."""
     version = _version(path)
     started = _ahead.pop(version, None)
     # What the thread has not come to yet is read here, while it goes on with the next.

@@ -102,12 +102,9 @@ _TIME_RESOLUTION_NS = 2 * 10**9
 class FooterCache:
     """The footers of a data directory, in a file; one that is damaged, or cannot be written, is none.
 
-    A run asks what its shards were made from before it does anything, and on a finished dataset that is all it does.
-    What is kept of a shard counts as long as it is the same version (`DataRoot.version`): its inode, its size, and
-    its times, that of the inode's last change among them, which goes on also where somebody sets that of the bytes
-    back. A change could hide behind times that do not tell it from the one before: so of a shard that was changed
-    less than two seconds before its footer was read nothing is kept. Digests of files are not kept: who compares one
-    reads the file.
+    What is kept of a shard counts as long as it is the same version (`DataRoot.version`). A change could hide behind
+    times that do not tell it from the one before: of a shard that was changed less than two seconds before its footer
+    was read nothing is kept. Digests of files are not kept: who compares one reads the file.
     """
 
     def __init__(self, root: LocalRoot) -> None:
@@ -162,10 +159,7 @@ _current: ContextVar[FooterCache | None] = ContextVar("known footers", default=N
 
 @contextlib.contextmanager
 def cached_footers(root: DataRoot) -> Iterator[None]:
-    """Read footers of a data directory no more than once while they stay as they are, here and in later processes.
-
-    On any other data root nothing is kept.
-    """
+    """Read footers of a data directory once while they stay as they are, here and in later processes."""
     if not isinstance(root, LocalRoot):
         yield
         return

@@ -49,11 +49,9 @@ LAYOUT: dict[str, Place] = {
     "release/objects": Place(schemas.RELEASE_OBJECTS, "release/objects/part-{scene}.parquet", "split"),
     "release/anchors": Place(schemas.RELEASE_ANCHORS, "release/anchors/part-{scene}.parquet", "split"),
     "release/viewpoints": Place(schemas.VIEWPOINTS, "release/viewpoints/part-{scene}.parquet", "split"),
-    "episodes": Place(schemas.EPISODES, _RUN, "evaluate"),
-    "steps": Place(schemas.STEPS, _RUN, "evaluate"),
-    "timings": Place(schemas.TIMINGS, _RUN, "evaluate"),
-    "failures": Place(schemas.FAILURES, _RUN, "evaluate"),
-}
+    "episodes": Place(schemas.EPISODES, _RUN, "evaluate"), "steps": Place(schemas.STEPS, _RUN, "evaluate"),
+    "timings": Place(schemas.TIMINGS, _RUN, "evaluate"), "failures": Place(schemas.FAILURES, _RUN, "evaluate"),
+}  # fmt: skip
 
 
 _HELD_OUT = re.compile(r"[UNID]_[A-Za-z]+-h\d+")

@@ -29,10 +29,7 @@ def memo_key(root: DataRoot, files: Iterable[str], *parameters: object) -> str:
 
 
 def memo(key: str, make: Callable[[], str]) -> str:
-    """Return the text that belongs to a key: as it was kept, or as it is made now.
-
-    Where the cache cannot be written the text is made each time.
-    """
+    """Return the text that belongs to a key: as it was kept, or as it is made now."""
     with contextlib.suppress(AerialDojoError, OSError, UnicodeDecodeError):
         if (found := Cache().find(key)) is not None:
             return (found / _TEXT).read_text(encoding="utf-8")

@@ -99,7 +99,7 @@ class ObjectRoot(DataRoot):
                 path = folder / name / inner
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with path.open("wb") as file:
-                    self._state.bucket.download(key, file, entry)
+                    self._state.bucket.download(key, file.write, entry)
 
         while True:
             path: Path = self._state.cache.make(self._item(files), fill) / name
@@ -133,7 +133,7 @@ class ObjectRoot(DataRoot):
                 return metadata[_DIGEST]
         digest = hashlib.sha256()
         for _, (key, entry) in sorted(files.items()):
-            state.bucket.download(key, _Hashed(digest), entry)
+            state.bucket.download(key, digest.update, entry)
         if files.keys() == {""}:
             state.digests[files[""][0], files[""][1].etag] = digest.hexdigest()
         return digest.hexdigest()
@@ -272,16 +272,6 @@ class ObjectRoot(DataRoot):
 
 def _is_ours(name: str) -> bool:
     return any(part.startswith(".aerialdojo-") for part in name.split("/"))
-
-
-class _Hashed:
-    """A file that is written to a digest."""
-
-    def __init__(self, digest: Any) -> None:
-        self._digest = digest
-
-    def write(self, block: bytes) -> None:
-        self._digest.update(block)
 
 
 class _Ranges(io.RawIOBase):

@@ -263,21 +263,7 @@ Where: TypeAlias = DataRoot | Path | str
 
 
 def open_root(where: Where) -> DataRoot:
-    """Open a data root.
-
-    Parameters
-    ----------
-    where : DataRoot, Path or str
-        A directory, which need not be there yet, or a URL of an object store (``s3://bucket/prefix``); a data root is
-        returned as it is.
-
-    Raises
-    ------
-    UsageError
-        A URL of a kind that nothing here reads, without a bucket, or with credentials in it.
-    StoreError
-        The extra for it is not installed.
-    """
+    """Open a data root: a directory, which need not be there yet, or a URL, ``s3://bucket/prefix``."""
     if isinstance(where, DataRoot):
         return where
     scheme, separator, rest = str(where).partition("://")

@@ -49,18 +49,9 @@ def shards(data: Where, table: str, scene: str, run: str = "default") -> list[st
 
 
 def write_shard(
-    data: Where,
-    table_name: str,
-    scene: str,
-    part: int,
-    table: pa.Table,
-    *,
-    fingerprint: str = "",
-    parts: int = 1,
-    summary: Mapping[str, Any] | None = None,
-    files: Mapping[str, ShardFile] | None = None,
-    run: str = "default",
-) -> Path:
+    data: Where, table_name: str, scene: str, part: int, table: pa.Table, *, fingerprint: str = "", parts: int = 1,
+    summary: Mapping[str, Any] | None = None, files: Mapping[str, ShardFile] | None = None, run: str = "default",
+) -> Path:  # fmt: skip
     """Check a table, write it as a shard, and give it its name when it is whole."""
     # Here alone, as in the other functions: half of what importing Arrow takes is what works on rows.
     from aerialdojo_gen.store.parquet_files import write_clustered
@@ -69,14 +60,9 @@ def write_shard(
     spec = LAYOUT[table_name].spec
     table = check_table(spec, table)
     info = ShardInfo(
-        fingerprint,
-        content_digest(table),
-        column_digests(table),
-        table.num_rows,
-        parts,
-        dict(summary or {}),
+        fingerprint, content_digest(table), column_digests(table), table.num_rows, parts, dict(summary or {}),
         dict(files or {}),
-    )
+    )  # fmt: skip
     schema_meta = dict(table.schema.metadata or {})
     schema_meta[META] = encode(info)
     root, name = open_root(data), shard_name(table_name, scene, part, run)

@@ -72,10 +72,7 @@ def _claim(area: Path) -> tuple[Path, TextIO]:
 
 
 def sweep(root: Path) -> None:
-    """Remove what dead writers left in a folder's staging folder; what a living one makes stays.
-
-    A folder that was to be replaced, where a kill came between its two renames, gets what belongs there.
-    """
+    """Remove what dead writers left in a folder's staging folder, or finish it; what a living one makes stays."""
     area = root / AREA
     try:
         items = sorted(area.iterdir())
@@ -111,10 +108,7 @@ def _recover(root: Path, item: Path, relative: str) -> None:
 
 
 def sweep_unstaged(data: Path) -> None:
-    """Remove from a data directory what was being made there when nothing was staged: ``.NAME.PID.tmp`` and ``.old``.
-
-    Only while the directory is held: then nobody makes anything in these places.
-    """
+    """Remove from a data directory, while it is held, what earlier versions made: ``.NAME.PID.tmp`` and ``.old``."""
     for pattern in ("meshes/.*", "release/.*", "release/*/.*", "release/*/*/.*", "[!.]*/*/.*"):
         for path in data.glob(pattern):
             match = _UNSTAGED.fullmatch(path.name)
@@ -163,11 +157,7 @@ def _is_at(file: TextIO, path: Path) -> bool:
 
 
 def replace_folder(new: Path, target: Path) -> None:
-    """Give a folder its name; what has it goes to the item of the new one.
-
-    In one step where the file system can exchange two names. Elsewhere there are two, and what a kill between them
-    leaves is put right by the next `sweep`.
-    """
+    """Give a folder its name; what has it goes to the item of the new one."""
     try:
         new.rename(target)
         return
@@ -176,6 +166,7 @@ def replace_folder(new: Path, target: Path) -> None:
             raise
     if exchange(new, target):
         return
+    # What a kill between these two renames leaves is put right by the next `sweep`.
     old = new.with_name(_OLD)
     target.rename(old)
     try:

@@ -91,12 +91,8 @@ CLEARANCE = "smallest distance along the route from the body's centre line to an
 
 
 def table(
-    name: str,
-    key: Sequence[str],
-    *fields: pa.Field,
-    clusters: Sequence[str] = (),
-    plain: Sequence[str] = (),
+    name: str, key: Sequence[str], *fields: pa.Field, clusters: Sequence[str] = (), plain: Sequence[str] = (),
     command: str = "",
-) -> TableSpec:
+) -> TableSpec:  # fmt: skip
     """Describe a table: see `TableSpec`."""
     return TableSpec(name, pa.schema(list(fields)), tuple(key), tuple(clusters), tuple(plain), command)

@@ -38,9 +38,7 @@ OBJECT_COLUMNS = [
     column("landmark_id", pa.int32(), "nearest landmark in the plane"),
     column("direction", pa.string(), "compass direction from that landmark to the object, one of eight"),
     column(
-        "claims",
-        pa.string(),
-        "what can be said of it, true of the mesh: a JSON list of claims (kind, key, things)",
+        "claims", pa.string(), "what can be said of it, true of the mesh: a JSON list of claims (kind, key, things)",
     ),
     column(
         "shape",
@@ -50,12 +48,10 @@ OBJECT_COLUMNS = [
         nullable=True,
     ),
     column(
-        "shape_held_out",
-        pa.bool_(),
-        "whether its design stands in no scene of the training side; null of imported meshes",
-        nullable=True,
+        "shape_held_out", pa.bool_(),
+        "whether its design stands in no scene of the training side; null of imported meshes", nullable=True,
     ),
-]
+]  # fmt: skip
 REFERENCE = [
     column("reference_image", pa.binary(), "PNG: front view from the selected anchor, or from further back "
            "along its viewing axis, where the object fits", nullable=True),
