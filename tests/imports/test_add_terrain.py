@@ -20,9 +20,9 @@ from aerialdojo_gen.scenes.build import build_scene
 
 @pytest.fixture(scope="module")
 def hill(tmp_path_factory):
-    """The hill as a grid in metres, 2 m apart, 120 m wide."""
+    """The hill as a grid in metres, 2 m apart, 80 m wide."""
     path = tmp_path_factory.mktemp("dem") / "hill.npz"
-    np.savez(path, heights_m=maps.heights(2.0, 60.0), cell_m=2.0)
+    np.savez(path, heights_m=maps.heights(2.0, 40.0), cell_m=2.0)
     return path
 
 
@@ -32,10 +32,10 @@ def added(hill, tmp_path_factory):
 
 
 def test_the_ground_is_the_models_by_interpolation(added):
-    at = np.arange(-60.0, 60.1, 2.0)
-    reference = RegularGridInterpolator((at, at), maps.heights(2.0, 60.0)[::-1])
+    at = np.arange(-40.0, 40.1, 2.0)
+    reference = RegularGridInterpolator((at, at), maps.heights(2.0, 40.0)[::-1])
     rng = np.random.default_rng(3)
-    places = rng.uniform(-59.5, 59.5, size=(600, 2))
+    places = rng.uniform(-39.5, 39.5, size=(600, 2))
     z = maps.ground_z(added.scene, places)
     origin = maps.origin_z(added)
     # A cell is two flat triangles here and a bent sheet there: they part by a quarter of its bend at the most.
@@ -91,14 +91,14 @@ def test_the_heights_lie_beside_the_plan_and_count_as_its_source(hill, tmp_path)
     table = place.recipe.with_name("Hill.heights.asc")
     assert table in scene_sources(ProjectPaths(tmp_path, ASSETS, table.parent, tmp_path), "Hill")
     # An ESRI ASCII grid, that this program reads as any other one.
-    assert np.abs(read_dem(table).heights_m + maps.origin_z(place) - maps.heights(2.0, 60.0)).max() < 0.0051
+    assert np.abs(read_dem(table).heights_m + maps.origin_z(place) - maps.heights(2.0, 40.0)).max() < 0.0051
     text = table.read_text()
     *head, first, rest = text.split("\n", 6)
     faults = {
         "is it truncated": text[: len(text) // 2],
         "ncols": text.replace("ncols", "columns"),
         "each within 2,000 m": "\n".join([*head, first.replace("0.00", "-9999", 1), rest]),
-        "the site has 120 by 120 m": text.replace("cellsize 2.0", "cellsize 1.0"),
+        "the site has 80 by 80 m": text.replace("cellsize 2.0", "cellsize 1.0"),
     }
     for said, wrong in faults.items():
         table.write_text(wrong)
