@@ -37,7 +37,7 @@ class Dem:
     y0: float
     dx: float  # Cell size eastwards and southwards, positive
     dy: float
-    geographic: bool | None
+    geographic: bool
     to_grid: Callable[[Floats, Floats], tuple[Floats, Floats]] | None
 
     @property
@@ -132,7 +132,7 @@ def _ascii(path: Path) -> Dem:
     rows, columns = grid.heights_m.shape
     west, north, cell = grid.west, grid.south + (rows - 1) * grid.cell, grid.cell
     geographic = cell * max(rows, columns) < 5 and abs(west) <= 180 and abs(north) <= 90 and cell < _DEGREES / 10
-    return Dem(path, grid.heights_m, west, north, cell, cell, geographic or None, _identity if geographic else None)
+    return Dem(path, grid.heights_m, west, north, cell, cell, geographic, _identity if geographic else None)
 
 
 def _npz(path: Path) -> Dem:
@@ -161,7 +161,7 @@ def _npz(path: Path) -> Dem:
         return Dem(path, z, west, north, (east - west) / (columns - 1), (north - south) / (rows - 1), True, _identity)
     if cell is None or not (math.isfinite(cell) and cell > 0):
         raise AssetError(f"{path}: cell_m must be a number above 0")
-    return Dem(path, z, 0.0, (rows - 1) * cell, cell, cell, None, None)
+    return Dem(path, z, 0.0, (rows - 1) * cell, cell, cell, False, None)
 
 
 def _check_npz_sizes(path: Path) -> None:

@@ -19,6 +19,7 @@ _SMALL_ART = ("mural", "graffiti", "relief", "mosaic", "plaque", "painting")
 _PARKING_METER = ("parking_tickets", "parking")
 _SPACING_M = {"tree_row": 8.0, "bollard": 1.8}
 _SHOPS = ("cafe", "restaurant", "bar", "pub", "fast_food", "bank", "pharmacy", "ice_cream", "cinema", "theatre")
+_WALL_M = 1.5
 _MAPPED_TREE_M = {"urban_tree": 6.0, "oak_tree": 10.7, "spruce_tree": 12.0}
 
 
@@ -116,18 +117,18 @@ def _along(line: BaseGeometry, spacing_m: float) -> list[Point]:
     return [line.interpolate(line.length * k / n) for k in range(n + 1)]
 
 
-def _move_before_wall(point: Point, built: BaseGeometry, thick_m: float = 1.5, out_m: float = 1.0) -> Point | None:
+def _move_before_wall(point: Point, built: BaseGeometry) -> Point | None:
     """Move a point in or on a wall to just outside it; None if it is well inside."""
     if built.is_empty or not built.intersects(point.buffer(0.3)):
         return point
     ring = built.boundary
     foot = ring.interpolate(ring.project(point))
     depth = foot.distance(point)
-    if built.contains(point) and depth > thick_m:
+    if built.contains(point) and depth > _WALL_M:
         return None
     for k in range(16):
         a = math.pi * k / 8
-        moved = Point(foot.x + out_m * math.cos(a), foot.y + out_m * math.sin(a))
-        if not shapely.intersects(built, moved.buffer(out_m * 0.9)):
+        moved = Point(foot.x + math.cos(a), foot.y + math.sin(a))
+        if not shapely.intersects(built, moved.buffer(0.9)):
             return moved
     return None

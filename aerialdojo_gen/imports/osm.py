@@ -59,7 +59,7 @@ class Map:
     extent: Bbox
 
 
-def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEMORY_BYTES) -> list[Map]:
+def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
     """Read the features that touch bounding boxes (degrees) in one pass; ways and areas stay whole."""
     try:
         importlib.import_module("osmium")
@@ -77,7 +77,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox], max_memory_bytes: int = MAX_MEM
     with scratch_folder() as folder:
         out = folder / "found.json"
         args = [str(out), json.dumps(boxes)]
-        read_in_sandbox(__name__, path, args, max_memory_bytes, _extract_advice(path, boxes))
+        read_in_sandbox(__name__, path, args, MAX_MEMORY_BYTES, _extract_advice(path, boxes))
         found = json.loads(out.read_text(encoding="utf-8"))
     west, south, east, north = found["extent"]
     extent = (west, south, east, north)

@@ -62,8 +62,11 @@ class RawNode:
 
     def select_faces(self, rows: NDArray[np.bool_] | NDArray[np.int64]) -> RawNode:
         """Return the node with a subset of its faces; vertices stay."""
-        of_faces = {name: getattr(self, name) for name in ("faces", "colours", "surface", "corners")}
-        return replace(self, **{name: None if all_ is None else all_[rows] for name, all_ in of_faces.items()})
+        return replace(
+            self, faces=self.faces[rows], colours=self.colours[rows],
+            surface=None if self.surface is None else self.surface[rows],
+            corners=None if self.corners is None else self.corners[rows],
+        )  # fmt: skip
 
     def with_vertices(self, vertices: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> RawNode:
         """Return the node with other vertices, and optionally other indices."""
