@@ -185,7 +185,7 @@ def test_wide_bodies_of_several_colours_or_textures_fall_apart_by_material(by):
     assert by == "colour" or all(len(np.unique(b.surface)) == 1 for b in bodies)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_nodes_in_any_order_make_the_same_bytes(tmp_path_factory, random):
     folder = tmp_path_factory.mktemp("order")

@@ -21,7 +21,7 @@ def files_of(data: Path) -> dict[str, bytes]:
 @pytest.mark.pipeline
 def test_a_world_runs_through_the_stages_by_its_mesh_until_its_plan_is_edited(tmp_path: Path) -> None:
     """Worlds to train on, from seed 1000 on, do so in `tests/learning/test_several_places.py`."""
-    out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=3)
+    out, options = tmp_path / "worlds", VaryOptions({"occupancy": 0.4}, n_objects=2)
     (one,) = vary(["U_Parking*"], WORLD[1], out, options)
     assert one.made
     data, name = out / "data", "U_ParkingLot-7"
@@ -43,16 +43,11 @@ def test_a_world_runs_through_the_stages_by_its_mesh_until_its_plan_is_edited(tm
     with pytest.raises(UsageError, match="occupancy"):
         vary(*WORLD, out, VaryOptions({"occupancy": 0.5}))
 
-    built, *others = run_pipeline(out / "pipeline.toml", data=data, workers=1)
+    built, *others = run_pipeline(out / "pipeline.toml", data=data, stages=["split"], workers=1)
     assert (built.stage, built.computed, built.shards) == ("build-scenes", 0, 1)
     assert all(stage.computed for stage in others)
     tables = [pq.read_table(p) for p in (data / "release/tasks").rglob(f"part-{name}.parquet")]
     assert {s for t in tables for s in t.column("subset").to_pylist()} == {"test"}
-
-    shard.unlink()
-    mesh.write_bytes(b"half of a mesh")
-    assert computed() == 1
-    assert {file: files_of(data)[file] for file in handed_over} == handed_over
 
     text = (plan / f"{name}.toml").read_text()
     (plan / f"{name}.toml").write_text(text.replace("\nceiling_m = ", "\nceiling_m = 1", 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import re
 import socket
 import subprocess
@@ -12,7 +13,12 @@ import time
 import urllib.request
 from collections.abc import Iterator
 
+import botocore.session
+
 from aerialdojo_gen.store import bucket, object_folders
+
+# The description of the service, which each client would read anew for 0.2 s, is read once.
+botocore.session.create_loader = functools.cache(botocore.session.create_loader)
 
 CREDENTIALS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing", "AWS_DEFAULT_REGION": "us-east-1"}
 
