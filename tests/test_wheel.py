@@ -1,5 +1,6 @@
 """A wheel and a checkout make the same files, so that either goes on with what the other began."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -27,79 +28,86 @@ def unpacked(project, tmp_path_factory):
     return folder / "site-packages"
 
 
-def run(site, *args):
+# Commands one after the other in one process; what each says on stderr is parted from the next by a line.
+COMMANDS = """
+import json, sys
+from aerialdojo_gen.cli import app
+print(app.__file__)
+for words in json.loads(sys.argv[1]):
+    sys.argv[1:] = words
+    try:
+        app.main()
+    except SystemExit as ended:
+        print(ended.code or 0)
+    print("--", file=sys.stderr)
+"""
+
+
+def python(site, cwd, program, *given):
+    """Run a program with the wheel's package; gives what it prints to standard output and standard error."""
     done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", *map(str, args)],
-        cwd=site, env=os.environ | {"PYTHONPATH": str(site)}, capture_output=True, text=True, check=False,
+        [sys.executable, "-c", program, *given],
+        cwd=cwd, env=os.environ | {"PYTHONPATH": str(site)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return done.stderr
+    return done.stdout, done.stderr
 
 
 def test_a_wheel_finds_nothing_to_do_after_a_checkout_and_makes_the_same_bytes(unpacked, smoke, tmp_path):
     data, package = tmp_path / "data", unpacked / "aerialdojo_gen"
     shutil.copytree(smoke, data)
-    where = "import aerialdojo_gen; print(aerialdojo_gen.__file__)"
-    env = os.environ | {"PYTHONPATH": str(unpacked)}
-    found = subprocess.run([sys.executable, "-c", where], cwd=unpacked, env=env, capture_output=True, text=True)
-    assert found.stdout.strip() == str(package / "__init__.py")
-
     # What the checkout wrote is the wheel's own, and a pipeline's name is as good as its path.
-    pipeline = package / "_shipped" / "pipelines" / "smoke.toml"
-    said = run(unpacked, "run", "smoke", "--data", data, "--verbose").splitlines()
-    stages = [line for line in said if " rows in, " in line]
-    assert len(stages) == 10
-    assert all("; nothing to do; " in line for line in stages), said
-
     # And what the wheel writes is the checkout's own, to the last bit.
-    how = ("--pipeline", pipeline, "--data", data, "--workers", "1", "--force")
-    for stage in ("build-scenes", "filter", "split"):
-        assert "2 of 2 shards computed" in run(unpacked, stage, *how)
+    pipeline = package / "_shipped" / "pipelines" / "smoke.toml"
+    how = ["--pipeline", str(pipeline), "--data", str(data), "--workers", "1", "--force"]
+    stages = [[stage, *how] for stage in ("build-scenes", "filter", "split")]
+    commands = [
+        ["run", "smoke", "--data", str(data), "--verbose"],
+        *stages,
+        ["stats", "--data", str(tmp_path / "none")],
+    ]
+    out, err = python(unpacked, unpacked, COMMANDS, json.dumps(commands))
+    assert out.split() == [str(package / "cli" / "app.py"), "0", "0", "0", "0", "1"], err
+    first, *others, last, _ = err.split("--\n")
+    lines = [line for line in first.splitlines() if " rows in, " in line]
+    assert len(lines) == 10
+    assert all("; nothing to do; " in line for line in lines), first
+    assert all("2 of 2 shards computed" in said for said in others)
     shards = sorted(path.relative_to(smoke) for path in smoke.rglob("*") if path.is_file())
     assert [path for path in shards if (data / path).read_bytes() != (smoke / path).read_bytes()] == []
+    # Where no release is, the wheel advises what it has.
+    assert last.endswith("or make one with aerialdojo-gen run aerialdojo-200k\n")
 
 
-def test_every_pipeline_that_is_shipped_goes_by_its_name(unpacked, project):
-    env = os.environ | {"PYTHONPATH": str(unpacked)}
+def test_pipelines_and_recipes_that_are_shipped_go_by_their_names_anywhere(unpacked, project, tmp_path):
     names = sorted(path.stem for path in (project / "pipelines").glob("*.toml"))
     assert {"smoke", "aerialdojo-200k"} <= set(names)
-    text = "import sys; from aerialdojo_gen.dataset.build import open_pipeline as o; "
-    text += "print(*[o(name, 'd')[0].name for name in sys.argv[1:]])"
-    done = subprocess.run(
-        [sys.executable, "-c", text, *names], cwd=unpacked, env=env, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.split() == names
-
-
-def test_a_recipe_that_is_shipped_goes_by_its_name_anywhere(unpacked, project, tmp_path):
-    text = "import sys; from aerialdojo_gen.learning.recipe import load_recipe as o\n"
-    text += "for name in sys.argv[1:]: print(o(name).model_dump_json())"
-    env = os.environ | {"PYTHONPATH": str(unpacked)}
-
-    def read(*given):
-        return subprocess.run(
-            [sys.executable, "-c", text, *given], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
-        )
-
-    done = read("imitation", "imitation.toml", str(project / "pipelines" / "baselines" / "imitation.toml"))
-    assert len(done.stdout.splitlines()) == 3, done.stderr
-    assert len(set(done.stdout.splitlines())) == 1
-    (tmp_path / "imitation").write_text('name = "mine"\n')  # a file goes before a name
-    assert '"name":"mine"' in read("imitation").stdout
-    told = read("imitatoin").stderr
-    assert (
+    program = """
+import sys
+from pathlib import Path
+from aerialdojo_gen.dataset.build import open_pipeline
+from aerialdojo_gen.learning.recipe import load_recipe
+path, *names = sys.argv[1:]
+print(*[open_pipeline(name, "d")[0].name for name in names])
+for name in ("imitation", "imitation.toml", path):
+    print(load_recipe(name).model_dump_json())
+Path("imitation").write_text('name = "mine"\\n')
+print(load_recipe("imitation").name)
+try:
+    load_recipe("imitatoin")
+except Exception as error:
+    print(error)
+"""
+    recipe = project / "pipelines" / "baselines" / "imitation.toml"
+    found, *same, mine, told = python(unpacked, tmp_path, program, str(recipe), *names)[0].splitlines()
+    assert found.split() == names
+    assert len(same) == 3
+    assert len(set(same)) == 1
+    assert mine == "mine"  # a file goes before a name
+    by_name = (
         "no recipe imitatoin; by name, as in aerialdojo-gen train imitation: adapt, adapt-mall, blind, imitation"
-        in told
     )
-
-
-def test_where_no_release_is_the_wheel_advises_what_it_has(unpacked, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "aerialdojo_gen.cli", "stats", "--data", str(tmp_path / "none")],
-        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(unpacked)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert done.stderr.endswith("or make one with aerialdojo-gen run aerialdojo-200k\n")
+    assert by_name in told
 
 
 @pytest.mark.parametrize(
