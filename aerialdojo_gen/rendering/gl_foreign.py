@@ -19,7 +19,7 @@ _Key = tuple[int, int, bool, bool]
 
 
 def foreign_kinds(scene: Scene) -> list[Kind]:
-    """Pack the triangles that `aerialdojo_gen.rendering.gl_geometry.chunks` leaves out."""
+    """Pack the triangles that `aerialdojo_gen.rendering.gl_geometry.own_kinds` leaves out."""
     return _kinds(scene.instances, scene.materials, True, ("FOREIGN",))
 
 
