@@ -83,7 +83,7 @@ def site(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_page_or_style_of_the_site_loads_anything_from_elsewhere(site):
     loads = re.compile(
         r"""<(?!a\s)[^>]*\s(?:src|srcset|data|poster|href)=["']?((?:https?:)?//[^"'\s>]*)|"""
@@ -95,6 +95,7 @@ def test_no_page_or_style_of_the_site_loads_anything_from_elsewhere(site):
 
 
 @pytest.mark.browser
+@pytest.mark.nightly
 def test_search_works_where_the_site_is_opened_from_a_folder(site):
     with chromium("the site's search") as driver:
         for page in ("faq.html", "reference/cli.html"):

@@ -11,7 +11,7 @@ from support.chores import until
 
 
 @pytest.mark.kill
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_environment_that_was_killed_in_its_making_is_made_anew(project, tmp_path):
     for name in ("Makefile", "pyproject.toml", "constraints.txt"):
         shutil.copy(project / name, tmp_path)

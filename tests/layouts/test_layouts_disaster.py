@@ -138,8 +138,7 @@ def test_heaps_rise_inside_their_area_only():
     assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)
 
 
-SCENES = ["D_Flood_0", "D_Flood_1"]
-of_each_scene = each_scene(SCENES)
+of_each_scene = each_scene(["D_Flood_0", "D_Flood_1"])
 
 
 @of_each_scene

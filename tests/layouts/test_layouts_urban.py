@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.layout_checks import ASSETS, blank_site, catalogue, props_of, touching
+from support.layout_checks import ASSETS, DAILY, blank_site, catalogue, nightly_unless, props_of, touching
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.rays import RayCaster
@@ -85,9 +85,9 @@ def test_things_have_rare_variants_first_and_no_room_twice():
 RECIPE = ASSETS / "scenes" / "U_Mall_0.toml"
 
 
-@pytest.fixture(scope="module")
-def mall(scene_of: Callable[[str], Scene]) -> Scene:
-    return scene_of("U_Mall_0")
+@pytest.fixture(scope="module", params=[nightly_unless("U_Mall_0" in DAILY, "U_Mall_0")])
+def mall(request: pytest.FixtureRequest, scene_of: Callable[[str], Scene]) -> Scene:
+    return scene_of(request.param)
 
 
 @pytest.fixture(scope="module")

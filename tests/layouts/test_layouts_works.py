@@ -24,8 +24,6 @@ from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.placement import footprint
 from aerialdojo_gen.scenes.shapes import upright
 
-HARBORS = ["I_Harbor_0", "I_Harbor_1"]
-of_each_harbor = each_scene(HARBORS)
 _AFLOAT = {"freighter", "fishing_boat", "tugboat", "sailboat", "motor_yacht", "rowing_boat", "buoy"}
 
 
@@ -37,7 +35,7 @@ def land(scene: Scene) -> shapely.Geometry:
     return shapely.union_all(shapely.make_valid(shapely.polygons(corners[level][:, :, :2])), grid_size=0.01)
 
 
-@of_each_harbor
+@each_scene(["I_Harbor_0", "I_Harbor_1"])
 def test_boats_float_clear_of_the_quays(scene_of, name):
     scene = scene_of(name)
     boats = [i for i in props_of(scene) if i.category in _AFLOAT]
@@ -147,11 +145,9 @@ def test_parapets_are_open_at_their_gaps():
 
 
 blank = partial(blank_site, "U_T_0")
-WORKS = [f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1)]
-of_each_works = each_scene(WORKS)
 
 
-@of_each_works
+@each_scene(f"U_{kind}_{k}" for kind in ("Factory", "ConstructionSite") for k in (0, 1))
 def test_things_stand_at_many_heights(scene_of, name):
     scene = scene_of(name)
     targets = set(catalogue().targets)
@@ -220,13 +216,14 @@ def test_guard_rails_follow_every_line():
     assert "planks" not in dict(guard_rails(lines, 2.0))
 
 
-@pytest.mark.parametrize("x", [-12.0, 0.0, 12.0])
-def test_one_flies_from_the_pitch_through_a_portal_and_out_of_the_ground(scene_of, x):
-    scene = scene_of("U_Stadium_0")
+@each_scene(["U_Stadium_0"])
+def test_one_flies_from_the_pitch_through_a_portal_and_out_of_the_ground(scene_of, name):
     # Under the upper rows and through the outer wall; beside the portal the front wall bars the way.
-    through, beside = distances(scene, [(x + 1.1, -10.9, 2.0), (x + 1.9, -10.9, 0.9)], (0.0, -1.0, 0.0))
-    assert through > 9.0
-    assert beside < 1.5
+    xs = (-12.0, 0.0, 12.0)
+    eyes = [*((x + 1.1, -10.9, 2.0) for x in xs), *((x + 1.9, -10.9, 0.9) for x in xs)]
+    through, beside = distances(scene_of(name), eyes, (0.0, -1.0, 0.0)).reshape(2, 3)
+    assert (through > 9.0).all()
+    assert (beside < 1.5).all()
 
 
 def one_tier(**options) -> Tier:
