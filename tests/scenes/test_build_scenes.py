@@ -26,7 +26,6 @@ from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle
 from aerialdojo_gen.scenes.kit.streets import crossings, parking_row, streets
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
-from aerialdojo_gen.scenes.shapes import triangulate, triangulate_all
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
 
@@ -118,33 +117,17 @@ def test_another_seed_makes_another_scene(assets):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("seed = 3", "sead = 3", "unknown key 'sead': did you mean 'seed'?"),
-        ("plan = 1\n", "", "key 'plan' is missing"),
-        ("plan = 1", "plan = 2", "plan = 2"),
         ("plan = 1", 'layout = "mall"', "scenes are plans since version 0.2.0, without 'layout': docs/plans.md has"),
         ("plan = 1", 'layout = "town"', "scenes are plans since version 0.2.0, without 'layout': run add-map again"),
-        ("limit = 4", 'limit = "many"', "site[2] (pattern): [pattern] limit = "),
-        ("[40, 30]", "[40, -30]", "size_m.1 = "),
-        ('"#a9c6e8"', '"blue"', "sky = "),
-        ('"brick:#804020"', '"brik"', "palette wall: unknown material 'brik': did you mean 'brick'?"),
-        ("post = 4\n", "pots = 4\n", "inventory: unknown category 'pots': did you mean 'post'?"),
-        (
-            "[inventory]\npost = 4",
-            "[inventory]\npost = 9",
-            "inventory: the scene has too few of post (needs 9, has 4)",
-        ),
+        ("plan = 1\n", "", "key 'plan' is missing"),
         ("seed = 3", "seed = ", "Invalid value"),
     ],
 )
-def test_errors_name_file_and_key(assets, old, new, says):
+def test_what_is_no_plan_is_said_with_the_file(assets, old, new, says):
     path = assets / "scenes" / "U_Test_0.toml"
-    assert old in PLAN
-    path.write_text(new.join(PLAN.rsplit(old, 1)))
-    with pytest.raises(AssetError) as caught:
+    path.write_text(PLAN.replace(old, new, 1))
+    with pytest.raises(AssetError, match=rf"^{path}: [^\n]*{says}[^\n]*$"):
         build(assets)
-    assert says in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -292,21 +275,6 @@ def test_poisson_discs_are_those_of_the_rule_taken_dart_by_dart(seed, radius, li
                 taken.append((x, y, own))
                 wanted.append((x, y, yaw))
     assert [tuple(pose) for pose in poisson_disc(area, radius, np.random.default_rng(seed), density, limit)] == wanted
-
-
-@given(st.lists(st.tuples(st.integers(-8, 8), st.integers(-8, 8), st.integers(3, 9)), min_size=1, max_size=6))
-def test_polygons_triangulated_together_are_those_triangulated_alone(discs):
-    holed = [disc(x, y, 5.0, n).difference(disc(x + 0.5, y, 2.0, n)) for x, y, n in discs]
-    vertices, whose, faces = triangulate_all(holed)
-    alone = [triangulate(plan) for plan in holed]
-    assert np.array_equal(vertices, np.concatenate([v for v, _ in alone]))
-    assert np.array_equal(whose, np.repeat(np.arange(len(holed)), [len(v) for v, _ in alone]))
-    first = np.cumsum([0, *(len(v) for v, _ in alone[:-1])])
-    assert np.array_equal(faces, np.concatenate([f + k for (_, f), k in zip(alone, first, strict=True)]))
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    assert (doubled > 0).all()
-    assert np.isclose(doubled.sum() / 2, sum(plan.area for plan in holed))
 
 
 def test_poses_along_a_path_reach_both_ends_and_face_along_it():

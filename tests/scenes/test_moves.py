@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import trimesh
@@ -14,13 +16,18 @@ from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.contact import CONTACT_M, _feet, _gaps, rest_on_ground
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 YARD = ASSETS / "smoke" / "U_Courtyard_0.toml"
+
+
+@cache
+def yard() -> Scene:
+    return build_scene(YARD, catalogue())
 
 
 def built(tmp_path, extra):
@@ -30,7 +37,7 @@ def built(tmp_path, extra):
 
 
 def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
-    before = built(tmp_path, "")
+    before = yard()
     node = next(i.node for i in before.instances if i.anatomy is not None)
     after = built(tmp_path, f'\n[moves]\n{node} = {{ by_m = [0.5, -0.25], up_m = 0.5, place = "elsewhere" }}\n')
     assert [i.node for i in after.instances] == [i.node for i in before.instances]
@@ -42,7 +49,7 @@ def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
 
 
 def test_a_move_of_what_is_not_placed_names_the_nearest_node(tmp_path):
-    before = built(tmp_path, "")
+    before = yard()
     node = next(i.node for i in before.instances if i.anatomy is not None)
     with pytest.raises(AssetError, match=f"moves: no prop '{node}0' is placed: did you mean '{node}'"):
         built(tmp_path, f"\n[moves]\n{node}0 = {{ by_m = [1.0, 0.0] }}\n")
@@ -84,7 +91,7 @@ def test_a_levelled_place_is_level_and_the_ground_beyond_it_as_before():
 @pytest.mark.parametrize("turn_deg", [90, 180, 270])
 def test_a_turned_plan_is_the_same_scene_turned(tmp_path, turn_deg):
     """Every vertex, front and bound is turned exactly, the land beyond too; the sun stays where it is."""
-    before = built(tmp_path, "")
+    before = yard()
     recipe = tmp_path / YARD.name
     recipe.write_text(YARD.read_text().replace("ceiling_m", f"turn_deg = {turn_deg}\nceiling_m", 1))
     after = build_scene(recipe, catalogue())

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point
+from support.doc_blocks import blocks
 from support.layout_checks import ASSETS
 
 from aerialdojo_gen.base.errors import AssetError
@@ -194,6 +195,7 @@ def test_things_are_strewn_by_a_field_made_of_others(tmp_path, catalogue):
         ({"place": [{"what": "bench", "at": [0, 0], "count": 1001}]},
          "count = 1001: Input should be less than or equal"),
         ({"note": "nothing"}, "an entry has one of paint, make, parts, place, pattern"),
+        ({"pattern": {"of": ["oak_tree"], "scatter": "yard", "limit": "many"}}, r"\(pattern\): \[pattern\] limit = "),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_in_one_line(tmp_path, catalogue, entry, message):
@@ -201,6 +203,23 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path, catalogue, entry, message)
         build(tmp_path, catalogue, {**YARD, "site": [entry]})
     assert "U_Yard_0.toml" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ({"sead": 3}, "unknown key 'sead': did you mean 'seed'"),
+        ({"plan": 2}, "plan = 2"),
+        ({"size_m": [40, -30]}, r"size_m\.1 = "),
+        ({"sky": "blue"}, "sky = "),
+        ({"palette": {"wall": "brik"}}, "palette wall: unknown material 'brik': did you mean 'brick'"),
+        ({"inventory": {"trctor": 1}}, "inventory: unknown category 'trctor': did you mean 'tractor'"),
+        ({"inventory": {"tractor": 9}}, r"inventory: the scene has too few of tractor \(needs 9, has 1\)"),
+    ],
+)
+def test_what_is_wrong_with_the_head_is_named_in_one_line(tmp_path, catalogue, head, message):
+    with pytest.raises(AssetError, match=rf"^[^\n]*U_Yard_0\.toml: [^\n]*{message}[^\n]*$"):
+        build(tmp_path, catalogue, YARD | head)
 
 
 def test_things_settle_on_slopes_and_keep_others_at_a_distance(tmp_path, catalogue):
@@ -265,19 +284,18 @@ def test_ground_has_the_heights_of_a_formula(tmp_path, catalogue):
     assert ground.bounds[:, 2] == pytest.approx((0, 4), abs=0.05)
 
 
-def test_the_plan_of_the_contributors_page_is_built(tmp_path, catalogue):
-    text = (ASSETS.parent / "CONTRIBUTING.md").read_text().partition("```toml\n#:schema")[2].partition("```")[0]
-    (tmp_path / "U_Farm_0.toml").write_text(text.partition("\n")[2])
-    scene = build_plan(tmp_path / "U_Farm_0.toml", catalogue)
-    assert {"barn", "tractor_000", "beehive_000"} <= {instance.node for instance in scene.instances}
-
-
-def test_the_plan_of_the_documents_page_is_built(tmp_path, catalogue):
-    blocks = (ASSETS.parent / "docs/plans.md").read_text().split("```toml\n")[1:]
+@pytest.mark.parametrize(
+    ("page", "nodes"),
+    [
+        ("CONTRIBUTING.md", {"barn", "tractor_000", "beehive_000"}),
+        ("docs/plans.md", {"barn", "tractor_000", "beehive_001", "stone_wall_000", "bench_000"}),
+    ],
+)
+def test_the_plan_of_a_page_is_built(tmp_path, catalogue, page, nodes):
+    found = [block.text for block in blocks(ASSETS.parent / page) if block.language == "toml"]
     path = tmp_path / "U_Farm_0.toml"
-    path.write_text("".join(block.partition("```")[0] for block in blocks))
-    nodes = {instance.node for instance in build_plan(path, catalogue).instances}
-    assert {"barn", "tractor_000", "beehive_001", "stone_wall_000", "bench_000"} <= nodes
+    path.write_text("".join(found))
+    assert nodes <= {instance.node for instance in build_plan(path, catalogue).instances}
 
 
 def test_every_builder_says_what_it_builds():

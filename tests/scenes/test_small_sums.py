@@ -5,13 +5,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
-from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry import portable
-from aerialdojo_gen.scenes.mesh import Mesh, areas, to_part
-from aerialdojo_gen.scenes.noise import value_noise
-from aerialdojo_gen.scenes.shapes import sphere
+from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
 
 
@@ -28,18 +24,6 @@ def test_areas_are_added_in_the_order_of_arrays():
     v, f = rng.normal(size=(500, 3)) * 10.0 ** rng.uniform(-3, 3, (500, 1)), rng.integers(0, 500, (2000, 3))
     normal = np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
     assert np.array_equal(areas(v, f.astype(np.int32)), np.sqrt((normal**2).sum(axis=1)) / 2.0)
-
-
-def test_noise_is_that_of_four_corners():
-    for size, cells, rows in ((64, 7, 7), (32, 4, 18), (128, 64, 8)):
-        lattice = generator(0, "texture", "test").uniform(-1.0, 1.0, size=(rows, cells))
-        y, x = np.arange(size) * rows / size, np.arange(size) * cells / size
-        i, j = np.floor(y).astype(int), np.floor(x).astype(int)
-        s, t = y - i, x - j
-        s, t = (s * s * (3.0 - 2.0 * s))[:, None], (t * t * (3.0 - 2.0 * t))[None, :]
-        a, b, c, d = (lattice[np.ix_((i + p) % rows, (j + q) % cells)] for p in (0, 1) for q in (0, 1))
-        expected = (a * (1 - t) + b * t) * (1 - s) + (c * (1 - t) + d * t) * s
-        assert np.array_equal(value_noise(size, cells, generator(0, "texture", "test"), rows), expected)
 
 
 def test_functions_are_those_of_the_c_library():
@@ -92,41 +76,3 @@ def is_uneven(node: ast.AST) -> bool:
         case ast.BinOp(left=base, op=ast.Pow(), right=ast.Constant(exponent)):
             return exponent != 2 and not isinstance(base, ast.Constant)
     return False
-
-
-def test_texture_coordinates_are_those_of_arrays():
-    rng = np.random.default_rng(7)
-    v, f = rng.normal(size=(60, 3)), rng.integers(0, 60, (200, 3)).astype(np.int32)
-    v[:20, 2] = 0.5
-    f[:50] = rng.integers(0, 20, (50, 3))
-    given = np.where(rng.random((200, 3, 1)) < 0.3, rng.integers(0, 3, (200, 3, 2)) / 2.0, np.nan)
-    made = to_part(Mesh(v, f, given), "brick", 0.7)
-    corners = v[f]
-    normals = portable.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(portable.norm(normals)[:, None], 1e-300)
-    flat = np.abs(normals[:, 2]) > 0.96
-    along = np.column_stack([-normals[:, 1], normals[:, 0], np.zeros(len(f))])
-    along /= np.maximum(portable.norm(along)[:, None], 1e-12)
-    along[flat] = (1.0, 0.0, 0.0)
-    up = portable.cross(normals, along)
-    up[flat] = (0.0, 1.0, 0.0)
-    projected = np.stack([portable.dot(corners, along[:, None]), portable.dot(corners, up[:, None])], axis=2)
-    uv = (np.where(np.isnan(given), projected, given).reshape(-1, 2) / 0.7).astype(np.float32)
-    keys = np.column_stack([f.reshape(-1), np.rint(uv * 4096.0)])
-    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    assert flat.any()
-    assert not flat.all()
-    assert len(first) < len(keys)
-    assert np.array_equal(made.faces, index.reshape(-1, 3))
-    assert np.array_equal(made.uv, uv[first])
-    assert np.array_equal(made.vertices, v[f.reshape(-1)[first]])
-
-
-def test_spheres_are_cut_as_trimesh_cuts_them():
-    ball = trimesh.creation.icosahedron()
-    for level in range(4):
-        ball.vertices = portable.unit(np.array(ball.vertices))
-        made = sphere(radius=1.0, subdivisions=level)
-        assert np.array_equal(made.vertices, ball.vertices)
-        assert np.array_equal(made.faces, ball.faces)
-        ball = ball.subdivide()
