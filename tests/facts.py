@@ -142,29 +142,18 @@ def evaluate_tables(data: Path) -> str:
     runs = [f"tables-{agent}" for agent in AGENTS]
     if not all((data / "episodes" / run).is_dir() for run in runs):
         return ""
-    command = [
-        sys.executable,
-        "-m",
-        "aerialdojo_gen.cli",
-        "report",
-        *runs,
-        "--data",
-        str(data),
-        "--format",
-        "markdown",
-    ]
-    command += ["--table", "overall", "--table", "results", "--table", "partition"]
+    tables = [word for table in ("overall", "results", "partition") for word in ("--table", table)]
+    command = [sys.executable, "-m", "aerialdojo_gen.cli", "report", *runs, *tables, "--data", data]
+    command += ["--format", "markdown"]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return done.stdout.strip() + "\n"
 
 
 def measured_on() -> dict[str, str]:
     """The commit and the machine."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short=7", "HEAD"], cwd=ROOT, capture_output=True, text=True
-    ).stdout
+    told = subprocess.run(["git", "rev-parse", "--short=7", "HEAD"], cwd=ROOT, capture_output=True, text=True)
     models = re.findall(r"^model name\s*: (.*)", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    return {"commit": commit.strip(), "machine": f"{models[0] if models else 'unknown'}, {os.cpu_count()} cores"}
+    return {"commit": told.stdout.strip(), "machine": f"{models[0] if models else 'unknown'}, {os.cpu_count()} cores"}
 
 
 def show(value: float | str, like: str) -> str:

@@ -26,8 +26,8 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from support import chores
 from support.preload import library
@@ -42,42 +42,22 @@ renderer = "pybullet"
 """
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """A command to kill."""
 
-    arguments: Callable[[Path, int], list[str]]  # Of the data directory and a number of workers
+    arguments: Callable[[Path, int], list[object]]  # Of the data directory and a number of workers
     # Brings a copy of the finished data to where the command has something to do.
-    prepare: Callable[[Path, random.Random], None]
+    prepare: Callable[[Path, random.Random], object]
 
 
-def _pipeline(data: Path) -> str:
-    return str(data.parent / "torture.toml")
+def _run(data: Path, workers: int) -> list[object]:
+    return ["run", data.parent / "torture.toml", "--data", data, "--workers", workers]
 
 
-def _run(data: Path, workers: int) -> list[str]:
-    return ["run", _pipeline(data), "--data", str(data), "--workers", str(workers)]
-
-
-def _render(frames: str) -> Callable[[Path, int], list[str]]:
+def _render(frames: str) -> Callable[[Path, int], list[object]]:
     return lambda data, workers: [
-        "render", "--pipeline", _pipeline(data), "--data", str(data), "--workers", str(workers), "--frames", frames,
-        "--scene", SCENE,
-    ]  # fmt: skip
-
-
-def _export(data: Path, _workers: int) -> list[str]:
-    return ["export", "--format", "aerialdojo", "--data", str(data), "--out", str(data / "exports" / "a"), "--force"]
-
-
-def _import(data: Path, _workers: int) -> list[str]:
-    source = str(data.parent / "exported")
-    return ["import-benchmark", source, "--format", "aerialdojo", "--data", str(data), "--name", "a", "--force"]
-
-
-def _evaluate(data: Path, workers: int) -> list[str]:
-    return [
-        "evaluate", "--agent", "oracle", "--limit", "40", "--run", "a", "--data", str(data), "--workers", str(workers)
+        "render", "--pipeline", data.parent / "torture.toml", "--data", data, "--workers", workers,
+        "--frames", frames, "--scene", SCENE,
     ]  # fmt: skip
 
 
@@ -111,18 +91,25 @@ def _older(folder: str, marker: str) -> Callable[[Path, random.Random], None]:
     return prepare
 
 
-def _nothing(_data: Path, _rng: random.Random) -> None:
-    pass
-
-
 KINDS = {
     "run": Kind(_run, _lose_stages),
     "render-video": Kind(_render("video"), _lose_recordings),
     "render-png": Kind(_render("png"), _lose_recordings),
-    "export": Kind(_export, _older("exports/a", "export.json")),
-    "import": Kind(_import, _older("imported/a", "import.json")),
-    "evaluate": Kind(_evaluate, _nothing),
-}
+    "export": Kind(
+        lambda data, _: ["export", "--format", "aerialdojo", "--data", data, "--out", data / "exports/a", "--force"],
+        _older("exports/a", "export.json"),
+    ),
+    "import": Kind(
+        lambda data, _: ["import-benchmark", data.parent / "exported", "--format", "aerialdojo", "--data", data,
+                         "--name", "a", "--force"],
+        _older("imported/a", "import.json"),
+    ),
+    "evaluate": Kind(
+        lambda data, workers: ["evaluate", "--agent", "oracle", "--limit", 40, "--run", "a", "--data", data,
+                               "--workers", workers],
+        lambda _data, _rng: None,
+    ),
+}  # fmt: skip
 
 
 class Server:
@@ -134,11 +121,9 @@ class Server:
             env=os.environ | {"LD_PRELOAD": str(library()), "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
 
-    def run(self, arguments: list[str], env: dict[str, str], said: Path, kill_after: float) -> int:
+    def run(self, arguments: list[object], env: dict[str, str], said: Path, kill_after: float) -> int:
         """Run a command in a session of its own; returns its exit status, negative for a signal."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        print(json.dumps([arguments, env, str(said)]), file=self._process.stdin, flush=True)
+        print(json.dumps([[*map(str, arguments)], env, str(said)]), file=self._process.stdin, flush=True)
         session = int(self._process.stdout.readline())
         if kill_after >= 0:
             # The server reaps it when it is asked to go on: until then its number is nobody else's.
@@ -152,7 +137,6 @@ class Server:
 
     def close(self) -> None:
         """End it."""
-        assert self._process.stdin is not None
         self._process.stdin.close()
         self._process.wait()
 
@@ -208,12 +192,14 @@ class Bench:
         self._seconds: dict[str, float] = {}
         self._calls: dict[str, int] = {}
 
-    def _command(self, arguments: list[str], env: dict[str, str] | None = None, kill_after: float = -1.0) -> int:
+    def _command(self, arguments: list[object], env: dict[str, str] | None = None, kill_after: float = -1.0) -> int:
         """Run a command, killed after so many seconds where that is not negative; returns its exit status."""
         said = self._folder / "stderr"
         code = self._server.run(arguments, env or {}, said, kill_after)
         if code not in (0, -signal.SIGKILL):
-            raise AssertionError(f"{' '.join(arguments)} ended with {code}: {said.read_text(encoding='utf-8')}")
+            raise AssertionError(
+                f"{' '.join(map(str, arguments))} ended with {code}: {said.read_text(encoding='utf-8')}"
+            )
         return code
 
     def close(self) -> None:
@@ -234,7 +220,7 @@ class Bench:
     def exported(self) -> Path:
         """What there is to import."""
         out = self._folder / "exported"
-        self._command(["export", "--format", "aerialdojo", "--data", str(self._base), "--out", str(out)])
+        self._command(["export", "--format", "aerialdojo", "--data", self._base, "--out", out])
         return out
 
     def _copy(self, name: str, rng: random.Random) -> Path:

@@ -5,44 +5,30 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from support import handmade
 
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.scenes.catalogue import load_catalogue
-from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
-
-_QUADS = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
-CUBE_FACES = np.array([f for a, b, c, d in _QUADS for f in ((a, b, c), (a, c, d))], dtype=np.int32)
-NAMES = {
-    "delivery_van": "delivery van",
-    "mailbox": "mailbox",
-    "bench": "bench",
-    "street_lamp": "street lamp",
-    "clock_tower": "clock tower",
-    "canopy": "canopy",
-}
-
+from aerialdojo_gen.scenes.model import Instance, Material, Scene
 
 PAINTS = {
     name: Material(name, rgb)
     for name, rgb in {
-        "grey": (128, 128, 128),
-        "red": (190, 40, 30),
-        "blue": (40, 80, 170),
-        "yellow": (230, 200, 40),
+        "grey": (128, 128, 128), "red": (190, 40, 30), "blue": (40, 80, 170), "yellow": (230, 200, 40),
         "green": (50, 130, 60),
     }.items()
-}
+}  # fmt: skip
 
 
 def box(
     node: str, centre: tuple[float, float, float], size: tuple[float, float, float], **attributes: str
 ) -> Instance:
     """A box on its bottom centre; the category is the node's name without its number."""
-    unit = np.array([[x, y, z] for z in (0, 1) for x, y in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))])
-    vertices = unit * np.array(size) + np.array(centre)
-    part = Part(vertices, CUBE_FACES, np.zeros((8, 2), dtype=np.float32), attributes.get("colour", "grey"))
-    return Instance(node, node.rsplit("_", 1)[0], attributes.get("colour", ""), attributes, (part,))
+    (x, y, z), (w, d, h) = centre, size
+    body = handmade.box((x - w / 2, y - d / 2, z), (x + w / 2, y + d / 2, z + h))
+    parts = (handmade.part(body, attributes.get("colour", "grey")),)
+    return Instance(node, node.rsplit("_", 1)[0], attributes.get("colour", ""), attributes, parts)
 
 
 def street() -> Scene:
@@ -84,7 +70,7 @@ def street_annotations(**descriptions: str) -> Annotations:
     objects = tuple(
         Object(
             id=k,
-            name=f"{scene[node].attributes['colour']} {NAMES[scene[node].category]}",
+            name=f"{scene[node].attributes['colour']} {scene[node].category.replace('_', ' ')}",
             category=scene[node].category,
             description=text,
             node=node,

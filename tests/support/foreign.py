@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -107,3 +110,11 @@ def glb(document: bytes, body: bytes = b"") -> bytes:
     if body:
         parts += struct.pack("<II", len(body), 0x004E4942) + body
     return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
+
+
+def changed_glb(raw: bytes, change: Callable[[dict[str, Any]], object]) -> bytes:
+    """Give a GLB with another document."""
+    (length,) = struct.unpack_from("<I", raw, 12)
+    document = json.loads(raw[20 : 20 + length])
+    change(document)
+    return glb(json.dumps(document, separators=(",", ":")).encode(), raw[28 + length :])

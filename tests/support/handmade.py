@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import trimesh
+from numpy.typing import NDArray
 
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
@@ -21,17 +22,14 @@ from aerialdojo_gen.store.schemas import TableSpec
 from aerialdojo_gen.store.tables import from_rows
 
 
+def part(mesh: trimesh.Trimesh, material: str = "grey", uv: NDArray[np.float64] | None = None) -> Part:
+    v = np.asarray(mesh.vertices, dtype=np.float64)
+    places = np.zeros((len(v), 2)) if uv is None else uv
+    return Part(v, np.asarray(mesh.faces, dtype=np.int32), places.astype(np.float32), material)
+
+
 def instance(node: str, *meshes: trimesh.Trimesh, category: str = "thing") -> Instance:
-    parts = tuple(
-        Part(
-            np.asarray(m.vertices, dtype=np.float64),
-            np.asarray(m.faces, dtype=np.int32),
-            np.zeros((len(m.vertices), 2), dtype=np.float32),
-            "grey",
-        )
-        for m in meshes
-    )
-    return Instance(node, category, "", {}, parts)
+    return Instance(node, category, "", {}, tuple(map(part, meshes)))
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> trimesh.Trimesh:

@@ -8,22 +8,21 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from aerialdojo_gen.scenes.terrain import Terrain
+
 CELL_M = 2.0
 
 
 @dataclass(frozen=True)
 class Hills:
-    """Heights at the corners of square cells, in metres; rows run north, the first corner lies at the origin.
-
-    Attributes
-    ----------
-    heights_m : (rows, columns) float64
-    missing : (rows - 1, columns - 1) bool
-        Cells without a surface.
-    """
+    """Heights, in rows that run north from the origin, and which of the cells between them have no surface."""
 
     heights_m: np.ndarray
     missing: np.ndarray
+
+    @property
+    def ground(self) -> Terrain:
+        return Terrain(0.0, 0.0, CELL_M, self.heights_m)
 
     @property
     def size_m(self) -> np.ndarray:
@@ -31,28 +30,15 @@ class Hills:
 
     def z(self, xy: np.ndarray) -> np.ndarray:
         """Height of the surface at points (n, 2) in the field's own frame; NaN where there is none."""
-        u, v = (np.asarray(xy, dtype=np.float64) / CELL_M).T
-        rows, columns = self.missing.shape
-        inside = (u >= 0) & (u <= columns) & (v >= 0) & (v <= rows)
-        j = np.clip(np.floor(u).astype(int), 0, columns - 1)
-        i = np.clip(np.floor(v).astype(int), 0, rows - 1)
-        s, t = u - j, v - i
-        h = self.heights_m
-        sw, se, nw, ne = h[i, j], h[i, j + 1], h[i + 1, j], h[i + 1, j + 1]
-        z = np.where(s >= t, sw + s * (se - sw) + t * (ne - se), sw + t * (nw - sw) + s * (ne - nw))
-        return np.where(inside & ~self.missing[i, j], z, np.nan)
+        xy = np.asarray(xy, dtype=np.float64)
+        inside = ((xy >= 0) & (xy <= self.size_m)).all(axis=1)
+        j, i = np.clip(np.floor(xy / CELL_M).astype(int), 0, np.array(self.missing.shape[::-1]) - 1).T
+        return np.where(inside & ~self.missing[i, j], self.ground.z(*xy.T), np.nan)
 
     def mesh(self, turned: bool = False) -> trimesh.Trimesh:
         """The sheet; `turned` winds it the wrong way round, as imports often are."""
-        rows, columns = self.heights_m.shape
-        x, y = np.meshgrid(np.arange(columns) * CELL_M, np.arange(rows) * CELL_M)
-        i, j = np.nonzero(~self.missing)
-        sw = i * columns + j
-        faces = np.concatenate([
-            np.column_stack([sw, sw + 1, sw + columns + 1]), np.column_stack([sw, sw + columns + 1, sw + columns]),
-        ])  # fmt: skip
-        vertices = np.column_stack([x.ravel(), y.ravel(), self.heights_m.ravel()])
-        return trimesh.Trimesh(vertices, faces[:, ::-1] if turned else faces, process=False)
+        faces = self.ground.triangles()[np.tile(~self.missing.ravel(), 2)]
+        return trimesh.Trimesh(self.ground.corners(), faces[:, ::-1] if turned else faces, process=False)
 
 
 def hills(seed: int, cells: int = 20, relief_m: float = 12.0, holes: int = 0, ragged: bool = False) -> Hills:

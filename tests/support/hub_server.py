@@ -81,19 +81,8 @@ class _Handler(BaseHTTPRequestHandler):
     def log_message(self, *arguments):
         pass
 
-    def do_GET(self):
-        self._handle("GET")
-
-    def do_HEAD(self):
-        self._handle("HEAD")
-
-    def do_POST(self):
-        self._handle("POST")
-
-    def do_PUT(self):
-        self._handle("PUT")
-
-    def _handle(self, method):
+    def _handle(self):
+        method = self.command
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
         if (self.headers.get("Transfer-Encoding") or "") == "chunked":
             body = self._chunks()
@@ -104,6 +93,8 @@ class _Handler(BaseHTTPRequestHandler):
                     answer(self, body, *at.groups())
                     return
             self._say(404, {"error": f"no route {method} {path}"})
+
+    do_GET = do_HEAD = do_POST = do_PUT = _handle  # noqa: N815 - as the server calls them
 
     def _chunks(self):
         body = b""

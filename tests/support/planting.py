@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
 import math
-import struct
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from support.foreign import changed_glb
 
 from aerialdojo_gen.base.config.pipeline import load_pipeline
 from aerialdojo_gen.dataset.validate import ValidationOptions, validate
@@ -205,17 +204,7 @@ def definitions():
 def edit_mesh(planted: Planted, change: Callable[[dict], None]) -> None:
     """Change the glTF document of the scene's mesh, and put the new digest into `scenes`, as a bad author would."""
     path = planted.data / "meshes" / f"{planted.scene}.glb"
-    raw = path.read_bytes()
-    (length,) = struct.unpack_from("<I", raw, 12)
-    document = json.loads(raw[20 : 20 + length])
-    change(document)
-    head = json.dumps(document, separators=(",", ":")).encode()
-    head += b" " * (-len(head) % 4)
-    rest = raw[20 + length :]
-    path.write_bytes(
-        struct.pack("<4sII", b"glTF", 2, 20 + len(head) + len(rest))
-        + struct.pack("<II", len(head), 0x4E4F534A) + head + rest
-    )  # fmt: skip
+    path.write_bytes(changed_glb(path.read_bytes(), change))
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     planted.edit("release/scenes", lambda row: row.update(mesh_sha256=digest))
 

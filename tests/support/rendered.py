@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 from support import handmade
 
-from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.model import Instance, Material, Scene
 
 CHECKS = np.kron([[0, 1], [1, 0]], np.ones((8, 8))).astype(np.uint8)
 MATERIALS = {
@@ -20,13 +19,10 @@ MATERIALS = {
 
 
 def block(node: str, low: tuple[float, float, float], high: tuple[float, float, float], material: str) -> Instance:
-    mesh = trimesh.creation.box(bounds=[low, high])
+    mesh = handmade.box(low, high)
     # A projection along the diagonal, so that no face is without texture.
     uv = (mesh.vertices[:, :2] + mesh.vertices[:, 2:]) / MATERIALS[material].tile_m
-    part = Part(
-        np.asarray(mesh.vertices, dtype=np.float64), mesh.faces.astype(np.int32), uv.astype(np.float32), material
-    )
-    return Instance(node, "thing", "", {}, (part,))
+    return Instance(node, "thing", "", {}, (handmade.part(mesh, material, uv),))
 
 
 def courtyard() -> Scene:

@@ -4,9 +4,10 @@ import json
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from typing import Any
+
+from support.chores import until
 
 from aerialdojo_gen.learning.recipe import Recipe
 
@@ -30,10 +31,7 @@ def kill_at_first_checkpoint(recipe, data, out, cache):
         "--cache", str(cache), "--device", "cpu", "--workers", "1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-        until = time.monotonic() + 300
-        while not (out / "checkpoint.safetensors").is_file() and process.poll() is None:
-            assert time.monotonic() < until
-            time.sleep(0.02)
+        until(lambda: (out / "checkpoint.safetensors").is_file() or process.poll() is not None, 300)
         process.send_signal(signal.SIGKILL)
         process.communicate()
     assert process.returncode == -signal.SIGKILL

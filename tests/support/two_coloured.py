@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from support import handmade
 from support.handmade import box, ground, instance
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
@@ -18,13 +19,7 @@ EMBODIMENT = Embodiment()
 
 
 def part(low, high, material) -> Part:
-    mesh = box(low, high)
-    return Part(
-        np.asarray(mesh.vertices, np.float64),
-        np.asarray(mesh.faces, np.int32),
-        np.zeros((8, 2), np.float32),
-        material,
-    )
+    return handmade.part(box(low, high), material)
 
 
 def yard(*things: Instance, colours: tuple[Material, ...] = ()) -> Scene:
