@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
+from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -132,19 +133,17 @@ class _Writer:
     def __init__(self) -> None:
         self.data: list[bytes] = []
         self._size = 0
-        self._views: list[dict[str, Any]] = []
-        self._accessors: list[dict[str, Any]] = []
-        self._materials: list[dict[str, Any]] = []
-        self._images: list[dict[str, Any]] = []
-        self._meshes: list[dict[str, Any]] = []
-        self._nodes: list[dict[str, Any]] = []
+        self._tables: defaultdict[str, list[dict[str, Any]]] = defaultdict(list)
+
+    def _add(self, table: str, entry: dict[str, Any]) -> int:
+        self._tables[table].append(entry)
+        return len(self._tables[table]) - 1
 
     def material(self, material: Material) -> None:
-        self._materials.append(material_entry(material, self._image))
+        self._add("materials", material_entry(material, self._image))
 
     def _image(self, file: bytes, media_type: str) -> int:
-        self._images.append({"mimeType": media_type, "bufferView": self._view(file, None)})
-        return len(self._images) - 1
+        return self._add("images", {"mimeType": media_type, "bufferView": self._view(file, None)})
 
     def instance(self, instance: Instance, materials: dict[str, int]) -> None:
         primitives = []
@@ -158,7 +157,7 @@ class _Writer:
             }
             if part.colours is not None:
                 stored = self._accessor(linear_colours(part.colours), _UINT16, "VEC4", _ARRAY_BUFFER)
-                self._accessors[stored]["normalized"] = True
+                self._tables["accessors"][stored]["normalized"] = True
                 attributes["COLOR_0"] = stored
             indices = self._accessor(part.faces.reshape(-1).astype(_DTYPES[kind]), kind, "SCALAR", _INDEX_BUFFER)
             primitives.append({"attributes": attributes, "indices": indices, "material": materials[part.material]})
@@ -171,8 +170,8 @@ class _Writer:
             **({"held_out": True} if instance.held_out else {}),
             **({} if instance.anatomy is None else {"anatomy": instance.anatomy.to_json()}),
         }
-        self._nodes.append({"name": instance.node, "mesh": len(self._meshes), "extras": extras})
-        self._meshes.append({"primitives": primitives})
+        mesh = self._add("meshes", {"primitives": primitives})
+        self._add("nodes", {"name": instance.node, "mesh": mesh, "extras": extras})
 
     def document(self, scene: Scene) -> dict[str, Any]:
         own = {
@@ -184,7 +183,8 @@ class _Writer:
             **({} if scene.weather == WEATHERS[0] else {"weather": scene.weather}),
             **({"imported": True} if scene.imported else {}),
         }
-        children = list(range(1, len(self._nodes) + 1))
+        tables = self._tables
+        children = list(range(1, len(tables["nodes"]) + 1))
         root = {"name": scene.name, "rotation": _Z_UP_TO_Y_UP, "children": children}
         document: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "aerialdojo-gen"}
@@ -192,20 +192,17 @@ class _Writer:
             "extras": {"aerialdojo": own},
             "scene": 0,
             "scenes": [{"name": scene.name, "nodes": [0]}],
-            "nodes": [root, *self._nodes],
-            "meshes": self._meshes,
-            "materials": self._materials,
-            "accessors": self._accessors,
-            "bufferViews": self._views,
+            "nodes": [root, *tables["nodes"]],
+            **{table: tables[table] for table in ("meshes", "materials", "accessors", "bufferViews")},
             "buffers": [{"byteLength": self._size}],
         }
-        used = sorted({name for entry in self._materials for name in entry.get("extensions", {})})
+        used = sorted({name for entry in tables["materials"] for name in entry.get("extensions", {})})
         if used:
             document["extensionsUsed"] = used
-        if self._images:
-            document["images"] = self._images
+        if images := tables["images"]:
+            document["images"] = images
             document["samplers"] = [{"wrapS": 10497, "wrapT": 10497, "magFilter": 9729, "minFilter": 9987}]
-            document["textures"] = [{"source": k, "sampler": 0} for k in range(len(self._images))]
+            document["textures"] = [{"source": k, "sampler": 0} for k in range(len(images))]
         return document
 
     def _accessor(self, values: NDArray[Any], component: int, kind: str, target: int, bounds: bool = False) -> int:
@@ -217,16 +214,14 @@ class _Writer:
         }
         if bounds:
             entry |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        self._accessors.append(entry)
-        return len(self._accessors) - 1
+        return self._add("accessors", entry)
 
     def _view(self, raw: bytes, target: int | None) -> int:
         view = {"buffer": 0, "byteOffset": self._size, "byteLength": len(raw)}
-        self._views.append(view if target is None else view | {"target": target})
         padding = b"\0" * (-len(raw) % 4)
         self.data += [raw, padding]
         self._size += len(raw) + len(padding)
-        return len(self._views) - 1
+        return self._add("bufferViews", view if target is None else view | {"target": target})
 
 
 def _chunks(whole: bytes) -> tuple[dict[str, Any], memoryview]:

@@ -76,12 +76,10 @@ def _expression(names: PlanNames, text: str, known: Mapping[str, Any]) -> Field:
 
 def _patches(names: PlanNames, value: Mapping[str, Any]) -> Field:
     """Patches, about 1 on average, that rise to exp(sharpness) in the middle of some."""
-    given = value["patches"]
-    if not isinstance(given, list) or len(given) != 3:
-        raise ValueError(f"patches is [seed, wavelength_m, sharpness], got {given!r}")
-    seed, wavelength_m, sharpness = (names.number(one) for one in given)
+    form = "patches is [seed, wavelength_m, sharpness]"
+    seed, wavelength_m, sharpness = names.numbers(value["patches"], form, 3)
     if wavelength_m <= 0.0 or abs(sharpness) > 20.0:
-        raise ValueError(f"patches have a wavelength above 0 and a sharpness up to 20, got {given!r}")
+        raise ValueError(f"patches have a wavelength above 0 and a sharpness up to 20, got {value['patches']!r}")
     noise = OpenSimplex(seed=int(seed))
     return lambda _site: lambda x, y: math.exp(sharpness * noise.noise2(x / wavelength_m, y / wavelength_m))
 

@@ -61,6 +61,12 @@ class PlanNames:
             raise ValueError(f"must lie within {_MAX_M:,.0f}, got {value:g}")
         return float(value)
 
+    def numbers(self, value: Any, form: str, *counts: int) -> list[float]:
+        """Resolve a list of as many numbers as one of the counts says; its form is for the message."""
+        if not isinstance(value, list) or len(value) not in counts:
+            raise ValueError(f"{form}, got {value!r}")
+        return [self.number(one) for one in value]
+
     def formula(self, value: Any) -> ArrayFunction:
         """Resolve a formula over arrays and the plan's heights; it takes the arrays by name."""
         text = value if isinstance(value, str) else repr(self.number(value))
@@ -74,9 +80,7 @@ class PlanNames:
 
     def frame(self, value: Any) -> Frame:
         """Resolve ``[x, y, yaw]``."""
-        if not isinstance(value, list) or len(value) != 3:
-            raise ValueError(f"frame is [x, y, yaw], got {value!r}")
-        return Frame(*(self.number(one) for one in value))
+        return Frame(*self.numbers(value, "frame is [x, y, yaw]", 3))
 
     def line(self, value: Any) -> list[Point]:
         """Resolve the name of a line, its points, or ``{points, smooth}``, ``{points, eased}``, ``{points, frame}``.
@@ -111,9 +115,8 @@ class PlanNames:
         return smooth_path(eased_path(points, eased) if eased else points, smooth)
 
     def _ellipse(self, value: Any) -> list[Point]:
-        if not isinstance(value, list) or len(value) != 5:
-            raise ValueError(f"ellipse is [x, y, radius along x, radius along y, steps], got {value!r}")
-        x, y, a, b, steps = (self.number(one) for one in value)
+        form = "ellipse is [x, y, radius along x, radius along y, steps]"
+        x, y, a, b, steps = self.numbers(value, form, 5)
         turns = [2 * math.pi * k / max(int(steps), 3) for k in range(max(int(steps), 3) + 1)]
         return [(x + a * math.cos(turn), y + b * math.sin(turn)) for turn in turns]
 
@@ -169,30 +172,23 @@ class PlanNames:
 
 
 def _box(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    corners = value["box"]
-    if not isinstance(corners, list) or len(corners) != 4:
-        raise ValueError(f"box is [x0, y0, x1, y1], got {corners!r}")
-    x0, y0, x1, y1 = (names.number(corner) for corner in corners)
+    x0, y0, x1, y1 = names.numbers(value["box"], "box is [x0, y0, x1, y1]", 4)
     if min(abs(x1 - x0), abs(y1 - y0)) < _SHORTEST_M:
         raise ValueError(f"a rectangle must be {_SHORTEST_M:g} m wide and deep or more")
     return rectangle(x0, y0, x1, y1)
 
 
 def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    given = value["disc"]
-    if not isinstance(given, list) or len(given) not in (3, 4):
-        raise ValueError(f"disc is [x, y, radius] or [x, y, radius, corners], got {given!r}")
-    x, y, radius = (names.number(one) for one in given[:3])
-    return disc(x, y, radius, int(given[3])) if len(given) == 4 else disc(x, y, radius)
+    form = "disc is [x, y, radius] or [x, y, radius, corners]"
+    x, y, radius, *corners = names.numbers(value["disc"], form, 3, 4)
+    return disc(x, y, radius, *map(int, corners))
 
 
 def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
-    given = value["blob"]
-    if not isinstance(given, list) or len(given) not in (4, 5, 6):
-        raise ValueError(f"blob is [x, y, radius, seed] or that with ragged, corners, got {given!r}")
-    x, y, radius, seed, ragged = (names.number(one) for one in (*given, 0.25)[:5])
-    area = blob(x, y, radius, int(seed), ragged, min(max(int(names.number(given[5])), 3), _MAX_POINTS)
-                if len(given) == 6 else 28)  # fmt: skip
+    form = "blob is [x, y, radius, seed] or that with ragged, corners"
+    x, y, radius, seed, *more = names.numbers(value["blob"], form, 4, 5, 6)
+    ragged, corners = (*more, *(0.25, 28)[len(more) :])
+    area = blob(x, y, radius, int(seed), ragged, min(max(int(corners), 3), _MAX_POINTS))
     if "long" not in value:
         return area
     # Length over width, and the direction of the length.
@@ -252,9 +248,8 @@ def _grown(names: PlanNames, area: BaseGeometry, by_m: Any) -> BaseGeometry:
 
 def _ragged(names: PlanNames, area: BaseGeometry, given: Any) -> BaseGeometry:
     """Make the outline natural: ``[metres in and out, seed, metres from point to point]``, of its largest piece."""
-    if not isinstance(given, list) or len(given) != 3:
-        raise ValueError(f"ragged is [metres in and out, seed, metres from point to point], got {given!r}")
-    amplitude_m, seed, step_m = (names.number(one) for one in given)
+    form = "ragged is [metres in and out, seed, metres from point to point]"
+    amplitude_m, seed, step_m = names.numbers(given, form, 3)
     ring = max(polygons_of(area), key=lambda piece: piece.area).exterior
     if not 8 <= ring.length / max(step_m, _SHORTEST_M) <= _MAX_POINTS:
         raise ValueError(f"ragged makes from 8 to {_MAX_POINTS:,} points, got one every {step_m:g} m")
@@ -292,50 +287,41 @@ def names_of(info: ValidationInfo) -> PlanNames:
     return info.context
 
 
+def _by(resolve: Callable[[PlanNames, Any], Any]) -> PlainValidator:
+    return PlainValidator(lambda value, info: resolve(names_of(info), value))
+
+
 _NUMBER_SCHEMA = {"type": ["number", "string"]}
 _POINT_SCHEMA = {"type": "array", "items": _NUMBER_SCHEMA, "minItems": 2, "maxItems": 2}
+
+
+def _named(items: dict[str, Any]) -> dict[str, Any]:
+    return {"anyOf": [{"type": "string"}, {"type": "array", "items": items}, {"type": "object"}]}
+
 
 Number = Annotated[
     float, BeforeValidator(lambda value, info: names_of(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
 ]
 """A number, or an expression over the plan's heights such as ``"quay + 0.2"``."""
-Formula = Annotated[
-    ArrayFunction,
-    PlainValidator(lambda value, info: names_of(info).formula(value)),
-    WithJsonSchema(_NUMBER_SCHEMA),
-]
+Formula = Annotated[ArrayFunction, _by(PlanNames.formula), WithJsonSchema(_NUMBER_SCHEMA)]
 """An expression over arrays, such as ``"2*eased(inland, 12, 26)*(1 + 0.8*noise)"``; see `evaluate_arrays`."""
-At = Annotated[Point, PlainValidator(lambda value, info: names_of(info).point(value)), WithJsonSchema(_POINT_SCHEMA)]
+At = Annotated[Point, _by(PlanNames.point), WithJsonSchema(_POINT_SCHEMA)]
 """A point ``[x, y]``, metres."""
 Box = tuple[Number, Number, Number, Number]
 """An axis-parallel rectangle ``[x0, y0, x1, y1]``, metres."""
 Point3 = tuple[Number, Number, Number]
 """A point ``[x, y, z]``, metres."""
-Line = Annotated[
-    list[Point],
-    PlainValidator(lambda value, info: names_of(info).line(value)),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _POINT_SCHEMA}, {"type": "object"}]}),
-]
+Line = Annotated[list[Point], _by(PlanNames.line), WithJsonSchema(_named(_POINT_SCHEMA))]
 """The name of a line, its points, or ``{points, smooth}`` or ``{points, eased}``."""
-Area = Annotated[
-    BaseGeometry,
-    PlainValidator(lambda value, info: names_of(info).area(value)),
-    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _NUMBER_SCHEMA}, {"type": "object"}]}),
-]
+Area = Annotated[BaseGeometry, _by(PlanNames.area), WithJsonSchema(_named(_NUMBER_SCHEMA))]
 """The name of an area, ``[x0, y0, x1, y1]``, or a table such as ``{disc = [x, y, radius], minus = "yard"}``."""
-Bodies = Annotated[
-    Parts,
-    PlainValidator(lambda value, info: names_of(info).bodies(value)),
-    WithJsonSchema({"type": "array", "items": {"type": "object"}}),
-]
+Bodies = Annotated[Parts, _by(PlanNames.bodies), WithJsonSchema({"type": "array", "items": {"type": "object"}})]
 """Parts as of a structure, which a builder adds to what it makes."""
 Areas = Annotated[
     list[BaseGeometry],
-    PlainValidator(lambda value, info: names_of(info).several(value)),
+    _by(PlanNames.several),
     WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}, {"type": "object"}]}),
 ]
 """An area, or a list of areas."""
-Material = Annotated[
-    str, PlainValidator(lambda value, info: names_of(info).material(value)), WithJsonSchema({"type": "string"})
-]
+Material = Annotated[str, _by(PlanNames.material), WithJsonSchema({"type": "string"})]
 """A name of the palette, or a material such as ``"brick:#8a4638"``."""

@@ -3,18 +3,59 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from aerialdojo_gen.scenes.worlds.blocks import Layout, lane_streets
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.streets import Box, grid
-from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, step
+from aerialdojo_gen.scenes.worlds.wilds import Pose, beside, rolling, step
 
 Point = tuple[float, float]
 STOREY_M = 3.1
+
+
+def built_up(
+    draft: Draft, layout: Callable[[Draft, float, float], Layout], relief_m: float, waves_m: Point
+) -> Layout:
+    """Lay streets, yards and open ground out on ground that rolls a little."""
+    rolling(draft, relief_m, waves_m, 1.6)
+    draft.level_things = False
+    lots, lanes, open_ = layout(draft, draft.width_m / 2, draft.depth_m / 2)
+    draft.section("Streets and open ground")
+    for box in open_:
+        draft.paint(box.rounded(), draft.material("square", *box))
+    for box in lots:
+        draft.paint(box.grown(-0.5).rounded(), draft.material("yard", *box))
+    lane_streets(draft, lanes)
+    return lots, lanes, open_
+
+
+def camp(draft: Draft, open_: Sequence[Box]) -> None:
+    """Offer slots to those who help (``camp``, ``small``), and paint the rubble."""
+    for box in open_:
+        things(draft, "camp", box.grown(-2.5), 6.2, (7.4, 7.0))
+        things(draft, "small", box.grown(-1.5), 4.8, (2.4, 2.6))
+    draft.section("Rubble")
+    if heaps := [name for name in draft.areas if name.startswith("heap_")]:
+        draft.paint(heaps, draft.material("rubble"))
+
+
+def shallow(draft: Draft, lot: Box, k: int, most_m: float, low: bool) -> Box:
+    """Ground of a building on a lot: one side of it where it is deep, with slots on the rest (``yard``)."""
+    box, deep = lot.grown(-1.5), min(lot.width, lot.depth) - 3.0
+    if deep <= most_m:
+        return box
+    (x0, y0, x1, y1), cut = box, deep - draft.number(most_m - 2.5, most_m, "deep", k)
+    x, y = (0.0, cut) if box.width >= box.depth else (cut, 0.0)
+    front = Box(x0, y0, x1 - x, y1 - y) if low else Box(x0 + x, y0 + y, x1, y1)
+    rest = box.shape().difference(front.grown(1.5).shape())
+    if rest.area > 20.0:
+        things(draft, "yard", Box(*rest.bounds), 5.2, (3.8, 3.8))
+    return front
 
 
 def wreck(
@@ -137,12 +178,6 @@ def littered(draft: Draft) -> None:
             "strew_about_heaps", heaps=heaps, spacing_m=1.5, margin_m=2.0, brick=draft.material("wall", "bricks")
         )
     draft.make("strew_chunks", area=[-w, -d, w, d], spacing_m=4.2, stream="everywhere", size_m=[0.35, 0.8])
-
-
-def paint_heaps(draft: Draft) -> None:
-    """Paint the heaps that there are; before what stands on them."""
-    if heaps := [name for name in draft.areas if name.startswith("heap_")]:
-        draft.paint(heaps, draft.material("rubble"))
 
 
 def poles(draft: Draft, lanes: Sequence[Box]) -> None:

@@ -6,17 +6,19 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, lane_streets, town
+from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.streets import Box
-from aerialdojo_gen.scenes.worlds.wilds import point, rolling, smoothed, step
+from aerialdojo_gen.scenes.worlds.wilds import point, smoothed, step
 from aerialdojo_gen.scenes.worlds.wrecked import (
+    built_up,
+    camp,
     heap,
     littered,
     open_landmarks,
-    paint_heaps,
     pancaked,
     poles,
+    shallow,
     things,
     wreck,
 )
@@ -25,15 +27,7 @@ from aerialdojo_gen.scenes.worlds.wrecked import (
 def write(draft: Draft) -> None:
     """Lay the town out, let the fault run through it, then wreck its buildings, and set up camp where it is open."""
     w, d = draft.width_m / 2, draft.depth_m / 2
-    rolling(draft, 0.3, (26, 36), 1.6)
-    draft.level_things = False
-    lots, lanes, open_ = _TOPOLOGIES[draft.topology](draft, w, d)
-    draft.section("Streets and open ground")
-    for box in open_:
-        draft.paint(box.rounded(), draft.material("square", *box))
-    for box in lots:
-        draft.paint(box.grown(-0.5).rounded(), draft.material("yard", *box))
-    lane_streets(draft, lanes)
+    lots, lanes, open_ = built_up(draft, _TOPOLOGIES[draft.topology], 0.3, (26, 36))
     fault = _fault(draft, w, d)
     for lane in lanes:
         draft.take(lane.shape())
@@ -41,11 +35,7 @@ def write(draft: Draft) -> None:
     draft.section("What is left of the buildings")
     for k, lot in enumerate(draft.shuffled(lots, "lots")):
         _ruin(draft, lot, k, fault)
-    for box in open_:
-        things(draft, "camp", box.grown(-2.5), 6.2, (7.4, 7.0))
-        things(draft, "small", box.grown(-1.5), 4.8, (2.4, 2.6))
-    draft.section("Rubble")
-    paint_heaps(draft)
+    camp(draft, open_)
     draft.fill_slots()
     draft.section("Poles and loose pieces")
     poles(draft, lanes)
@@ -74,27 +64,12 @@ def _fault(draft: Draft, w: float, d: float) -> shapely.LineString:
 def _ruin(draft: Draft, lot: Box, k: int, fault: shapely.LineString) -> None:
     """Put what is left of a building on a lot, or rubble alone where the fault runs."""
     name, storeys = f"block_{k}", max(2, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k))
-    deep = min(lot.width, lot.depth) - 3.0
-    box = lot.grown(-1.5)
-    if deep > 12.5:
-        cut = deep - draft.number(10.0, 12.5, "deep", k)
-        low = draft.chance(0.5, "front", k)
-        x0, y0, x1, y1 = box
-        box = (Box(x0, y0 + (0 if low else cut), x1, y1 - (cut if low else 0)) if box.width >= box.depth
-               else Box(x0 + (0 if low else cut), y0, x1 - (cut if low else 0), y1))  # fmt: skip
-        rest = lot.grown(-1.5).shape().difference(box.grown(1.5).shape())
-        if rest.area > 20.0:
-            things(draft, "yard", Box(*rest.bounds), 5.2, (3.8, 3.8))
+    box = shallow(draft, lot, k, 12.5, draft.chance(0.5, "front", k))
     if fault.distance(box.shape()) < 1.5:
         x, y = box.middle
         if k % 2:
-            heap(
-                draft,
-                f"heap_{name}",
-                point(x, y),
-                min(box.width, box.depth) * 0.45,
-                draft.number(1.2, 2.2, "heap", k),
-            )
+            high = draft.number(1.2, 2.2, "heap", k)
+            heap(draft, f"heap_{name}", point(x, y), min(box.width, box.depth) * 0.45, high)
         things(draft, "yard", box, 5.2, (3.8, 3.8))
         return
     if draft.chance(0.22, "fallen", k):

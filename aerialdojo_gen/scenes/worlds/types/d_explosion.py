@@ -7,27 +7,27 @@ from collections.abc import Callable
 
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, lane_streets, split, town
+from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, split, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.streets import Box
-from aerialdojo_gen.scenes.worlds.wilds import beside, point, rolling, step
-from aerialdojo_gen.scenes.worlds.wrecked import heap, littered, open_landmarks, paint_heaps, things, wreck
+from aerialdojo_gen.scenes.worlds.wilds import beside, point, step
+from aerialdojo_gen.scenes.worlds.wrecked import (
+    built_up,
+    camp,
+    heap,
+    littered,
+    open_landmarks,
+    shallow,
+    things,
+    wreck,
+)
 
 Point = tuple[float, float]
 
 
 def write(draft: Draft) -> None:
     """Lay streets and lots out, blast a crater, then tear the buildings open, the more the nearer they stand."""
-    w, d = draft.width_m / 2, draft.depth_m / 2
-    rolling(draft, 0.25, (22, 32), 1.6)
-    draft.level_things = False
-    lots, lanes, open_ = _TOPOLOGIES[draft.topology](draft, w, d)
-    draft.section("Streets and open ground")
-    for box in open_:
-        draft.paint(box.rounded(), draft.material("square", *box))
-    for box in lots:
-        draft.paint(box.grown(-0.5).rounded(), draft.material("yard", *box))
-    lane_streets(draft, lanes)
+    lots, lanes, open_ = built_up(draft, _TOPOLOGIES[draft.topology], 0.25, (22, 32))
     at = _where(draft, lanes, open_)
     radius = draft.knob("crater_m")
     _crater(draft, at, radius)
@@ -39,11 +39,7 @@ def write(draft: Draft) -> None:
     draft.section("What is left of the buildings")
     for k, lot in enumerate(draft.shuffled(lots, "lots")):
         _lot(draft, lot, k, at, radius)
-    for box in open_:
-        things(draft, "camp", box.grown(-2.5), 6.2, (7.4, 7.0))
-        things(draft, "small", box.grown(-1.5), 4.8, (2.4, 2.6))
-    draft.section("Rubble")
-    paint_heaps(draft)
+    camp(draft, open_)
     _cordon(draft, at, radius)
     draft.fill_slots()
     draft.section("Loose pieces")
@@ -83,17 +79,10 @@ def _crater(draft: Draft, at: Point, radius_m: float) -> None:
 def _lot(draft: Draft, lot: Box, k: int, at: Point, radius_m: float) -> None:
     """Put what is left of a building on a lot; near the blast it is torn wide open, or rubble alone."""
     name, storeys = f"block_{k}", max(2, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k))
-    box, deep = lot.grown(-1.5), min(lot.width, lot.depth) - 3.0
-    if deep > 13.0:
-        # The front stands at the side that looks to the blast.
-        cut = deep - draft.number(10.5, 13.0, "deep", k)
-        low = at[1] < box.middle[1] if box.width >= box.depth else at[0] < box.middle[0]
-        x0, y0, x1, y1 = box
-        box = (Box(x0, y0 + (0 if low else cut), x1, y1 - (cut if low else 0)) if box.width >= box.depth
-               else Box(x0 + (0 if low else cut), y0, x1 - (cut if low else 0), y1))  # fmt: skip
-        rest = lot.grown(-1.5).shape().difference(box.grown(1.5).shape())
-        if rest.area > 20.0:
-            things(draft, "yard", Box(*rest.bounds), 5.2, (3.8, 3.8))
+    whole = lot.grown(-1.5)
+    # The front stands at the side that looks to the blast.
+    low = at[1] < whole.middle[1] if whole.width >= whole.depth else at[0] < whole.middle[0]
+    box = shallow(draft, lot, k, 13.0, low)
     away = box.shape().distance(shapely.Point(at))
     taken = not draft.is_free(box.shape())
     if taken or away < radius_m * 1.1:
