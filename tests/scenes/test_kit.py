@@ -22,7 +22,7 @@ STACKED = {
     "building", "canopy", "flats", "gable_cabins", "long_balconies", "sash_windows", "shopping_hall", "town_blocks",
 }  # fmt: skip
 MAX_TRIANGLES = 60_000
-SETTINGS = 8
+SETTINGS = 5
 
 
 def test_every_builder_is_used():

@@ -288,7 +288,6 @@ def test_a_side_without_designs_takes_the_first(catalogue):
     ([], "array of tables"),
     ([{"name": "plain", "held_out": True}], "first design"),
     ([{"name": "plain"}, {"name": "plain"}], "one name"),
-    ([{"name": "plain", "stretch": [1, 1]}], "three factors"),
     ([{"name": "plain", "stretch": [1, 1, 9]}], "three factors"),
     ([{"name": "plain", "without": ["roof"]}], "'roof'"),
     ([{"name": "plain", "params": {"high": 2}}], "'high'"),

@@ -187,7 +187,7 @@ def _disc(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
 def _blob(names: PlanNames, value: Mapping[str, Any]) -> BaseGeometry:
     form = "blob is [x, y, radius, seed] or that with ragged, corners"
     x, y, radius, seed, *more = names.numbers(value["blob"], form, 4, 5, 6)
-    ragged, corners = (*more, *(0.25, 28)[len(more) :])
+    ragged, corners = [*more, *[0.25, 28.0][len(more) :]]
     area = blob(x, y, radius, int(seed), ragged, min(max(int(corners), 3), _MAX_POINTS))
     if "long" not in value:
         return area
