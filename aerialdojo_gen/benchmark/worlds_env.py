@@ -29,22 +29,48 @@ class WorldsEnv(gymnasium.Env[dict[str, Any], np.int64]):
     (``$AERIALDOJO_CACHE``, at most ``$AERIALDOJO_CACHE_GB`` gigabytes), and later environments find them there. The
     worlds are gone through in an order that the seed of `reset` draws, and again in another one when all were seen.
 
-    Other options are those of `AerialDojoEnv`, without `data` and `scene`.
+    Parameters
+    ----------
+    worlds : str or sequence of str
+        Names of scene types, or globs: ``"U_*"``.
+    start_seed : int
+        The first seed. Seeds from 1,000 on are for training, 0 to 199 for test, 200 to 999 for validation.
+    num_worlds : int
+        How many seeds, of every type.
+    episodes_per_world : int
+        So many episodes in a row are in one world.
+    knobs : mapping, optional
+        Knobs of the types, by name.
+    held_out : bool
+        Worlds of topologies, palettes and props that no other world has.
+    n_objects : int
+        Most annotated objects of a world: tasks grow with the square.
+    cache : Path, optional
+        In place of the user's cache.
+    **options
+        As for `AerialDojoEnv`, without `data` and `scene`: ``modality="semantic"``, ``views=("front",)``, …
+
+    Raises
+    ------
+    UsageError
+        No such type, or a value makes no sense.
+    AerialDojoError
+        A world could not be made.
     """
 
     metadata = AerialDojoEnv.metadata
 
     def __init__(
         self,
-        worlds: str | Sequence[str],  # Names of scene types, or globs: ``"U_*"``
+        worlds: str | Sequence[str],
         *,
-        start_seed: int = 1000,  # Seeds from 1,000 on are for training, 0 to 199 for test, 200 to 999 for validation
-        num_worlds: int = 1,  # How many seeds, of every type
-        episodes_per_world: int = 20,  # So many episodes in a row are in one world
-        knobs: Mapping[str, float] | None = None,  # Of the types, by name
-        held_out: bool = False,  # Worlds of topologies, palettes and props that no other world has
-        n_objects: int = 40,  # Most annotated objects of a world: tasks grow with the square
-        cache: Path | None = None,  # In place of the user's
+        start_seed: int = 1000,
+        num_worlds: int = 1,
+        episodes_per_world: int = 20,
+        knobs: Mapping[str, float] | None = None,
+        held_out: bool = False,
+        n_objects: int = 40,
+        cache: Path | None = None,
         **options: Any,
     ) -> None:
         for name in ("data", "scene"):

@@ -6,6 +6,19 @@ from aerialdojo_gen.benchmark.agents.goal import BLIND, Goal, Heading, Observati
 from aerialdojo_gen.benchmark.agents.load import BUILT_IN, agent_class, load_agent
 
 __all__ = [
-    "BLIND", "BUILT_IN", "Agent", "AgentBase", "AgentUnavailable", "Goal", "Heading", "InvalidAnswer", "Observation",
-    "Rules", "Sensors", "ServiceDown", "Usage", "agent_class", "load_agent",
-]  # fmt: skip
+    "BLIND",
+    "BUILT_IN",
+    "Agent",
+    "AgentBase",
+    "AgentUnavailable",
+    "Goal",
+    "Heading",
+    "InvalidAnswer",
+    "Observation",
+    "Rules",
+    "Sensors",
+    "ServiceDown",
+    "Usage",
+    "agent_class",
+    "load_agent",
+]

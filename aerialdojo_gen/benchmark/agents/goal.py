@@ -21,17 +21,33 @@ N_ACTIONS = APPROACH
 
 @dataclass(frozen=True)
 class Sensors:
-    """The cameras of the body, all taken at once before every action (paper: sensors)."""
+    """The cameras of the body, all taken at once before every action (paper: sensors).
 
-    # A name alone does for one; empty for an agent that flies blind, and then nothing is rendered
+    Attributes
+    ----------
+    views : tuple of str
+        Of `aerialdojo_gen.store.schemas.VIEWS` (a name alone does for one); empty for an agent that flies blind,
+        and then nothing is rendered.
+    rgb, depth : bool
+        Whether pictures, and whether depth, are handed out.
+    width, height : int
+        Pixels.
+    fov_deg : float
+        Horizontal field of view, degrees.
+    max_depth_m : float
+        Range of the depth camera, metres.
+    light : str
+        ``"scene"`` for the scene's own, ``"random"`` for one of each task, or ``"clear"``, ``"overcast"``,
+        ``"haze"``, ``"dusk"``, ``"wet"``.
+    """
+
     views: tuple[str, ...] = VIEWS
-    rgb: bool = True  # Whether pictures, and whether depth, are handed out
+    rgb: bool = True
     depth: bool = True
-    width: int = 640  # Pixels
+    width: int = 640
     height: int = 640
-    fov_deg: float = FOV_DEG  # Horizontal field of view, degrees
-    max_depth_m: float = 65.535  # Range of the depth camera, metres
-    # ``"scene"`` for the scene's own, ``"random"`` for one of each task, or a light's name
+    fov_deg: float = FOV_DEG
+    max_depth_m: float = 65.535
     light: str = OWN
 
     def __post_init__(self) -> None:
@@ -64,13 +80,25 @@ BLIND = Sensors(views=(), rgb=False, depth=False)
 
 @dataclass(frozen=True)
 class Rules:
-    """What holds in every episode of a setting, and may be given to an agent (paper: embodiment, termination)."""
+    """What holds in every episode of a setting, and may be given to an agent (paper: embodiment, termination).
 
-    action_budget: int  # Most actions, Stop included
-    success_radius_m: float = 3.0  # How near to the goal viewpoint a Stop must be
-    radius_m: float = RADIUS_M  # Of the body's collision sphere
-    wheelbase_m: float = WHEELBASE_M  # Distance between opposite rotors
-    sensors: Sensors = BLIND  # What observations hold
+    Attributes
+    ----------
+    action_budget : int
+        Most actions, Stop included.
+    success_radius_m : float
+        How near to the goal viewpoint a Stop must be.
+    radius_m, wheelbase_m : float
+        The body: radius of its collision sphere, distance between opposite rotors.
+    sensors : Sensors
+        What observations hold.
+    """
+
+    action_budget: int
+    success_radius_m: float = 3.0
+    radius_m: float = RADIUS_M
+    wheelbase_m: float = WHEELBASE_M
+    sensors: Sensors = BLIND
 
 
 # What an agent may be given beside the paper's goal, on request.
@@ -87,30 +115,60 @@ class Heading:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """The object to be found, as the paper describes it to an agent."""
+    """The object to be found, as the paper describes it to an agent.
 
-    modality: str  # semantic (a description) or image (a picture)
-    target_name: str  # What a person would call it
-    landmark: str  # The landmark nearest to it
-    direction: str  # One of eight compass directions from there to it
-    description: str | None  # For semantic goals
-    # For image goals, (H, W, 3) uint8, read-only: the object as the drone's front camera sees it from the goal
-    # viewpoint, or, where it would not fit into the picture, from `image_distance_m` behind that viewpoint.
+    Attributes
+    ----------
+    modality : str
+        semantic (a description) or image (a picture).
+    target_name : str
+        What a person would call it.
+    landmark, direction : str
+        The landmark nearest to it, and one of eight compass directions from there to it.
+    description : str or None
+        For semantic goals.
+    image : (H, W, 3) uint8 or None
+        For image goals: the object as the drone's front camera sees it from the goal viewpoint, or, where it would
+        not fit into the picture, from `image_distance_m` behind that viewpoint; read-only.
+    rules : Rules
+    heading : Heading or None
+        Of the start pose, where it is given (``--tell heading``); None in the paper's setting.
+    image_distance_m : float or None
+        For image goals: how far from the goal viewpoint the picture was taken, metres, straight back along the
+        camera's axis. A Stop where it was taken fails if that is more than the success radius. None if unknown.
+    """
+
+    modality: str
+    target_name: str
+    landmark: str
+    direction: str
+    description: str | None
     image: NDArray[np.uint8] | None
     rules: Rules
-    heading: Heading | None = None  # Of the start pose, where it is given (``--tell heading``)
-    # For image goals: how far from the goal viewpoint the picture was taken, metres, straight back along the camera's
-    # axis; None if unknown. A Stop where it was taken fails if that is more than the success radius.
+    heading: Heading | None = None
     image_distance_m: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What an agent has before it chooses an action. No pose: who wants one reckons it from the actions."""
+    """What the agent has before it chooses an action. No pose: an agent that wants one reckons it from its actions.
 
-    step: int  # Actions spent so far
-    remaining_actions: int  # Actions left, Stop included
-    refused: bool = False  # The last action would have left the flight volume: it was spent, and nothing moved
-    rgb: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)  # By view: (H, W, 3), sRGB
-    # By view: (H, W), planar depth along the optical axis, metres; 0 where there is nothing within range
+    Attributes
+    ----------
+    rgb : mapping of str to (H, W, 3) uint8
+        By view, sRGB; empty without pictures.
+    depth_m : mapping of str to (H, W) float32
+        By view, planar depth along the optical axis, metres; 0 where there is nothing within range.
+    step : int
+        Actions spent so far.
+    remaining_actions : int
+        Actions left, Stop included.
+    refused : bool
+        The last action would have left the flight volume: it was spent, and the body did not move.
+    """
+
+    step: int
+    remaining_actions: int
+    refused: bool = False
+    rgb: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
     depth_m: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
