@@ -37,16 +37,11 @@ def inventory() -> dict[str, PaperScene]:
     """Read the paper's Table 10: 42 scenes by name."""
     return {
         row["scene"]: PaperScene(
-            scene=row["scene"],
-            landmarks=int(row["landmarks"]),
-            objects=int(row["objects"]),
-            base=int(row["base"]) // 2,
-            standard=int(row["standard"]) // 2,
-            long_horizon=int(row["long_horizon"]) // 2,
-            path_m=1000.0 * float(row["path_km"]),
+            row["scene"], int(row["landmarks"]), int(row["objects"]), *(int(row[s]) // 2 for s in SETTINGS),
+            1000.0 * float(row["path_km"]),
         )
         for row in _rows("inventory.csv")
-    }
+    }  # fmt: skip
 
 
 def paper_counts() -> dict[str, tuple[int, int]]:
@@ -98,10 +93,7 @@ def results() -> tuple[PaperResult, ...]:
 
 @cache
 def benchmarks() -> tuple[dict[str, str], ...]:
-    """Read the paper's Table 1, cells as they are printed: ``benchmark``, ``year``, ``task``, ``dof``, ….
-
-    Families are letters: U(rban), N(atural), I(nfrastructure), D(isaster).
-    """
+    """Read the paper's Table 1, cells as they are printed; families are letters, as scenes' names begin."""
     return tuple(_rows("benchmarks.csv"))
 
 
@@ -116,10 +108,7 @@ def family_counts() -> dict[str, dict[str, float]]:
 
 @cache
 def shares() -> dict[str, float]:
-    """Read the shares that the paper's appendix C names, per cent of all task instances.
-
-    ``ID train`` and ``OOD train`` are shares of that partition's instances.
-    """
+    """Read the shares of appendix C, per cent of all task instances, or of the partition's for ``ID train``."""
     return {row["share"]: float(row["percent"]) for row in _rows("shares.csv")}
 
 

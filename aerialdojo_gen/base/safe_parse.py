@@ -99,10 +99,7 @@ def loads_json(text: str | bytes, *, finite: bool = True) -> Any:
 
 
 def _plain_toml(text: str) -> bool:
-    """Whether TOML shows at a glance that nothing is beyond the bounds of `_scan`, in a third of its time.
-
-    False says nothing.
-    """
+    """Whether TOML shows, in a third of `_scan`'s time, that it is within its bounds; False says nothing."""
     if any(mark in text for mark in ('"""', "'''", "\\\n")):
         return False
     bare = _TOML_TEXT.sub("", text)

@@ -28,10 +28,7 @@ _PATTERNS = (
 
 
 def is_secret_name(name: str) -> bool:
-    """Whether a thing of this name (an option, a header, a variable) holds a secret: ``api_key``, ``X-Auth-Token``.
-
-    ``key_env`` and the like name a variable and hold none.
-    """
+    """Whether what has this name (``X-Auth-Token``) holds a secret; ``key_env`` and the like name a variable."""
     return not name.endswith("_env") and any(word.lower() in _SECRET_WORDS for word in _WORD.findall(name))
 
 

@@ -10,11 +10,7 @@ _PREFIX = "shipped:"
 
 
 def home() -> Path:
-    """Return the folder that holds scene_assets/, annotations/ and pipelines/.
-
-    A checkout's own folder where the package lies in one, else what the wheel carries. The archive for a cluster's
-    machines has pipelines/ and scene_assets/ beside the package.
-    """
+    """Return the folder of scene_assets/, annotations/ and pipelines/: the package's, or what a wheel carries."""
     package = Path(__file__).resolve().parents[1]
     return package.parent if (package.parent / "pipelines" / "paper").is_dir() else package / "_shipped"
 

@@ -93,10 +93,7 @@ def stage_code(stage: str, idle: tuple[str, ...] = ()) -> Code:
 
 @cache
 def code_of(module: str, idle: tuple[str, ...] = ()) -> Code:
-    """Return the code that a module of this package depends on, as of the first call in this process.
-
-    `idle` are modules and libraries that are imported and not used.
-    """
+    """Return the code that a module depends on, but for `idle` imports, as of the first call in this process."""
     found: set[str] = set()
     libraries: set[str] = set()
     waiting = [module, *(f"{_NAME}.{name}" for name in _WRITERS)]

@@ -19,11 +19,7 @@ from aerialdojo_gen.store.files import file_digest
 
 
 def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, scene: str) -> str:
-    """Hash everything that the shards of a scene depend on.
-
-    Inputs count by content, not by fingerprint: if an upstream stage runs again and writes the same rows, nothing
-    downstream is stale. Code counts as in `aerialdojo_gen.pipeline.code_digest`; absolute paths do not count.
-    """
+    """Hash all that a scene's shards depend on: code, configuration, and inputs by their content."""
     code = stage_code(stage.name, stage.idle(pipeline.section(stage.name)))
     # The paper's figures are next to the package in a checkout, inside it in a wheel.
     figures = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []

@@ -9,11 +9,7 @@ from typing import Any
 
 
 class Interrupts:
-    """Turns SIGINT into KeyboardInterrupt, and remembers it.
-
-    Python raises KeyboardInterrupt wherever the main thread is; a library's callback may print and drop it.
-    `check` raises it again.
-    """
+    """Raises KeyboardInterrupt at SIGINT, and in `check` again: a library's callback may have dropped it."""
 
     def __init__(self) -> None:
         self._interrupted = False

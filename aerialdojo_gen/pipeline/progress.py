@@ -48,11 +48,7 @@ class Rate:
         self._first: tuple[int, float] | None = None
 
     def per_s(self, done: int) -> float | None:
-        """Return items per second after `done` items; None while unknown.
-
-        Several processes finish their first items almost together, so the rate is unknown until as much time has
-        passed since the first item as before it.
-        """
+        """Return items per second after `done` items; None until the first is as long ago as it took."""
         now = time.monotonic()
         if self._first is None:
             self._first = done, now

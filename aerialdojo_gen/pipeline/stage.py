@@ -85,10 +85,7 @@ class Job:
         return open_scene(mesh_file(self.roots.data, row["mesh_path"]), row["mesh_sha256"], keep).scene
 
     def output_file(self, relative: str) -> AbstractContextManager[Path]:
-        """Yield a temporary path for a file output (a path relative to the data directory, which it must not leave).
-
-        It has the output's suffix, and is renamed if the block ends without an error.
-        """
+        """Yield a temporary path of the same suffix, which becomes the file if the block ends without an error."""
         self.files.append(relative)
         self.digested.append(relative)
         return self.roots.data.commit(relative)

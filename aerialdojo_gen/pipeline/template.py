@@ -139,10 +139,7 @@ def _key_text(key: str) -> str:
 
 
 def key_lines(keys: list[Key], width: int | None = None) -> list[str]:
-    """Write keys for a terminal of so many columns, or in lines of any length.
-
-    Each key has a line, and what it means below it; a star where it has another value than the default.
-    """
+    """Write keys and their meanings for a terminal of so many columns; a star where the default is another."""
     meanings = section_meanings()
     lines: list[str] = []
     for section, every in groupby(keys, key=lambda key: key.section.partition(".")[0]):

@@ -6,37 +6,10 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pyarrow.parquet as pq
-import pytest
 
-import aerialdojo_gen
-
-PACKAGE = Path(aerialdojo_gen.__file__).parent
-CHECKOUT = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").is_file())
 SCENE = "U_Courtyard_0"
-
-# The example of CONTRIBUTING, as it stands there.
-MODULE, SCHEMA, ROW = re.findall(r"```python\n(.*?)```", (CHECKOUT / "CONTRIBUTING.md").read_text(), re.DOTALL)[:3]
-
-
-@pytest.fixture
-def checkout(tmp_path):
-    """A checkout of which only the package is a copy, with one stage more."""
-    for path in PACKAGE.rglob("*"):
-        if path.is_file() and path.suffix in (".py", ".toml", ".csv"):
-            target = tmp_path / "aerialdojo_gen" / path.relative_to(PACKAGE)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, target)
-    for folder in ("scene_assets", "annotations", "pipelines"):
-        (tmp_path / folder).symlink_to(CHECKOUT / folder)
-    package = tmp_path / "aerialdojo_gen"
-    (package / "pipeline" / "stages" / "work" / "tally.py").write_text(MODULE)
-    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{SCHEMA}\n\nSTAGED = (")
-    replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
-    replaced(package / "pipeline" / "registry.py", "\n)\n\nBY_NAME", f"\n    {ROW.strip()},\n)\n\nBY_NAME")
-    return tmp_path
 
 
 def replaced(path, old, new):
@@ -45,27 +18,36 @@ def replaced(path, old, new):
     path.write_text(text.replace(old, new))
 
 
-def call(checkout, *args):
-    command = [sys.executable, "-m", "aerialdojo_gen.cli", *args]
-    env = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "200"}
-    done = subprocess.run(command, cwd=checkout, env=env, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout + done.stderr
+def test_a_new_stage_is_a_module_a_schema_and_a_row(project, smoke, tmp_path):
+    module, schema, row = re.findall(r"```python\n(.*?)```", (project / "CONTRIBUTING.md").read_text(), re.DOTALL)[:3]
+    # A checkout of which only the package is a copy, with its machine code, and two tables of the smoke run.
+    package = shutil.copytree(
+        project / "aerialdojo_gen", tmp_path / "aerialdojo_gen", ignore=shutil.ignore_patterns("*.pyc")
+    )
+    for folder in ("scene_assets", "annotations", "pipelines"):
+        (tmp_path / folder).symlink_to(project / folder)
+    for folder in ("meshes", "scenes"):
+        shutil.copytree(smoke / folder, tmp_path / "data" / folder)
+    work = package / "pipeline" / "stages" / "work" / "tally.py"
+    work.write_text(module)
+    replaced(package / "store" / "schemas" / "staged.py", "STAGED = (", f"{schema}\n\nSTAGED = (")
+    replaced(package / "store" / "schemas" / "staged.py", "VERDICTS)", "VERDICTS, TALLIES)")
+    replaced(package / "pipeline" / "registry.py", "\n)  # fmt: skip", f"\n    {row.strip()},\n)")
 
+    def tally():
+        tally = ["tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml"]
+        env = os.environ | {"PYTHONPATH": str(tmp_path), "COLUMNS": "200"}
+        command = [sys.executable, "-m", "aerialdojo_gen.cli", *tally]
+        done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        # Of the stages before nothing is stale.
+        assert re.findall(r"(\S+): .* (\d+) of 1 shards computed", done.stderr) == [("tally", "1")]
+        return pq.read_table(tmp_path / "data" / "tallies" / SCENE).to_pylist()
 
-@pytest.mark.slow
-def test_a_new_stage_is_a_module_a_schema_and_a_row(checkout):
-    tally = ("tally", "--scene", SCENE, "--data", "data", "--workers", "1", "--pipeline", "pipelines/smoke.toml")
-    assert "1 of 1 shards computed" in call(checkout, *tally)
-    rows = pq.read_table(checkout / "data" / "tallies" / SCENE).to_pylist()
-    scenes = pq.read_table(checkout / "data" / "scenes" / SCENE).to_pylist()
-    assert sum(row["things"] for row in rows) == scenes[0]["n_instances"]
-    assert len(rows) == scenes[0]["n_categories"] == len(Counter(row["category"] for row in rows))
+    rows = tally()
+    (scene,) = pq.read_table(smoke / "scenes" / SCENE).to_pylist()
+    assert sum(row["things"] for row in rows) == scene["n_instances"]
+    assert len(rows) == scene["n_categories"] == len(Counter(row["category"] for row in rows))
     # It follows its own code; that a line of the table of stages makes nothing stale, test_code_digest tells.
-    module = checkout / "aerialdojo_gen" / "pipeline" / "stages" / "work" / "tally.py"
-    replaced(module, '"things": n}', '"things": n + 1}')
-    assert "tally: " in (said := call(checkout, *tally))
-    assert said.count("1 of 1 shards computed") == 1
-    assert pq.read_table(checkout / "data" / "tallies" / SCENE)["things"].to_pylist() == [
-        r["things"] + 1 for r in rows
-    ]
+    replaced(work, '"things": n}', '"things": n + 1}')
+    assert [row["things"] for row in tally()] == [row["things"] + 1 for row in rows]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from support import handmade
 from support.handmade import box, ground, instance
 
 from aerialdojo_gen.base.config.sections import AnchorSampleConfig
 from aerialdojo_gen.base.config.shared import Embodiment
-from aerialdojo_gen.pipeline.scoring.base import AnchorView
+from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.scenes.model import Instance, Material, Part, Scene
 
@@ -46,7 +44,7 @@ def item_of(thing: Instance, name: str) -> dict:
 def plain_view(rgb: tuple[int, int, int], size: int = 32) -> AnchorView:
     """A view of one colour, all of it the object."""
     whole = np.ones((size, size), np.bool_)
-    return AnchorView(np.full((size, size, 3), rgb, np.uint8), whole, whole, ~whole, 1.0, 0.0, 1.0)
+    return AnchorView(np.full((size, size, 3), rgb, np.uint8), whole, whole, ~whole, CandidateMeasures(1.0, 0.0, 1.0))
 
 
 def redness(rgb: np.ndarray) -> float:
@@ -56,9 +54,3 @@ def redness(rgb: np.ndarray) -> float:
 def sign(node: str = "sign") -> Instance:
     """A board, 2 m wide and 4 cm thick, that faces east and west."""
     return instance(node, box((-0.02, -1.0, 1.0), (0.02, 1.0, 2.2)), box((-0.02, -0.03, 0.0), (0.02, 0.03, 1.0)))
-
-
-def directions(rows: list[dict], thing: Instance) -> Iterator[float]:
-    """Azimuth of anchors seen from their object, radians."""
-    for row in rows:
-        yield float(np.arctan2(row["y_m"] - thing.centroid[1], row["x_m"] - thing.centroid[0]))

@@ -40,11 +40,7 @@ class Meter:
 
 
 def bounded_client(base: Any, timeout: Any) -> Any:
-    """Make an asynchronous HTTP client whose responses are bounded in size.
-
-    The client packages read a body whole, an error's too, however long it is. Redirects are not followed: they would
-    carry the key elsewhere.
-    """
+    """Make an HTTP client that bounds what it reads, which the client packages do not, and follows no redirect."""
 
     class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
         async def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:

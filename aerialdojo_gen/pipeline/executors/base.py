@@ -18,11 +18,7 @@ EXECUTORS = ("local", "ray")
 
 
 class Labelled(Protocol):
-    """A picklable task with a name for messages.
-
-    A task with paths of `SharedPaths.bundled` also has a method ``moved(place)``, which returns the task with
-    ``place(path)`` in place of each such path.
-    """
+    """A picklable task; ``moved(place)`` of one with paths of `SharedPaths.bundled` puts ``place(path)`` for each."""
 
     @property
     def label(self) -> str:
@@ -60,11 +56,7 @@ class ParentChannel:
 
 
 class Executor(ABC):
-    """Runs tasks in several processes; a context manager.
-
-    Processes start with the first tasks and live until the block ends; on an error or Ctrl-C they are terminated
-    (`cancel`) before the block is left.
-    """
+    """Runs tasks in processes that start with the first task and end with the block, at once on an error."""
 
     def __enter__(self) -> Executor:
         """Return self."""

@@ -27,10 +27,7 @@ _EDGE_PX, _TOKENS = 224, 77
 
 
 class ClipScorer:
-    """Scores how well a picture fits the object's name; see `aerialdojo_gen.pipeline.scoring.base.Scorer`.
-
-    The candidate whose picture fits the name best has 1, another one exp(100 · (its cosine − the best cosine)).
-    """
+    """A `Scorer` by a picture's fit to the name: the best has 1, others exp(100 · (cosine − the best cosine))."""
 
     name = "clip"
 

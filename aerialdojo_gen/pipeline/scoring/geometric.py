@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
-import cv2
 import numpy as np
 
-from aerialdojo_gen.geometry.portable import norm
 from aerialdojo_gen.geometry.viewpoints import level_marks
 from aerialdojo_gen.pipeline.scoring.base import AnchorView, CandidateMeasures
 from aerialdojo_gen.pipeline.scoring.recognisability import clarity_score, front_score, part_score, recognisability
@@ -22,17 +18,10 @@ WEIGHTS = {
 }  # fmt: skip
 # The weighted mean is multiplied by the `clarity_score` of these, of `unoccluded` and of `level`.
 FACTORS = ("framed", "open")
-
 # Share of the reference picture in a term, if it is taken from further back.
 _BEHIND = 0.7
-# Full marks from half of the picture's edge on, and from this CIE76 difference on: orange on grey asphalt has 60.
-_FULL_SIZE, _FULL_CONTRAST = 0.5, 50.0
-# A view is scored by the scorer, and again for the table's columns.
-_TAKEN: WeakKeyDictionary[AnchorView, dict[str, Any]] = WeakKeyDictionary()
 # Above the rounding error of a score.
 _ROUNDING = 1e-9
-# What surrounds the object: as far as this share of the picture's edge.
-_RING = 1 / 16
 
 
 @dataclass(frozen=True)
@@ -69,11 +58,10 @@ class Parts:
 
 def judge(view: AnchorView, radius_m: float, standoff_m: float) -> Parts:
     """Take a view's terms, those of the picture rather from the picture behind it, where there is one."""
-    marks = _pictured(view)
+    marks = view.marks
     if view.behind is not None:
-        behind = _pictured(view.behind)
-        marks = {name: _mixed(term, behind[name]) for name, term in marks.items()}
-    return _parts(view, marks, radius_m, standoff_m)
+        marks = {name: _mixed(term, view.behind.marks[name]) for name, term in marks.items()}
+    return _parts(view.known, marks, radius_m, standoff_m)
 
 
 def most(known: CandidateMeasures, radius_m: float, standoff_m: float, behind: AnchorView | None = None) -> float:
@@ -81,8 +69,7 @@ def most(known: CandidateMeasures, radius_m: float, standoff_m: float, behind: A
     marks = dict.fromkeys(("unoccluded", "size", "centred", "contrast", "sky", "open"), 1.0)
     marks["framed"] = known.framed
     if behind is not None:
-        seen = _pictured(behind)
-        marks = {name: _mixed(term, seen[name]) for name, term in marks.items()}
+        marks = {name: _mixed(term, behind.marks[name]) for name, term in marks.items()}
     elif known.framed_behind is not None:
         marks["framed"] = _mixed(known.framed, known.framed_behind)
     return _parts(known, marks, radius_m, standoff_m).score + _ROUNDING
@@ -92,62 +79,14 @@ def _mixed(here: float, behind: float) -> float:
     return (1.0 - _BEHIND) * here + _BEHIND * behind
 
 
-def _parts(known: AnchorView | CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
-    level = float(level_marks(known.elevation_deg))
+def _parts(known: CandidateMeasures, marks: dict[str, Any], radius_m: float, standoff_m: float) -> Parts:
     room = standoff_m - radius_m
     clear = min(max((known.clearance_m - radius_m) / room, 0.0), 1.0) if room > 0.0 else 1.0
     tells = float(part_score(np.array([known.part_visibility]))[0]) if known.part_visibility else None
     off = front_score(None if known.off_front_rad is None else np.array([known.off_front_rad]))
-    return Parts(
-        shown=known.shown,
-        level=level,
-        clear=clear,
-        tells=tells,
-        front=None if off is None else float(off[0]),
-        **marks,
-    )
-
-
-def _pictured(view: AnchorView) -> dict[str, Any]:
-    """Take the terms that the picture itself decides; they are taken once a view."""
-    with contextlib.suppress(KeyError):
-        return _TAKEN[view]
-    marks = _TAKEN[view] = _picture_marks(view)
-    return marks
-
-
-def _picture_marks(view: AnchorView) -> dict[str, Any]:
-    names = ("unoccluded", "size", "centred", "contrast", "sky", *FACTORS)
-    if not view.visible.any():
-        return dict.fromkeys(names, 0.0)
-    height, width = view.visible.shape
-    rows, columns = np.nonzero(view.visible)
-    edge = np.sqrt((np.ptp(rows) + 1) * (np.ptp(columns) + 1) / (height * width))
-    away = np.hypot((columns.mean() + 0.5) / width * 2.0 - 1.0, (rows.mean() + 0.5) / height * 2.0 - 1.0)
-    reach = 2 * max(1, round(width * _RING)) + 1
-    around = cv2.dilate(view.visible.astype(np.uint8), np.ones((reach, reach), np.uint8)) > 0
-    ring = around & ~view.visible
-    contrast = sky = 0.0
-    # An object that fills the picture has no outline in it.
-    if ring.any():
-        lab = cv2.cvtColor(view.rgb.astype(np.float32) / 255.0, cv2.COLOR_RGB2LAB)
-        difference = norm(lab[view.visible].mean(axis=0) - lab[ring].mean(axis=0))
-        contrast, sky = min(float(difference) / _FULL_CONTRAST, 1.0), float(view.sky[ring].mean())
-    foreground = 0.0
-    if view.nearer is not None:
-        rows, columns = np.nonzero(view.alone)
-        own = view.nearer[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        foreground = max(float(view.nearer.mean()), float(own.mean()))
-    marks = (
-        float(view.visible.sum() / max(int(view.alone.sum()), 1)),
-        min(float(edge) / _FULL_SIZE, 1.0),
-        1.0 - min(float(away), 1.0),
-        contrast,
-        sky,
-        view.framed,
-        1.0 - foreground,
-    )
-    return dict(zip(names, marks, strict=True))
+    front = None if off is None else float(off[0])
+    level = float(level_marks(known.elevation_deg))
+    return Parts(shown=known.shown, level=level, clear=clear, tells=tells, front=front, **marks)
 
 
 class GeometricScorer:

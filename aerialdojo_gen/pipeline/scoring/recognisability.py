@@ -32,10 +32,7 @@ def clarity_score(unoccluded: Floats, framed: Floats, foreground: Floats, level:
 
 
 def recognisability(score: Floats, parts: Floats | None, front: Floats | None) -> Floats:
-    """Combine the silhouette's score with those of identifying parts and front, (n,) in [0, 1].
-
-    None leaves its weight to the silhouette.
-    """
+    """Combine the silhouette's score with those of parts and front, (n,); None leaves its weight to the first."""
     known = [(weight, mark) for weight, mark in ((PARTS_WEIGHT, parts), (FRONT_WEIGHT, front)) if mark is not None]
     rest = 1.0 - sum(weight for weight, _ in known)
     return np.asarray(rest * score + sum(weight * mark for weight, mark in known))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +39,7 @@ def take_view(
     known: CandidateMeasures,
     parts: Sequence[NDArray[np.int64]],
 ) -> AnchorView:
-    """Take the front view of an object from a candidate anchor (world metres, radians).
-
-    Every machine gives the same mask.
-    """
+    """Take an object's front view from a candidate anchor (world metres, radians), the same mask anywhere."""
     pose = view_pose(position_m, yaw_rad, "front")
     picture = renderer.render(camera, pose)
     assert picture.instance is not None
@@ -56,21 +54,10 @@ def take_view(
     marks = tuple(
         seen * min(1.0, math.sqrt(share / _LARGE)) for seen, share in zip(known.part_visibility, shares, strict=True)
     )
-    return AnchorView(
-        picture.rgb,
-        visible,
-        silhouette,
-        picture.instance < 0,
-        known.shown,
-        known.elevation_deg,
-        known.clearance_m,
-        marks,
-        known.off_front_rad,
-        known.framed,
-        standing_nearer(
-            picture.depth_m, visible, (picture.instance >= 0) & renderer.wide[picture.instance], camera, pose
-        ),
-    )
+    wide = (picture.instance >= 0) & renderer.wide[picture.instance]
+    nearer = standing_nearer(picture.depth_m, visible, wide, camera, pose)
+    known = replace(known, part_visibility=marks)
+    return AnchorView(picture.rgb, visible, silhouette, picture.instance < 0, known, nearer)
 
 
 def standing_nearer(
@@ -169,10 +156,7 @@ def part_shares(
     visible: NDArray[np.bool_],
     enough: float = math.inf,
 ) -> list[float]:
-    """Share, 0 to 1, of a picture's pixels that show each part.
-
-    One of at least `enough` may be understated, not below it.
-    """
+    """Share of a picture's pixels that show each part; from `enough` on it may be understated, not below it."""
     counts = np.zeros(len(parts), dtype=np.int64)
     # Each pixel of a part lies in the part's box.
     around = [visible & boxed(camera, world_from_camera, thing.vertices[thing.faces[part]].reshape(-1, 3))

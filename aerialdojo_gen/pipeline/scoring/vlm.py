@@ -33,11 +33,7 @@ _WRAPPED = re.compile(r"\A\s*(?:<think>.*?</think>)?\s*(?:```(?:json)?[ \t]*\n)?
 
 
 class VlmScorer:
-    """Scores by the order that a model answers with; see `aerialdojo_gen.pipeline.scoring.base.Scorer`.
-
-    The best has 1, the worst 0, the others are spaced evenly between. After an invalid answer the request is
-    repeated once; then the scorer gives no score, and logs it.
-    """
+    """A `Scorer` by the order that a model gives: best 1, worst 0; asked twice at most, then it has no opinion."""
 
     name = "vlm"
 

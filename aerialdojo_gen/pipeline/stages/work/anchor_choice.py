@@ -41,10 +41,7 @@ class Judged:
 def judge_anchor(
     position_m: Floats, yaw_rad: float, item: dict[str, Any], world: World, job: Job, config: AnchorSampleConfig
 ) -> Judged:
-    """Check a viewpoint (world metres, radians) against the rules for anchors (paper: anchors).
-
-    Returns all faults.
-    """
+    """Check a viewpoint (world metres, radians) against all rules for anchors (paper: anchors)."""
     k = world.index[item["mesh_node"]]
     instance = world.scene.instances[k]
     surface = Surface.of(instance)

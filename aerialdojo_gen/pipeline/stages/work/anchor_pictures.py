@@ -60,8 +60,11 @@ class CandidateViews:
         view = self.found.picture(int(self.which[n]), size_px, fov_deg)
         if self.has_back(n):
             back = back or self.behind.picture(n, size_px, fov_deg)
-            part_visibility = _mean(view.part_visibility, back.part_visibility)
-            view = replace(view, shown=(view.shown + back.shown) / 2.0, part_visibility=part_visibility, behind=back)
+            known = replace(
+                view.known, shown=(view.known.shown + back.known.shown) / 2.0,
+                part_visibility=_mean(view.known.part_visibility, back.known.part_visibility),
+            )  # fmt: skip
+            view = replace(view, known=known, behind=back)
         return view
 
     def has_back(self, n: int) -> bool:
@@ -69,13 +72,10 @@ class CandidateViews:
         return bool(self.step_back_m[n] > 0.0)
 
     def most(self, n: int, radius_m: float, standoff_m: float, back: AnchorView | None = None) -> float:
-        """Bound the geometric score of a candidate, a number among `which`, from above, without a picture from it.
-
-        Where there is one from behind it already, the bound is that much tighter.
-        """
+        """Bound the geometric score of number n of `which` from above without its picture; one from behind helps."""
         known, behind = self.found.measures(int(self.which[n])), self.behind
         if self.has_back(n):
-            seen = behind.part_visibility[n].tolist() if back is None else back.part_visibility
+            seen = behind.part_visibility[n].tolist() if back is None else back.known.part_visibility
             known = replace(
                 known, shown=(known.shown + float(behind.views.shown[n])) / 2.0,
                 part_visibility=_mean(known.part_visibility, seen), framed_behind=float(behind.views.framed[n]),
@@ -92,10 +92,7 @@ def best_pictured(
     radius_m: float,
     config: AnchorSampleConfig,
 ) -> tuple[NDArray[np.int64], list[tuple[AnchorView, Verdict]]]:
-    """Picture candidates that could still be among the best, and shortlist.
-
-    Indices (k,) into `few` and their verdicts.
-    """
+    """Picture candidates that could be among the best, and shortlist: indices (k,) into `few` and their verdicts."""
     scorers, separation_rad = scorer_ensemble(config, radius_m), math.radians(config.separation_deg)
     weights = config.weights
     if weights.clip or weights.vlm:

@@ -35,24 +35,19 @@ log = logging.getLogger(__name__)
 _RAY_CAST_FACTOR = 4
 # More parts than that get no candidates of their own.
 _MAX_PARTS = 4
-REASONS = ("no_surface", "out_of_bounds", "in_collision", "unreachable", "not_visible", "not_shortlisted")
+# The tests that a candidate goes through, in their order; it is counted under the first that it fails.
+REASONS = (
+    "no_surface",  # its line comes nowhere near the object's surface
+    "out_of_bounds",  # the body leaves the flight volume
+    "in_collision",  # a surface is within the body's radius plus `margin_m`
+    "unreachable",  # no way from the open sky: inside a closed room, or below ground that is an open sheet
+    "not_visible",  # visible fraction below `min_visible_fraction`
+    "not_shortlisted",  # `shortlist` others show the object better, or from a side of their own
+)
 
 
 def run(job: Job, config: AnchorSampleConfig) -> Output:
-    """Find, judge and rank the anchors of every object of a scene.
-
-    A candidate lies `standoff_m` from the object's surface (its mesh, not its box) and faces its centroid in yaw. It
-    goes through these tests, and is counted under the first that it fails: ``no_surface`` (its line comes nowhere
-    near the surface), ``out_of_bounds`` (the body leaves the flight volume), ``in_collision`` (a surface within
-    the body's radius plus `margin_m`), ``unreachable`` (no way from the open sky: inside a closed room, or below
-    ground that is an open sheet), ``not_visible`` (visible fraction below `min_visible_fraction`),
-    ``not_shortlisted`` (`shortlist` others show the object better, or from a side of their own). Ray casts to points
-    of its surface put the visible ones in order; the best `pictured`, from different sides, are pictured and scored
-    (`aerialdojo_gen.pipeline.scoring`). The best of those, again from different sides, are the object's anchors; the
-    best of all is selected, or the one that a person chose, which then comes first. Where the catalogue gives an
-    object's front and identifying parts, these weigh as much as its silhouette, candidates are placed before those
-    parts as well, and one anchor at least is within 60° of a front, if any candidate there sees the object.
-    """
+    """Find, judge and rank the anchors of every object of a scene."""
     objects = job.read("objects").to_pylist()
     chosen = {row["object_id"]: row for row in job.read("chosen_anchors").to_pylist()}
     world = World.of(job.scene_model(), job.embodiment.radius_m, config.margin_m)

@@ -27,6 +27,7 @@ from aerialdojo_gen.scenes.model import Instance, Scene
 
 Floats = NDArray[np.float64]
 _LEAST_POINTS = 32
+_POSE = ("x_m", "y_m", "z_m", "yaw_rad")
 
 
 @dataclass(frozen=True)
@@ -150,16 +151,12 @@ class Candidates:
 
     def viewpoints(self, which: NDArray[np.int64], object_id: int) -> list[dict[str, Any]]:
         """Rows of ``viewpoints``: where one may stop to have found the object."""
-        return [
-            {
-                "scene": self.world.scene.name,
-                "object_id": object_id,
-                "viewpoint_id": n,
-                **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
-                "yaw_rad": float(self.yaw_rad[k]),
-            }
-            for n, k in enumerate(which)
-        ]
+        ids = {"scene": self.world.scene.name, "object_id": object_id}
+        return [ids | {"viewpoint_id": n} | self.pose(k) for n, k in enumerate(which)]
+
+    def pose(self, k: int) -> dict[str, float]:
+        """Columns of the k-th viewpoint's place and yaw."""
+        return dict(zip(_POSE, (*self.positions_m[k].tolist(), float(self.yaw_rad[k])), strict=True))
 
     def measures(self, k: int) -> CandidateMeasures:
         """What is known of the view from the k-th viewpoint before it is pictured."""
@@ -180,8 +177,7 @@ class Candidates:
     def row(self, k: int, surface_distance_m: float) -> dict[str, Any]:
         """What a row of ``anchors`` says of where the k-th viewpoint is and what it sees."""
         return {
-            **dict(zip(("x_m", "y_m", "z_m"), self.positions_m[k].tolist(), strict=True)),
-            "yaw_rad": float(self.yaw_rad[k]),
+            **self.pose(k),
             "clearance_m": float(self.clearance_m[k]),
             "surface_distance_m": surface_distance_m,
             "visible_fraction": float(self.views.visible_fraction[k]),

@@ -7,7 +7,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
 from aerialdojo_gen.annotations.check import check_source
@@ -52,24 +51,21 @@ def annotation_tables(annotations: Annotations, claims: SceneClaims) -> dict[str
     """Make the tables `landmarks`, `objects` and `chosen_anchors` of annotations that are right."""
     scene = claims.scene
     landmarks = sorted(annotations.landmarks, key=lambda entry: entry.id)
-    places = np.array([scene[entry.node].centroid for entry in landmarks]).reshape(-1, 3)
     landmark_rows = [
-        {"scene": scene.name, "landmark_id": e.id, "name": e.name, "mesh_node": e.node, **_xyz("{}_m", place)}
-        for e, place in zip(landmarks, places, strict=True)
+        {"scene": scene.name, "landmark_id": e.id, "name": e.name, "mesh_node": e.node}
+        | _xyz("{}_m", scene[e.node].centroid)
+        for e in landmarks
     ]
-    object_rows = []
+    object_rows, chosen_rows = [], []
     for entry in sorted(annotations.objects, key=lambda entry: entry.id):
-        instance = scene[entry.node]
-        i = claims.geometry.index[entry.node]
+        instance, i = scene[entry.node], claims.geometry.index[entry.node]
         bearing = claims.bearings[i]
         assert bearing is not None, f"{scene.name}, object {entry.id}: unchecked annotations"
+        ids = {"scene": scene.name, "object_id": entry.id}
         object_rows.append(
             {
-                "scene": scene.name,
-                "object_id": entry.id,
-                "name": entry.name,
-                "category": entry.category,
-                "description": entry.description,
+                **ids,
+                **{name: getattr(entry, name) for name in ("name", "category", "description")},
                 "mesh_node": entry.node,
                 **_xyz("{}_m", instance.centroid),
                 **_xyz("size_{}_m", instance.bounds[1] - instance.bounds[0]),
@@ -80,21 +76,11 @@ def annotation_tables(annotations: Annotations, claims: SceneClaims) -> dict[str
                 "shape_held_out": instance.held_out if instance.shape else None,
             }
         )
-    chosen_rows = [
-        {
-            "scene": scene.name,
-            "object_id": entry.id,
-            **_xyz("{}_m", entry.anchor.position_m),
-            "yaw_rad": math.radians(entry.anchor.yaw_deg),
-        }
-        for entry in sorted(annotations.objects, key=lambda entry: entry.id)
-        if entry.anchor is not None
-    ]
-    return {
-        "landmarks": pa.Table.from_pylist(landmark_rows, schema=LANDMARKS.schema),
-        "objects": pa.Table.from_pylist(object_rows, schema=OBJECTS.schema),
-        "chosen_anchors": pa.Table.from_pylist(chosen_rows, schema=CHOSEN_ANCHORS.schema),
-    }
+        if (anchor := entry.anchor) is not None:
+            yaw_rad = math.radians(anchor.yaw_deg)
+            chosen_rows.append({**ids, **_xyz("{}_m", anchor.position_m), "yaw_rad": yaw_rad})
+    rows = ((LANDMARKS, landmark_rows), (OBJECTS, object_rows), (CHOSEN_ANCHORS, chosen_rows))
+    return {spec.name: pa.Table.from_pylist(own, schema=spec.schema) for spec, own in rows}
 
 
 def _xyz(name: str, values: Any) -> dict[str, float]:

@@ -28,10 +28,7 @@ _PART_SHARE, _MIN_PART_SHARE = 0.0014, 0.0007
 
 
 def fitting_m(vertices: Floats, position_m: Floats, yaw_rad: float, fov_deg: float) -> float:
-    """How far, metres, a level camera must go back for an object's vertices (n, 3) to fit its picture.
-
-    0 where they do.
-    """
+    """How far, metres, a level camera must go back, 0 if not, for an object's vertices (n, 3) to fit its picture."""
     half = _FILLED * math.tan(math.radians(fov_deg) / 2.0)
     x, y, z = (float(c) for c in position_m)
     return max(0.0, float(_fitting(vertices, x, y, z, math.cos(yaw_rad), math.sin(yaw_rad), half)))
@@ -57,14 +54,6 @@ def part_limit_m(patches: Sequence[Patch], seen: Floats, position_m: Floats, yaw
             floor = min(_PART_SHARE, max(_MIN_PART_SHARE, taken / 2.0))
             most = min(most, max(0.0, away * (math.sqrt(taken / floor) - 1.0)))
     return most
-
-
-def step_back_m(
-    world: World, instance: int, points: Floats, position_m: Floats, yaw_rad: float, fov_deg: float, most_m: float
-) -> float:
-    """How far to step back from one anchor: `steps_back_m` of it alone."""
-    place, yaw, most = position_m[None], np.array([yaw_rad]), np.array([most_m])
-    return float(steps_back_m(world, instance, points, place, yaw, fov_deg, most)[0])
 
 
 def steps_back_m(

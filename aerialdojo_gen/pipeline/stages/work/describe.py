@@ -22,11 +22,7 @@ from aerialdojo_gen.store.tables import from_rows
 
 
 def run(job: Job, config: DescribeConfig) -> Output:
-    """Write the texts of one scene.
-
-    A text excludes everything of the object's category with the same landmark and direction. A text by a person comes
-    first, as it is, beside those that are made.
-    """
+    """Write a scene's texts, a person's first; each fits nothing else of its category, landmark and direction."""
     objects, landmarks = job.read("objects").to_pylist(), job.read("landmarks").to_pylist()
     shown = {row["object_id"]: set(row["parts_shown"]) for row in job.read("references").to_pylist()}
     vocabulary = Vocabulary.of(job.scene_model(), load_catalogue(job.roots.scene_assets))

@@ -38,10 +38,7 @@ def _hidden_at_stop(job: Job, plans: pa.Table, targets: pa.Table) -> NDArray[np.
 
 
 def run(job: Job, config: FilterConfig) -> Output:
-    """Judge every candidate of a scene by `judge`.
-
-    And then by what its agent sees at the end (``"target_hidden"``).
-    """
+    """Judge a scene's candidates by `judge`, then by what the agent sees at the end (``"target_hidden"``)."""
     pairs = job.read("pairs")
     flown = ["x_m", "y_m", "z_m", "action"]
     plans = (

@@ -26,11 +26,7 @@ Floats = NDArray[np.float64]
 
 
 def run(job: Job, config: PairObjectsConfig) -> Output:
-    """Pair the shortlisted anchors of every object with the selected anchor of every other one.
-
-    Left out are only pairs that no route could make a task, whatever the scene: see `length_bound_m`. Of every other
-    one it is said how much of the target the start sees (`aerialdojo_gen.geometry.start_visibility`).
-    """
+    """Pair objects' anchors with others' selected one, but where no route could make a task (`length_bound_m`)."""
     anchors = job.read("anchors")
     object_id = anchors["object_id"].to_numpy()
     anchor_id = anchors["anchor_id"].to_numpy()
@@ -100,9 +96,6 @@ def _seen_at_start(
 
 
 def length_bound_m(start: Floats, goal: Floats, max_approach_m: float) -> Floats:
-    """Lower bound (n,), metres, of a route's length.
-
-    Horizontal plus vertical distance, less what an Approach may cut.
-    """
+    """Lower bound (n,), metres, of a route's length: level and vertical distance, less what an Approach may cut."""
     way = np.abs(goal - start)
     return np.asarray(np.hypot(way[:, 0], way[:, 1]) + way[:, 2] - (math.sqrt(2.0) - 1.0) * max_approach_m)

@@ -105,10 +105,7 @@ def _planner(scene: Scene, config: PlanConfig, radius_m: float) -> Planner:
 
 
 def _ends(job: Job, pairs: pa.Table) -> tuple[Floats, Floats]:
-    """Goals and start poses of the candidates, (n, 4) float64 each.
-
-    A start is the start object's anchor, its yaw turned by 180° (paper: start poses).
-    """
+    """Goals and start poses, (n, 4) float64 each; a start is its anchor turned by 180° (paper: start poses)."""
     columns = ["object_id", "anchor_id", "x_m", "y_m", "z_m", "yaw_rad", "selected"]
     anchors, pair = job.read("anchors").select(columns).to_pydict(), pairs.to_pydict()
     poses = np.column_stack([anchors[name] for name in columns[2:6]])

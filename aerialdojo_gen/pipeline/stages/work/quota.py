@@ -38,20 +38,14 @@ def apportion(total: int, sizes: Mapping[str, int]) -> dict[str, int]:
 def train_quotas(
     scene: str, scenes: Mapping[str, PaperScene], splits: Mapping[tuple[str, str], Mapping[str, int]]
 ) -> dict[str, int]:
-    """Return a scene's share of the paper's training tasks of its partition.
-
-    The shares depend on the paper's figures alone, so that each scene can be written separately.
-    """
+    """Return a scene's share of the paper's training tasks of its partition, by the paper's figures alone."""
     alike = [row for row in scenes.values() if partition(row.scene) == partition(scene)]
     totals = splits[partition(scene).upper(), "train"]
     return {s: apportion(total, {row.scene: row.tasks[s] for row in alike})[scene] for s, total in totals.items()}
 
 
 def difficulty_level(plan_detour: Floats, visible_at_start: Floats) -> NDArray[np.int64]:
-    """Difficulty level (n,), 0 to 2.
-
-    One for a plan detour of `DETOUR` or more, one for a target that the start does not see.
-    """
+    """Difficulty level (n,), 0 to 2: one for a plan detour of `DETOUR`, one for a target unseen at the start."""
     return (plan_detour >= DETOUR).astype(np.int64) + (visible_at_start == 0.0)
 
 

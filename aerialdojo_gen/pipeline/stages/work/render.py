@@ -29,10 +29,7 @@ from aerialdojo_gen.store.tables import from_rows
 
 
 def run(job: Job, config: RenderConfig) -> Output:
-    """Record this shard's share of the scene's sample.
-
-    Trajectories that lie there finished are not recorded again.
-    """
+    """Record this shard's share of the scene's sample, but for trajectories that lie there finished."""
     routes = {row["nav_id"]: row for table in tables(config, job.scene) for row in job.read(table).to_pylist()}
     mine = choose_trajectories(routes.values(), config.limit, job.seed)[job.part :: job.parts]
     mesh = job.read("scenes")["mesh_sha256"][0].as_py()

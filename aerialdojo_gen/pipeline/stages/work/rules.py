@@ -26,10 +26,7 @@ def judge(
     plan_detour: NDArray[np.float64] | None = None,
     visible_at_start: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """Judge candidates by the paper's rules (section on filtering).
-
-    Reason and setting, (n,) each, ``"kept"`` or the first rule that fails.
-    """
+    """Judge candidates (paper: filtering): (n,) reasons, ``"kept"`` or the first rule that fails, and settings."""
     solved = outcome == "SOLVED"
     # Fixed widths: numpy would cut a longer word to the width of the first ones.
     setting = np.full(len(outcome), "", dtype="U24")

@@ -72,10 +72,7 @@ def with_lists(routes: pa.Table, plans: pa.Table) -> pa.Table:
 
 
 def splits_of(routes: pa.Table, train: NDArray[np.bool_], out: set[int]) -> dict[str, pa.Array]:
-    """Whether routes' ends occur in training, and their side of the split by objects.
-
-    (n,) columns of `SPLIT_COLUMNS`.
-    """
+    """`SPLIT_COLUMNS` (n,): whether routes' ends occur in training, and their side of the split by objects."""
     target, start = (routes.column(f"{end}_object_id").to_numpy() for end in ("target", "start"))
     # Two ids packed into one number.
     pose, pair = (start.astype(np.int64) << 32 | ids for ids in (routes.column("start_anchor_id").to_numpy(), target))
