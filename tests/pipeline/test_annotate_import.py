@@ -14,7 +14,6 @@ from aerialdojo_gen.annotations.format import Anchor, Landmark, format_annotatio
 from aerialdojo_gen.base.config.sections import AnnotateImportConfig
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.base.errors import AnnotationError, UsageError
-from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.pipeline.stage import Job, ProjectPaths
 from aerialdojo_gen.pipeline.stages.work import annotate_import
 from aerialdojo_gen.scenes.model import Scene
@@ -121,25 +120,13 @@ def test_each_fault_is_found_at_its_place(k, changes, path, words):
     assert all(f.line > 0 for f in faults)
 
 
-def test_the_right_file_has_no_fault():
-    assert _faults(street_annotations()) == []
-    assert _faults(street_annotations(), counts=(1, 4)) == []
-
-
 def test_counts_scene_landmarks_and_bounds():
     annotations = street_annotations()
+    assert _faults(annotations) == _faults(annotations, counts=(1, 4)) == []
     assert [f.path for f in _faults(annotations, counts=(2, 5))] == ["landmarks", "objects"]
     assert [f.path for f in _faults(dataclasses.replace(annotations, scene="U_Mall_0"))] == ["scene"]
     twice = (*annotations.landmarks, Landmark(id=1, name="Clock tower", node="bench_000"))
     assert [f.path for f in _faults(dataclasses.replace(annotations, landmarks=twice))] == ["landmarks[1].name"]
-    none = _faults(dataclasses.replace(annotations, landmarks=()))
-    assert [f.path for f in none] == ["landmarks"]
+    assert [f.path for f in _faults(dataclasses.replace(annotations, landmarks=()))] == ["landmarks"]
     small = dataclasses.replace(street(), bounds=np.array([[-35.0, -35.0, 0.0], [35.0, 35.0, 40.0]]))
     assert [f.path for f in _faults(annotations, small)] == ["objects[1].node"]
-
-
-def test_the_inventory_is_the_papers():
-    counts = paper_counts()
-    assert len(counts) == 42
-    assert counts["U_Mall_0"] == (6, 123)
-    assert tuple(map(sum, zip(*counts.values(), strict=True))) == (109, 2099)

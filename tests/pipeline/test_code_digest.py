@@ -15,12 +15,11 @@ from support import court
 
 import aerialdojo_gen
 from aerialdojo_gen.base.config.pipeline import load_pipeline
-from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ClipConfig, ReferenceImagesConfig, RenderConfig
+from aerialdojo_gen.base.config.sections import AnchorSampleConfig, ReferenceImagesConfig, RenderConfig
 from aerialdojo_gen.benchmark.evaluation import agent_code_digest
 from aerialdojo_gen.dataset.build import open_pipeline
 from aerialdojo_gen.pipeline import code_digest
 from aerialdojo_gen.pipeline.code_digest import code_of, stage_code
-from aerialdojo_gen.pipeline.fingerprint import _values
 from aerialdojo_gen.pipeline.freshness import is_fresh
 from aerialdojo_gen.pipeline.registry import BY_NAME, STAGES
 from aerialdojo_gen.store import shards as store
@@ -137,14 +136,6 @@ def test_another_number_of_shards_or_another_source_makes_a_scene_stale(project,
     assert not is_fresh(moved, config.section("build-scenes"), "U_Courtyard_0", config, roots)
 
 
-def test_figures_of_the_paper_count_where_they_are_read():
-    assert [name for name in NAMES if "aerialdojo_gen.base.paper_figures" in stage_code(name).parts] == [
-        "annotate-import",
-        "plan",
-        "split",
-    ]
-
-
 def test_libraries_that_shape_the_bytes_count():
     libraries = {name: set(stage_code(name).libraries) for name in NAMES}
     assert {"numpy", "scipy", "shapely", "cv2", "pyarrow"} <= libraries["build-scenes"]
@@ -210,13 +201,6 @@ def test_what_is_idle_is_not_imported(project, tmp_path):
         idle = BY_NAME[stage].idle(SECTIONS[stage](**given))
         assert len(idle) == 2
         assert not imported & set(idle)
-
-
-def test_absolute_paths_are_in_no_fingerprint(tmp_path):
-    clip = ClipConfig(vision=tmp_path / "v", text=tmp_path / "t", tokenizer=tmp_path / "k", sha256="0" * 64)
-    values = _values(AnchorSampleConfig(clip=clip))
-    assert values["clip"] == {"sha256": "0" * 64}
-    assert str(tmp_path) not in str(values)
 
 
 def test_an_evaluation_counts_the_agents_code(tmp_path, monkeypatch):

@@ -18,107 +18,53 @@ from aerialdojo_gen.pipeline.stages.work.rules import judge
 from aerialdojo_gen.rendering.casters import all_in_sight, in_sight
 from aerialdojo_gen.store.schemas import APPROACH, STOP
 
-CONFIG = FilterConfig()
+EDGE = 1e-7
+# Lengths and distances at the bounds of the paper's rules, just beside them, and anywhere.
+AT_BOUNDS = [b + d for b in (3, 5, 20, 30, 40, 60, 100) for d in (-EDGE, 0.0, EDGE)]
+METRES = st.sampled_from(AT_BOUNDS) | st.floats(0, 150)
+RANGES = {"base": (5, 30), "standard": (30, 60), "long_horizon": (60, 100)}
+BUDGETS = {"base": 90, "standard": 180, "long_horizon": 300}
+ACTIONS = st.sampled_from([b + d for b in BUDGETS.values() for d in (0, 1)]) | st.integers(0, 400)
+OUTCOMES = ["SOLVED"] * 5 + ["NO_PATH", "BUDGET_EXHAUSTED", "START_IN_COLLISION", "GOAL_IN_COLLISION"]
+# At the bound of the ratio of length and distance, or either as it comes.
+LENGTHS = st.tuples(METRES, METRES) | METRES.map(lambda d: (d, 1.05 * d)) | METRES.map(lambda d: (d, 1.0499 * d))
+SHARES = st.sampled_from([0.0, 1e-9, 0.1, 0.1001, 1.0, np.nan])
+DETOURS = st.sampled_from([1.0, 1.0499, 1.05, 1.06, np.nan])
 
 
-def verdict(outcome="SOLVED", euclidean=10.0, length=12.0, n_actions=20, config=CONFIG, **figures):
-    told = {name: np.array([value]) for name, value in figures.items()}
-    reason, setting = judge(
-        np.array([outcome]),
-        np.array([euclidean]),
-        np.array([length]),
-        np.array([n_actions], np.int32),
-        config,
-        **told,
-    )
-    return reason[0], setting[0]
-
-
-@pytest.mark.parametrize(
-    ("case", "expected"),
-    [
-        ({}, ("kept", "base")),
-        ({"euclidean": 3.0, "length": 6.0}, ("too_close", "base")),
-        ({"euclidean": 3.0000001, "length": 6.0}, ("kept", "base")),
-        ({"euclidean": 4.0, "length": 4.9999999}, ("too_short", "")),
-        ({"euclidean": 4.0, "length": 5.0}, ("kept", "base")),
-        ({"euclidean": 25.0, "length": 29.999}, ("kept", "base")),
-        ({"euclidean": 25.0, "length": 30.0}, ("kept", "standard")),
-        ({"euclidean": 50.0, "length": 60.0}, ("kept", "long_horizon")),
-        ({"euclidean": 90.0, "length": 99.999}, ("kept", "long_horizon")),
-        ({"euclidean": 90.0, "length": 100.0}, ("too_long", "")),
-        ({"euclidean": 10.0, "length": 10.5}, ("kept", "base")),
-        ({"euclidean": 10.0, "length": 10.4999}, ("near_straight", "base")),
-        ({"n_actions": 90}, ("kept", "base")),
-        ({"n_actions": 91}, ("over_budget", "base")),
-        ({"euclidean": 40.0, "length": 50.0, "n_actions": 180}, ("kept", "standard")),
-        ({"euclidean": 40.0, "length": 50.0, "n_actions": 181}, ("over_budget", "standard")),
-        ({"euclidean": 70.0, "length": 80.0, "n_actions": 301}, ("over_budget", "long_horizon")),
-        ({"outcome": "NO_PATH", "length": 0.0}, ("no_path", "")),
-        ({"outcome": "START_IN_COLLISION", "length": 0.0}, ("start_in_collision", "")),
-        ({"outcome": "GOAL_IN_COLLISION", "length": 0.0}, ("goal_in_collision", "")),
-        ({"outcome": "BUDGET_EXHAUSTED", "length": 0.0}, ("budget_exhausted", "")),
-        ({"euclidean": 0.0, "length": 8.0}, ("too_close", "base")),
-    ],
-)
-def test_rules_at_their_boundaries(case, expected):
-    assert verdict(**case) == expected
-
-
-HARD = FilterConfig(min_plan_detour=1.05, max_visible_at_start=0.1)
-
-
-@pytest.mark.parametrize(
-    ("detour", "visible", "config", "expected"),
-    [
-        (1.0, 1.0, CONFIG, "kept"),
-        (np.nan, np.nan, CONFIG, "kept"),
-        (1.05, 0.1, HARD, "kept"),
-        (1.0499, 0.1, HARD, "small_plan_detour"),
-        (1.0499, 0.2, HARD, "small_plan_detour"),
-        (1.05, 0.1001, HARD, "target_in_view"),
-        (np.nan, 0.0, HARD, "small_plan_detour"),
-        (1.2, np.nan, HARD, "target_in_view"),
-        (1.0, 0.0, FilterConfig(max_visible_at_start=0.0), "kept"),
-        (1.0, 1e-9, FilterConfig(max_visible_at_start=0.0), "target_in_view"),
-        (1.06, 1.0, FilterConfig(min_plan_detour=1.06), "kept"),
-    ],
-)
-def test_rules_of_difficulty_at_their_boundaries(detour, visible, config, expected):
-    told = {"config": config, "plan_detour": detour, "visible_at_start": visible}
-    assert verdict(**told) == (expected, "base")
-    # The paper's own rules come first.
-    assert verdict(length=10.1, **told)[0] == "near_straight"
-
-
-def test_what_nobody_told_is_not_kept_where_it_is_asked_for():
-    assert verdict(config=HARD)[0] == "small_plan_detour"
-    assert verdict()[0] == "kept"
+def by_the_paper(outcome, euclidean, length, n_actions, detour, visible, config):
+    """The first rule that a candidate breaks, one rule after another."""
+    if outcome != "SOLVED":
+        return outcome.lower(), ""
+    setting = next((name for name, (low, high) in RANGES.items() if low <= length < high), "")
+    broken = {
+        "too_close": euclidean <= 3,
+        "too_short": length < 5,
+        "too_long": length >= 100,
+        "near_straight": length < 1.05 * euclidean,
+        "over_budget": n_actions > BUDGETS.get(setting, math.inf),
+        "small_plan_detour": config.min_plan_detour > 1 and not detour >= config.min_plan_detour,
+        "target_in_view": config.max_visible_at_start < 1 and not visible <= config.max_visible_at_start,
+    }
+    return next((rule for rule, breaks in broken.items() if breaks), "kept"), setting
 
 
 @given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(["SOLVED", "NO_PATH", "BUDGET_EXHAUSTED"]),
-            st.floats(0, 150), st.floats(0, 200), st.integers(0, 400),
-        ),
-        min_size=1,
-    )
-)  # fmt: skip
-def test_kept_rows_hold_every_rule_and_every_row_has_a_reason(rows):
-    outcome, euclidean, length, n_actions = (np.array(c) for c in zip(*rows, strict=True))
-    reason, setting = judge(outcome, euclidean, length, n_actions.astype(np.int32), CONFIG)
-    budgets = {"base": (5, 30, 90), "standard": (30, 60, 180), "long_horizon": (60, 100, 300)}
-    for (o, d, ell, n), r, s in zip(rows, reason, setting, strict=True):
-        assert r
-        holds = o == "SOLVED" and d > 3 and 5 <= ell < 100 and ell >= 1.05 * d
-        if r == "kept":
-            low, high, budget = budgets[s]
-            assert holds
-            assert low <= ell < high
-            assert n <= budget
-        else:
-            assert not holds or n > budgets[s][2]
+    st.lists(st.tuples(st.sampled_from(OUTCOMES), LENGTHS, ACTIONS, DETOURS, SHARES), min_size=1),
+    st.sampled_from([{}, {"min_plan_detour": 1.05, "max_visible_at_start": 0.1}, {"max_visible_at_start": 0.0}]),
+)
+def test_a_candidate_is_rejected_by_the_first_rule_that_it_breaks(rows, values):
+    config = FilterConfig(**values)
+    outcome, lengths, n_actions, detour, visible = (np.array(c) for c in zip(*rows, strict=True))
+    reason, setting = judge(outcome, *lengths.T, n_actions.astype(np.int32), config, detour, visible)
+    expected = [by_the_paper(o, *metres, *more, config) for o, metres, *more in rows]
+    assert list(zip(reason.tolist(), setting.tolist(), strict=True)) == expected
+
+
+def test_what_nobody_told_is_not_kept_where_it_is_asked_for():
+    known = np.array(["SOLVED"]), np.array([10.0]), np.array([12.0]), np.array([20], np.int32)
+    assert judge(*known, FilterConfig())[0] == "kept"
+    assert judge(*known, FilterConfig(min_plan_detour=1.05))[0] == "small_plan_detour"
 
 
 FORWARD_5 = 3

@@ -31,43 +31,12 @@ def opened(project, smoke, tmp_path_factory):
     return pipeline, dataclasses.replace(roots, **copied)
 
 
-def prints(opened, stages=BY_NAME):
-    pipeline, roots = opened
-    return {name: fingerprint.scene_fingerprint(BY_NAME[name], pipeline, roots, SCENE) for name in stages}
+def prints(opened):
+    return {name: fingerprint.scene_fingerprint(stage, *opened, SCENE) for name, stage in BY_NAME.items()}
 
 
 def changed(before, after):
     return {name for name in before if before[name] != after[name]}
-
-
-def test_the_seed_and_the_body_count_for_every_stage(opened):
-    pipeline, roots = opened
-    before = prints(opened)
-    assert prints(opened) == before
-    other = pipeline.model_copy(update={"seed": pipeline.seed + 1})
-    assert changed(before, prints((other, roots))) == set(BY_NAME)
-    for name in ("radius_m", "wheelbase_m"):
-        body = pipeline.embodiment.model_copy(update={name: 0.3})
-        assert changed(before, prints((pipeline.model_copy(update={"embodiment": body}), roots))) == set(BY_NAME)
-
-
-@pytest.mark.parametrize(
-    ("stage", "section", "values"),
-    [
-        ("anchor-sample", "anchor_sample", {"standoff_m": 1.5}),
-        ("pair-objects", "pair_objects", {"start_variants": 2}),
-        ("plan", "plan", {"search_margin": 0.5}),
-        ("filter", "filter", {"min_detour_ratio": 1.1}),
-        ("split", "split", {"id_train_fraction": 0.7}),
-        ("render", "render", {"fps": 5}),
-    ],
-)
-def test_a_section_counts_for_its_own_stage(opened, stage, section, values):
-    pipeline, roots = opened
-    own = getattr(pipeline, section).model_copy(update=values)
-    assert own != getattr(pipeline, section)
-    other = pipeline.model_copy(update={section: own})
-    assert changed(prints(opened), prints((other, roots))) == {stage}
 
 
 def test_every_table_that_a_stage_reads_counts(opened):
@@ -90,9 +59,12 @@ def test_every_table_that_a_stage_reads_counts(opened):
     assert prints(opened) == before
 
 
-def test_files_count_by_their_bytes(opened):
-    _, roots = opened
+def test_files_count_by_their_bytes_and_not_by_the_place_of_a_checkout(opened, project):
+    pipeline, roots = opened
     before = prints(opened)
+    _, elsewhere = open_pipeline(project / "pipelines" / "smoke.toml", roots.data)
+    assert elsewhere.recipes != roots.recipes
+    assert prints((pipeline, elsewhere)) == before
     annotations, recipe = roots.annotations / f"{SCENE}.json", roots.recipes / f"{SCENE}.toml"
     for path, text, stale in (
         (annotations, json.dumps(json.loads(annotations.read_text())), {"annotate-import"}),
@@ -103,13 +75,6 @@ def test_files_count_by_their_bytes(opened):
         assert changed(before, prints(opened)) == stale
         path.write_bytes(whole)
     assert prints(opened) == before
-
-
-def test_the_place_of_a_checkout_does_not_count(opened, project):
-    pipeline, roots = opened
-    _, elsewhere = open_pipeline(project / "pipelines" / "smoke.toml", roots.data)
-    assert elsewhere.recipes != roots.recipes
-    assert prints((pipeline, elsewhere)) == prints(opened)
 
 
 def test_the_papers_figures_count_where_they_are_read(opened, tmp_path, monkeypatch):

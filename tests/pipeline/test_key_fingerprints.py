@@ -1,5 +1,8 @@
 """Every key of a pipeline file, changed in the file, changes the fingerprints of the stages that read it."""
 
+import contextlib
+import functools
+import operator
 import typing
 from pathlib import Path
 
@@ -71,13 +74,6 @@ def others(value, words):
     return ["another-text-of-some-length", ["plan"]]
 
 
-def put(raw, key, value):
-    *folders, last = key
-    for folder in folders:
-        raw = raw[folder]
-    raw[last] = value
-
-
 def written(folder, changes):
     """The pipeline of a file with every key in it, some of them changed."""
     whole = Pipeline()
@@ -87,8 +83,8 @@ def written(folder, changes):
     }
     whole = whole.model_copy(update={"anchor_sample": whole.anchor_sample.model_copy(update=scorers)})
     raw = whole.model_dump(by_alias=True, mode="json", exclude_none=True)
-    for key, value in changes.items():
-        put(raw, key, value)
+    for (*folders, last), value in changes.items():
+        functools.reduce(operator.getitem, folders, raw)[last] = value
     if ("render", "profile") in changes:
         raw["render"] = {k: v for k, v in raw["render"].items() if k not in PROFILES["training"]}
     file = folder / "pipeline.toml"
@@ -99,11 +95,8 @@ def written(folder, changes):
 def changed_by(folder, base, key, value, words):
     """The pipeline with another value of a key, and of those that must go with it; None where none is allowed."""
     for other in others(value, words):
-        try:
-            pipeline = written(folder, base | dict.fromkeys(JOINED.get(key, [key]), other))
-        except ConfigError:
-            continue
-        return pipeline
+        with contextlib.suppress(ConfigError):
+            return written(folder, base | dict.fromkeys(JOINED.get(key, [key]), other))
     return None
 
 

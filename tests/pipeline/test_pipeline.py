@@ -1,26 +1,17 @@
 """Properties of the real output of a whole run on two small scenes, beside those that validate holds."""
 
-import io
-import itertools
-import json
 import math
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 import trimesh
 from support.command_line import called
 
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.store import schemas
-from aerialdojo_gen.store import shards as store
-from aerialdojo_gen.store.tables import content_digest
 
 RADIUS_M = 0.25
-SUCCESS_RADIUS_M = 3.0
-BUDGETS = {"base": 90, "standard": 180, "long_horizon": 300}
-RANGES = {"base": (5, 30), "standard": (30, 60), "long_horizon": (60, 100)}
 LISTS = ["x_m", "y_m", "z_m", "yaw_rad", "action"]
 # Displacement in the body's frame (forward, left, up) in metres and turn in degrees, from the design's table and
 # not from the package.
@@ -54,50 +45,12 @@ def replay(row):
 
 
 @pytest.fixture(scope="module")
-def plans(smoke):
-    return pd.read_parquet(smoke / "plans")
-
-
-@pytest.fixture(scope="module")
-def solved(plans):
-    return plans[plans["outcome"] == "SOLVED"]
-
-
-@pytest.fixture(scope="module")
-def routes(smoke):
-    return pd.concat([pd.read_parquet(p) for p in sorted((smoke / "release" / "routes").iterdir())])
-
-
-@pytest.fixture(scope="module")
-def tasks(smoke):
-    return pd.concat([pd.read_parquet(p) for p in sorted((smoke / "release" / "tasks").iterdir())])
-
-
-@pytest.fixture(scope="module")
-def meshes(smoke):
-    result = {}
-    for path in sorted((smoke / "meshes").iterdir()):
-        model = read_glb(path)
-        parts = [trimesh.Trimesh(i.vertices, i.faces, process=False) for i in model.instances]
-        result[path.stem] = trimesh.util.concatenate(parts)
-    return result
-
-
-def test_there_is_something_to_test(solved, routes, tasks):
-    assert len(solved) > 200
-    assert routes.groupby("scene").size().min() > 20
-    assert len(tasks) == 2 * len(routes)
-
-
-def test_every_candidate_has_a_plan_and_a_verdict(smoke, plans):
-    pairs, verdicts = pd.read_parquet(smoke / "pairs"), pd.read_parquet(smoke / "verdicts")
-    keys = [set(zip(t["scene"], t["pair_id"], strict=True)) for t in (pairs, plans, verdicts)]
-    assert keys[0] == keys[1] == keys[2]
-    assert set(plans["outcome"]) <= set(schemas.OUTCOMES)
-    assert (verdicts["reason"] == "kept").equals(verdicts["keep"])
+def solved(smoke):
+    return pd.read_parquet(smoke / "plans", filters=[("outcome", "==", "SOLVED")])
 
 
 def test_replay_of_the_actions_reproduces_the_stored_poses(solved):
+    assert len(solved) > 200
     for row in solved.itertuples():
         assert len({len(getattr(row, name)) for name in LISTS}) == 1
         assert row.action[-1] == schemas.STOP
@@ -113,20 +66,12 @@ def test_replay_of_the_actions_reproduces_the_stored_poses(solved):
         assert np.linalg.norm(poses[-1, :3] - xyz(row)[-1]) <= 1.0 + 1e-6
 
 
-def test_released_routes_hold_the_papers_bounds(routes):
-    assert (routes["euclidean_m"] > 3).all()
-    assert (routes["length_m"] >= 1.05 * routes["euclidean_m"]).all()
-    assert np.allclose(routes["detour_ratio"], routes["length_m"] / routes["euclidean_m"], rtol=1e-12)
-    for setting, rows in routes.groupby("setting"):
-        low, high = RANGES[setting]
-        assert rows["length_m"].between(low, high, inclusive="left").all()
-        assert (rows["n_actions"] <= BUDGETS[setting]).all()
-
-
-def test_no_ray_along_the_body_hits_anything(solved, meshes):
+def test_no_ray_along_the_body_hits_anything(smoke, solved):
     """Rays along every segment, on the body's axis and on eight lines of its hull, against embree."""
     for scene, rows in solved.groupby("scene"):
-        intersector = trimesh.ray.ray_pyembree.RayMeshIntersector(meshes[scene])
+        instances = read_glb(smoke / "meshes" / f"{scene}.glb").instances
+        mesh = trimesh.util.concatenate([trimesh.Trimesh(i.vertices, i.faces, process=False) for i in instances])
+        intersector = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
         starts, ends = [], []
         for row in rows.itertuples():
             points = xyz(row)
@@ -142,67 +87,13 @@ def test_no_ray_along_the_body_hits_anything(solved, meshes):
         for k in range(9):
             angle = k * math.pi / 4
             offset = 0 if k == 8 else 0.98 * RADIUS_M * (math.cos(angle) * side + math.sin(angle) * up)
-            distance = np.linalg.norm(hit_locations(intersector, p + offset, along) - (p + offset), axis=1)
-            assert not np.count_nonzero(distance < length - 1e-3), (scene, k)
-
-
-def hit_locations(intersector, origins, directions):
-    """First hits of rays, infinity where there is none."""
-    locations, rays, _ = intersector.intersects_location(origins, directions, multiple_hits=False)
-    result = np.full(origins.shape, np.inf)
-    result[rays] = locations
-    return result
-
-
-def test_the_body_never_touches_the_mesh_at_sampled_points(routes, meshes):
-    """Exact point-to-mesh distances by trimesh, which the planner does not use."""
-    for scene, rows in routes.groupby("scene"):
-        query = trimesh.proximity.ProximityQuery(meshes[scene])
-        for row in rows.sort_values("nav_id").head(12).itertuples():
-            points = xyz(row)
-            dense = np.concatenate([np.linspace(a, b, 6) for a, b in itertools.pairwise(points)])
-            distance = query.on_surface(np.unique(dense, axis=0))[1]
-            assert distance.min() > RADIUS_M - 1e-4, row.nav_id
-            # The stored clearance is the route's smallest: no sampled point is nearer than it says.
-            assert min(distance.min(), 5.0) >= row.min_clearance_m - 1e-3
-
-
-def test_recordings_are_there_and_well(smoke):
-    recordings = pd.read_parquet(smoke / "recordings")
-    frames = pd.read_parquet(smoke / "frames")
-    assert set(recordings["view"]) == set(schemas.VIEWS)
-    assert set(recordings["modality"]) == {"rgb", "depth"}
-    assert recordings["ok"].all()
-    n_frames = frames.groupby("nav_id").size()
-    for row in recordings.itertuples():
-        path = smoke / row.path
-        assert path.stat().st_size == row.bytes
-        assert row.n_frames == n_frames[row.nav_id]
-
-
-def test_tasks_and_routes_meet_on_their_key(tasks, routes):
-    assert set(tasks["nav_id"]) == set(routes["nav_id"])
-    assert routes["nav_id"].is_unique
-    split = tasks.groupby("nav_id")[["subset", "partition"]].nunique()
-    assert (split == 1).all().all()
-
-
-def test_every_shard_says_what_it_was_made_from(smoke):
-    for path in sorted(smoke.rglob("part-*.parquet")):
-        info = store.read_info(path.parent, path.name)
-        assert len(info.fingerprint) == 64
-        meta = json.loads(pq.read_schema(path).metadata[b"aerialdojo"])
-        assert meta["content"] == content_digest(pq.read_table(path, partitioning=None)), path
-
-
-def test_the_card_is_written(smoke, tasks):
-    card = (smoke / "release" / "README.md").read_text()
-    assert f"{len(tasks):,} task instances" in card
-    assert io.StringIO(card).readline() == "---\n"
+            hits, rays, _ = intersector.intersects_location(p + offset, along, multiple_hits=False)
+            assert (np.linalg.norm(hits - (p + offset)[rays], axis=1) > length[rays] - 1e-3).all(), (scene, k)
 
 
 def test_render_command_keeps_to_the_pipelines_scenes(smoke, project):
     before = {p: p.stat().st_mtime_ns for p in smoke.rglob("*.parquet")}
+    assert pd.read_parquet(smoke / "recordings")["ok"].all()
     done = called("render", "--pipeline", "pipelines/smoke.toml", "--limit", 1, "--data", smoke, cwd=project)
     assert done.returncode == 0, done.stderr
     tasks = pd.read_parquet(smoke / "release/tasks")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -34,6 +33,7 @@ pytestmark = pytest.mark.slow
 
 ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 3})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
+LOOSE = FEW.model_copy(update={"frames": "png", "views": ("front",), "instances": True})
 
 
 def write_inputs(data):
@@ -51,11 +51,39 @@ def whole(tmp_path_factory):
     return data
 
 
+@pytest.fixture(scope="module")
+def loose(tmp_path_factory):
+    """Recordings as loose pictures."""
+    data = tmp_path_factory.mktemp("loose")
+    write_inputs(data)
+    run_whole(data, LOOSE)
+    return data
+
+
+@pytest.fixture
+def recorded(monkeypatch):
+    """The trajectories that are recorded, one after another."""
+    recorded = []
+    record = render._Trajectory.record
+    monkeypatch.setattr(
+        render._Trajectory, "record", lambda self, *args: recorded.append(self.nav_id) or record(self, *args)
+    )
+    return recorded
+
+
+# It runs `ALL`.
+RUN = """
+import sys
+from pathlib import Path
+from support.court import CONFIG, run_whole
+run_whole(Path(sys.argv[1]), CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 3}))
+"""
+
+
 @pytest.mark.kill
-def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole):
+def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes_by_two_processes(tmp_path, whole):
     write_inputs(tmp_path)
-    code = f"from support.court import *; from pathlib import Path; run_whole(Path({str(tmp_path)!r}), CONFIG.model_copy(update={{'limit': 0, 'trajectories_per_part': 3}}))"  # noqa: E501
-    process = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[1])
+    process = subprocess.Popen([sys.executable, "-c", RUN, tmp_path], cwd=Path(__file__).parents[1])
     media = tmp_path / "media" / SCENE
     limit = time.monotonic() + 120
     while len(list(media.glob("nav_*/recording.json"))) < 4 and time.monotonic() < limit:
@@ -70,16 +98,16 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp
     (half / "new" / "front_rgb.mp4").write_bytes(b"half")
     (half / "lease").write_text(f"media/{SCENE}/nav_05")
 
-    run_whole(tmp_path, ALL)
+    run_whole(tmp_path, ALL, workers=2)
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
     assert not (tmp_path / AREA).exists()
 
 
 def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):
-    machines = [tmp_path / str(k) for k in range(3)]
     together: dict[str, bytes] = {}
-    for k, data in enumerate(machines):
+    for k in range(3):
+        data = tmp_path / str(k)
         write_inputs(data)
         (summary,) = run_whole(data, ALL, limits=RunLimits((k, 3)))
         assert summary.computed in (1, 2)
@@ -89,26 +117,11 @@ def test_the_shares_of_three_machines_are_what_one_writes(tmp_path, whole):
     assert together == files_of(whole)
 
 
-def test_two_workers_write_what_one_does(tmp_path, whole):
+def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_path, whole, recorded, monkeypatch):
     write_inputs(tmp_path)
-    run_whole(tmp_path, ALL, workers=2)
-    assert files_of(tmp_path) == files_of(whole)
-
-
-def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_path, whole, monkeypatch):
-    write_inputs(tmp_path)
-    recorded = []
-    record = render._Trajectory.record
-
-    def slow(self, *args):
-        recorded.append(self.nav_id)
-        clock[0] += 10.0
-        return record(self, *args)
-
-    clock = [time.time()]
-    monkeypatch.setattr(render._Trajectory, "record", slow)
-    monkeypatch.setattr(time, "time", lambda: clock[0])
-    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=clock[0] + 45.0))
+    began = time.time()
+    monkeypatch.setattr(time, "time", lambda: began + 10.0 * len(recorded))
+    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=began + 45.0))
     assert len(recorded) == 5
     assert summary.computed == 1
     assert not list((tmp_path / "media" / SCENE).glob(".*"))
@@ -117,38 +130,14 @@ def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_p
     assert files_of(tmp_path) == files_of(whole)
 
 
-def test_more_trajectories_keep_the_finished_ones_and_force_does_not(tmp_path, monkeypatch):
+def test_more_trajectories_keep_the_finished_ones_and_force_does_not(tmp_path, recorded):
     write_inputs(tmp_path)
-    recorded = []
-    record = render._Trajectory.record
-    monkeypatch.setattr(
-        render._Trajectory, "record", lambda self, *args: recorded.append(self.nav_id) or record(self, *args)
-    )
     run_whole(tmp_path, CONFIG)
     assert len(recorded) == 3
     run_whole(tmp_path, FEW)
     assert len(recorded) == len(set(recorded)) == 4
     run_whole(tmp_path, FEW, force=["render"])
     assert len(recorded) == 8
-
-
-def lose_the_note(data):
-    (data / "media" / SCENE / "nav_a" / "recording.json").write_text("{")
-    for part in (data / "recordings" / SCENE).iterdir():
-        part.unlink()
-
-
-def test_a_damaged_recording_is_made_again(tmp_path, whole):
-    data = shutil.copytree(whole, tmp_path / "data")
-    folder = data / "media" / SCENE / "nav_a"
-    for damage in (
-        lambda: (folder / "down_depth.mkv").unlink(),
-        lambda: (folder / "left_rgb.mp4").write_bytes((folder / "left_rgb.mp4").read_bytes()[:-7]),
-        lambda: lose_the_note(data),
-    ):
-        damage()
-        run_whole(data, ALL)
-        assert files_of(data) == files_of(whole)
 
 
 def test_a_flagged_view_is_rendered_once_again_and_a_fault_that_passes_leaves_no_flag(tmp_path, monkeypatch):
@@ -190,30 +179,23 @@ def test_a_video_that_lacks_a_frame_is_flagged_missing(tmp_path, monkeypatch):
     assert summary.counts["missing"] == 2
 
 
-def test_png_frames_hold_what_the_videos_do_and_instances_name_the_cubes(tmp_path, whole):
-    write_inputs(tmp_path)
-    config = CONFIG.model_copy(update={"frames": "png", "instances": True})
-    run_whole(tmp_path, config)
-    rows = {
-        (r["nav_id"], r["view"], r["modality"]): r
-        for r in store.read_scene(tmp_path, "recordings", SCENE).to_pylist()
-    }
-    assert len(rows) == 3 * 4 * 3
-    row = rows["nav_a", "front", "depth"]
+def test_png_frames_hold_what_the_videos_do_and_instances_name_the_cubes(loose, whole):
+    rows = {(r["nav_id"], r["modality"]): r for r in store.read_scene(loose, "recordings", SCENE).to_pylist()}
+    assert len(rows) == 4 * 3
+    row = rows["nav_a", "depth"]
     assert row["codec"] == "png"
-    assert sorted(p.name for p in (tmp_path / row["path"]).glob("*.png")) == [f"{k:06}.png" for k in range(6)]
-    loose = read_recording(str(tmp_path / "media" / SCENE / "nav_a"))
+    assert sorted(p.name for p in (loose / row["path"]).glob("*.png")) == [f"{k:06}.png" for k in range(6)]
+    pictures = read_recording(str(loose / "media" / SCENE / "nav_a"))
     video = read_recording(whole / "media" / SCENE / "nav_a")
-    assert len(loose) == 6
-    for view in ("front", "left", "right", "down"):
-        assert loose.cameras[view] == video.cameras[view]
-        for k in (0, 5):
-            assert np.array_equal(loose.depth_m[view][k], video.depth_m[view][k])
-            assert np.abs(loose.rgb[view][k].astype(int) - video.rgb[view][k]).mean() < 12
-    plain = cv2.imread(str(tmp_path / row["path"] / "000003.png"), cv2.IMREAD_UNCHANGED)
-    assert np.array_equal(to_metres(plain), loose.depth_m["front"][3])
+    assert len(pictures) == 6
+    assert pictures.cameras["front"] == video.cameras["front"]
+    for k in (0, 5):
+        assert np.array_equal(pictures.depth_m["front"][k], video.depth_m["front"][k])
+        assert np.abs(pictures.rgb["front"][k].astype(int) - video.rgb["front"][k]).mean() < 12
+    plain = cv2.imread(str(loose / row["path"] / "000003.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(to_metres(plain), pictures.depth_m["front"][3])
     # Instance 5 of the court (number 6 in the file) is the red cube.
-    rgb, ids = loose.rgb["front"][0].astype(int), loose.instance["front"][0]
+    rgb, ids = pictures.rgb["front"][0].astype(int), pictures.instance["front"][0]
     assert (ids == 6).any()
     assert (rgb[ids == 6][:, 0] > 2 * rgb[ids == 6][:, 1:].max(axis=1)).all()
 
@@ -233,27 +215,13 @@ def test_the_estimate_is_of_the_selection_and_near_the_truth(whole):
     said = estimate(whole, [SCENE], ALL, 0, 2)
     assert "with 2 workers on idle cores" in str(said)
     assert "with 1 worker on idle cores" in str(dataclasses.replace(said, workers=1))
-    assert (said.trajectories, said.poses, said.videos) == (12, 72, 96)
+    assert "12 trajectories, 72 poses, 96 videos" in str(said)
+    assert estimate(whole, [SCENE], ALL.model_copy(update={"layout": "tiled"}), 0, 2).videos == 12
     size = sum(r["bytes"] for r in store.read_scene(whole, "recordings", SCENE).to_pylist())
     assert 0.4 * size < said.size_bytes < 2.5 * size
     assert said.wall_s == pytest.approx(said.cpu_s / 2)
-    assert "12 trajectories, 72 poses, 96 videos" in str(said)
     with pytest.raises(UsageError, match="nothing to record"):
         estimate(whole, [SCENE], ALL.model_copy(update={"split": "ood_train"}), 0, 2)
-
-
-def test_the_readers_of_the_documentation_read_what_was_drawn(whole, project):
-    folder = whole / "media" / SCENE / "nav_a"
-    depth = np.stack(list(read_recording(folder).depth_m["front"]))
-    depth[np.isinf(depth)] = 0.0
-    blocks = re.findall(r"```python\n(.*?)```", (project / "docs" / "recordings.md").read_text(), re.DOTALL)
-    assert len(blocks) == 3
-    own, pyav, opencv = ({"folder": folder} for _ in blocks)
-    for block, names in zip(blocks, (own, pyav, opencv), strict=True):
-        exec(block, names)
-    assert np.array_equal(own["recording"].rgb["front"][3], pyav["rgb"][3])
-    for names in (pyav, opencv):
-        assert np.array_equal(np.stack(names["depth_m"]), depth)
 
 
 def test_shares_and_durations_are_read_or_refused():
@@ -296,24 +264,17 @@ def test_the_row_says_what_drew_it(whole):
     }
 
 
-@pytest.fixture(scope="module")
-def loose(tmp_path_factory):
-    """Recordings as loose pictures."""
-    data = tmp_path_factory.mktemp("loose")
-    write_inputs(data)
-    run_whole(data, LOOSE)
-    return data
+def lose_the_note(folder):
+    (folder / "recording.json").write_text("{")
+    for part in (folder.parents[2] / "recordings" / SCENE).iterdir():
+        part.unlink()
 
 
-LOOSE = CONFIG.model_copy(update={"frames": "png", "views": ("front",), "limit": 2, "trajectories_per_part": 2})
-
-
-def damage_picture(folder):
-    raw = bytearray((folder / "front_rgb" / "000002.png").read_bytes())
-    raw[len(raw) // 2] ^= 1
-    (folder / "front_rgb" / "000002.png").write_bytes(raw)
-
-
+VIDEO_DAMAGE = {
+    "a video lost": lambda folder: (folder / "down_depth.mkv").unlink(),
+    "a video cut": lambda folder: os.truncate(folder / "left_rgb.mp4", (folder / "left_rgb.mp4").stat().st_size - 7),
+    "note and rows lost": lose_the_note,
+}
 DAMAGE = {
     "a picture lost": lambda folder: (folder / "front_depth" / "000003.png").unlink(),
     "a picture cut": lambda folder: os.truncate(folder / "front_rgb" / "000001.png", 100),
@@ -327,33 +288,29 @@ DAMAGE = {
 }  # fmt: skip
 
 
-def test_loose_pictures_that_are_lost_or_cut_are_recorded_again(tmp_path, loose):
-    data = shutil.copytree(loose, tmp_path / "data")
-    for what, damage in DAMAGE.items():
-        (summary,) = run_whole(data, LOOSE)
-        assert summary.computed == 0, what
-        damage(data / "media" / SCENE / "nav_b")
-        (summary,) = run_whole(data, LOOSE)
-        assert summary.computed >= 1, what
-        assert files_of(data) == files_of(loose), what
+def test_what_is_lost_or_cut_is_recorded_again(tmp_path, loose, whole):
+    for source, config, damages in ((loose, LOOSE, DAMAGE), (whole, ALL, VIDEO_DAMAGE)):
+        data = shutil.copytree(source, tmp_path / config.frames)
+        for what, damage in damages.items():
+            (summary,) = run_whole(data, config)
+            assert summary.computed == 0, what
+            damage(data / "media" / SCENE / "nav_b")
+            (summary,) = run_whole(data, config)
+            assert summary.computed >= 1, what
+            assert files_of(data) == files_of(source), what
 
 
 def test_verify_finds_a_flipped_bit_and_records_that_trajectory_alone_again(tmp_path, loose, whole):
-    for source, config in ((loose, LOOSE), (whole, ALL)):
+    for source, config, name in ((loose, LOOSE, "front_rgb/000002.png"), (whole, ALL, "left_rgb.mp4")):
         data = shutil.copytree(source, tmp_path / config.frames)
         media = data / "media" / SCENE
-        if config.frames == "png":
-            damage_picture(media / "nav_b")
-        else:
-            raw = bytearray((media / "nav_b" / "left_rgb.mp4").read_bytes())
-            raw[-200] ^= 1
-            (media / "nav_b" / "left_rgb.mp4").write_bytes(raw)
+        file = media / "nav_b" / name
+        raw = bytearray(file.read_bytes())
+        raw[len(raw) // 2] ^= 1
+        file.write_bytes(raw)
         kept = {p: p.stat().st_mtime_ns for p in media.rglob("*") if p.is_file() and "nav_b" not in p.parts}
-        (summary,) = run_whole(data, config)
-        assert summary.computed == 0
-        (summary,) = run_whole(data, config, limits=RunLimits(verify=True))
-        assert summary.computed == 1
+        for verify, computed in ((False, 0), (True, 1), (True, 0)):
+            (summary,) = run_whole(data, config, limits=RunLimits(verify=verify))
+            assert summary.computed == computed
         assert files_of(data) == files_of(source)
         assert {p: p.stat().st_mtime_ns for p in kept} == kept
-        (summary,) = run_whole(data, config, limits=RunLimits(verify=True))
-        assert summary.computed == 0

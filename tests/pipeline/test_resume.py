@@ -1,6 +1,7 @@
 """Kills, resumes, workers and damage: the tables end with the same bytes."""
 
 import os
+import random  # noqa: TID251 - which kills, not what is generated
 import shutil
 import signal
 import struct
@@ -34,18 +35,23 @@ def start(project, data):
 
 
 @pytest.fixture(scope="module")
-def server():
-    """A process that has imported everything and becomes a command in a child: imports are not what is tried here."""
-    one = torture.Server()
-    yield one
-    one.close()
+def bench(smoke, tmp_path_factory):
+    """Its server has imported everything and becomes a command in a child: imports are not what is tried here."""
+    bench = torture.Bench(tmp_path_factory.mktemp("torture"), smoke)
+    yield bench
+    bench.close()
 
 
-def run(server, data, pipeline="pipelines/smoke.toml"):
+@pytest.fixture
+def run(bench, tmp_path):
     """Run a command to its end in one process; gives its exit status and what it said."""
-    said = data.parent / "said"
-    code = server.run(["plan", "--pipeline", str(pipeline), "--data", str(data), "--workers", "1"], {}, said, -1.0)
-    return code, said.read_text()
+
+    def run(data):
+        command = ["plan", "--pipeline", "pipelines/smoke.toml", "--data", str(data), "--workers", "1"]
+        code = bench.server.run(command, {}, tmp_path / "said", -1.0)
+        return code, (tmp_path / "said").read_text()
+
+    return run
 
 
 def snapshot(data):
@@ -53,42 +59,32 @@ def snapshot(data):
     return {str(p.relative_to(data)): p.read_bytes() for p in files}
 
 
+def shards_of(data):
+    return [path for table in TABLES for path in data.glob(f"{table}/*/part-*.parquet")]
+
+
 def wait_for_shards(data, n, process):
-    # Of the tables that are compared, no others: what is waited for is what the tests count.
-    while process.poll() is None and sum(len(list(data.glob(f"{table}/*/part-*.parquet"))) for table in TABLES) < n:
+    while process.poll() is None and len(shards_of(data)) < n:
         time.sleep(0.01)
 
 
-def test_killed_again_and_again_ends_with_the_same_bytes(project, server, smoke, tmp_path):
+def test_what_was_killed_and_interrupted_goes_on_to_the_same_bytes(project, run, smoke, tmp_path):
     """Two processes begin and one ends: the bytes are those of a run by as many as there are cores."""
     data = tmp_path / "data"
-    kills = 0
-    # In build-scenes, and wherever the two scenes are after so many shards, each at its own stage. What a kill at any
-    # one call leaves, test_atomic and the torture try.
-    for shards in (1, 6, 11):
-        process = start(project, data)
-        wait_for_shards(data, shards, process)
-        # Somewhere after the shard's commit, most often within the next one's work or write.
-        time.sleep(0.02 * shards)
-        if process.poll() is None:
-            process.send_signal(signal.SIGKILL)
-            kills += 1
-        process.communicate()
-        chores.until_empty(process.pid)
-        for path in data.rglob("part-*.parquet"):
-            assert read_info(path.parent, path.name) is not None, "a reader saw half a shard"
-    assert kills >= 2
-    code, err = run(server, data)
-    assert code == 0, err
-    assert snapshot(data) == snapshot(smoke)
-    assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
-
-
-def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, server, smoke, tmp_path):
-    data = tmp_path / "data"
+    # In build-scenes or after it. What a kill at any one call leaves, test_atomic and the torture try.
     process = start(project, data)
-    wait_for_shards(data, 1, process)
-    code, err = run(server, data)
+    wait_for_shards(data, 2, process)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    chores.until_empty(process.pid)
+    for path in shards_of(data):
+        assert read_info(path.parent, path.name) is not None, "a reader saw half a shard"
+
+    before = len(shards_of(data))
+    process = start(project, data)
+    wait_for_shards(data, before + 1, process)
+    code, err = run(data)
     assert code == 1
     assert err.startswith(f"error: another run is writing to {data}: wait for it, or use another --data\n")
     wait_for_shards(data, 8, process)
@@ -101,25 +97,32 @@ def test_ctrl_c_keeps_what_was_finished_and_ends_the_workers(project, server, sm
     finished = snapshot(data)
     assert len([name for name in finished if name.endswith(".parquet")]) >= 8
     assert finished.items() <= snapshot(smoke).items()
-    assert not list(data.rglob(f"{AREA}*"))
+    assert not list(data.rglob(f"{AREA}*")), "what killed runs left half-made is swept"
+
+    code, err = run(data)
+    assert code == 0, err
+    assert snapshot(data) == snapshot(smoke)
+
+
+def test_a_little_of_the_torture(bench, monkeypatch):
+    """A command is killed at one of its calls and repeated, and every byte compared: a file left over is noticed."""
+    assert bench.case("export", random.Random("export"), aimed=True) == "killed"
+    kind = torture.KINDS["export"]
+
+    def litter(data, rng):
+        kind.prepare(data, rng)
+        (data / "exports").mkdir(exist_ok=True)
+        (data / "exports" / f"{rng.random()}").write_text("half")
+
+    monkeypatch.setitem(torture.KINDS, "export", torture.Kind(kind.arguments, litter))
+    with pytest.raises(AssertionError, match=r"export, killed .*: exports/0\."):
+        bench.case("export", random.Random(0), aimed=True)
 
 
 @pytest.fixture
 def copy(smoke, tmp_path):
     """A copy of the smoke data that a test may damage."""
     return shutil.copytree(smoke, tmp_path / "copy")
-
-
-def mtimes(data):
-    return {p: p.stat().st_mtime_ns for p in data.rglob("*") if p.is_file() and p.name != ".lock"}
-
-
-def test_nothing_changed_nothing_is_written(server, copy):
-    before = mtimes(copy)
-    code, err = run(server, copy)
-    assert code == 0
-    assert mtimes(copy) == before
-    assert err.count("; nothing to do; ") == 1, "what was asked for, not what it builds on"
 
 
 def shard(data, table, number):
@@ -137,7 +140,7 @@ def move_a_vertex(mesh):
     assert mesh.stat().st_size == before.st_size
 
 
-def test_whatever_is_damaged_is_named_and_made_again(server, smoke, copy):
+def test_whatever_is_damaged_is_named_and_made_again(run, smoke, copy):
     cut = {shard(copy, "plans", 0): 0, shard(copy, "pairs", 0): 100, shard(copy, "landmarks", 1): -9}
     for path, keep in cut.items():
         path.write_bytes(path.read_bytes()[:keep])
@@ -161,7 +164,7 @@ def test_whatever_is_damaged_is_named_and_made_again(server, smoke, copy):
     other.write_bytes(other.read_bytes()[:1000])
     with pytest.raises(AssetError, match="is not the mesh that the tables were made from"):
         read_glb(mesh, store.read_scene(copy, "scenes", mesh.stem)["mesh_sha256"][0].as_py())
-    code, err = run(server, copy)
+    code, err = run(copy)
     assert code == 0, err
     for path in cut:
         assert f"{path} is damaged" in err
@@ -173,36 +176,7 @@ def test_whatever_is_damaged_is_named_and_made_again(server, smoke, copy):
     assert snapshot(copy) == snapshot(smoke)
 
 
-def test_a_changed_config_makes_its_stage_stale_and_only_what_follows(project, server, copy, tmp_path):
-    before = mtimes(copy)
-    text = (project / "pipelines" / "smoke.toml").read_text()
-    text = text.replace('"../', f'"{project}/') + "\n[pair-objects]\nstart_variants = 1\n"
-    mine = tmp_path / "mine.toml"
-    mine.write_text(text)
-    code, err = run(server, copy, mine)
-    assert code == 0, err
-    changed = {p.relative_to(copy).parts[0] for p, t in mtimes(copy).items() if before.get(p) != t}
-    assert changed == {"pairs", "plans"}
-
-
-def test_a_read_only_directory_is_one_line(server, copy):
-    if os.geteuid() == 0:
-        # Root writes through permission bits: a folder in the shard's place stops it all the same.
-        path = sorted(copy.glob("pairs/*/part-00000.parquet"))[0]
-        path.unlink()
-        path.mkdir()
-    else:
-        folder = sorted(copy.glob("pairs/*"))[0]
-        sorted(folder.iterdir())[0].unlink()
-        folder.chmod(0o555)
-    code, err = run(server, copy)
-    assert code == 1
-    lines = [line for line in err.splitlines() if line.startswith("error:")]
-    assert len(lines) == 1
-    assert "Traceback" not in err
-
-
-def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(server, smoke, copy):
+def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_back(run, copy):
     (copy / ".lock").write_text("")
     recording = min((copy / "media" / "U_Courtyard_0").iterdir())
     recording.rename(recording.with_name(f".{recording.name}.4242.old"))
@@ -213,10 +187,13 @@ def test_what_versions_before_left_is_removed_once_and_an_old_recording_comes_ba
     ):  # fmt: skip
         (copy / left).parent.mkdir(parents=True, exist_ok=True)
         (copy / left).write_bytes(b"half")
-    code, err = run(server, copy)
+    before = {p: p.stat().st_mtime_ns for p in copy.rglob("*.*") if "/." not in str(p)}
+    code, err = run(copy)
     assert code == 0, err
+    assert err.count("; nothing to do; ") == 1, "what was asked for, not what it builds on"
+    assert {p: p.stat().st_mtime_ns for p in before} == before, "nothing changed, nothing is written"
     assert recording.is_dir()
     assert not [p for p in copy.rglob(".*") if p.name != ".lock"]
     (copy / "meshes" / ".mine.1.tmp").write_text("not looked for again")
-    code, err = run(server, copy)
+    code, err = run(copy)
     assert (copy / "meshes" / ".mine.1.tmp").is_file()

@@ -22,17 +22,13 @@ SCENES = ("U_Courtyard_0", "U_Courtyard_1")
 TABLES = {"pair-objects": "pairs", "plan": "plans", "filter": "verdicts"}
 
 
-def names(groups):
-    return [[stage.name for stage in group] for group in groups]
-
-
 def test_scenes_wait_for_one_another_before_the_release_and_before_recordings():
-    own = ["build-scenes", "annotate-import", "anchor-sample", "reference-images", "describe", "pair-objects"]
-    own += ["plan", "filter"]
-    assert names(group_stages(STAGES)) == [own, ["split"], ["render"]]
-    assert names(group_stages(STAGES[:7])) == [own[:7]]
+    *own, split, render = STAGES
+    assert (own[-1].name, split.name, render.name) == ("filter", "split", "render")
+    assert group_stages(STAGES) == [own, [split], [render]]
+    assert group_stages(own) == [own]
     # Of the last stage alone a part may be wanted.
-    assert names(group_stages(STAGES[:7], alone=True)) == [own[:6], ["plan"]]
+    assert group_stages(own, alone=True) == [own[:-1], own[-1:]]
 
 
 @pytest.mark.pipeline
@@ -52,26 +48,20 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
         outcomes = list(pool.run(chores.compute_and_sign, scheduler))
     assert not scheduler.errors
     pids = {path.name: path.read_text() for path in notes.iterdir()}
-    planned = [name for name in pids if " plan " in name]
-    assert len(pids) == len(outcomes) == scheduler.overview().scenes * 2 + len(planned)
+    done = {name: len([p for p in pids if f" {name} " in p]) for name in TABLES}
+    assert len(pids) == len(outcomes) == sum(done.values())
+    assert done["pair-objects"] == done["filter"] == len(SCENES)
     assert len(set(pids.values())) == 2
     for scene in SCENES:
         # A part of `plan` may have been done by who had nothing else to do.
         assert pids[f"{scene} pair-objects 0"] == pids[f"{scene} plan 0"]
-    assert [(one.stage, one.shards, one.computed) for one in scheduler.summaries()] == [
-        (name, len([p for p in pids if f" {name} " in p]), len([p for p in pids if f" {name} " in p]))
-        for name in TABLES
-    ]
+    summaries = scheduler.summaries()
+    assert {one.stage: one.shards for one in summaries} == {one.stage: one.computed for one in summaries} == done
     for table in TABLES.values():
         for path in (smoke / table).rglob("*.parquet"):
             assert (data / path.relative_to(smoke)).read_bytes() == path.read_bytes()
     assert known.left_s == 0.0 < expected_s
     assert known.done_s == pytest.approx(sum(one.seconds for one in outcomes))
-
-
-def run(project, data, pipeline, *args, verb="run"):
-    where = [str(pipeline)] if verb == "run" else ["--pipeline", str(pipeline)]
-    return called(verb, *where, "--data", data, "--workers", "1", *args, cwd=project)
 
 
 @pytest.mark.pipeline
@@ -87,7 +77,7 @@ def test_a_scene_that_fails_stops_alone(project, smoke, tmp_path):
     text = text.replace('"../annotations/smoke"', f'"{annotations}"').replace('"../', f'"{project}/')
     pipeline.write_text(text + "\n[pair-objects]\nstart_variants = 1\n")
     before = {path: path.stat().st_mtime_ns for path in data.rglob("*.parquet")}
-    done = run(project, data, pipeline)
+    done = called("run", pipeline, "--data", data, "--workers", "1", cwd=project)
     assert done.returncode == 1
     assert done.stderr.count("error:") == 1
     assert "nothing_of_that_name" in done.stderr
@@ -101,7 +91,7 @@ def test_a_scene_that_fails_stops_alone(project, smoke, tmp_path):
     assert "plan:" not in done.stderr
     # Mended, the first one goes on from where it stopped, and the other one has nothing to do but in `split`.
     shutil.copyfile(project / "annotations" / "smoke" / broken.name, broken)
-    done = run(project, data, pipeline, verb="filter")
+    done = called("filter", "--pipeline", pipeline, "--data", data, "--workers", "1", cwd=project)
     assert done.returncode == 0, done.stderr
     assert "pair-objects: " in done.stderr
     assert done.stderr.count("1 of 2 shards computed") == 2

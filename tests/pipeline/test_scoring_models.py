@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from support.handmade import job_of
-from support.llm_server import Drip, Hang, Say, Status, Trickle, serving
+from support.llm_server import Hang, Say, Status, serving
 from support.tiny_clip import write_clip
 from support.two_coloured import POST, item_of, plain_view, redness, world_of, yard
 
@@ -41,15 +41,6 @@ def looks_south(row):
     return abs(math.remainder(row["yaw_rad"] + math.pi / 2, 2 * math.pi)) < math.radians(50)
 
 
-def test_clip_prefers_the_picture_that_fits_the_name(clip):
-    scorer = ClipScorer(clip)
-    assert scorer.score("red post", [BLUE, RED, GREY])[1] == 1.0
-    assert scorer.score("blue post", [BLUE, RED, GREY])[0] == 1.0
-    for scores in (scorer.score("red post", [BLUE, RED, GREY]), scorer.score("blue post", [RED])):
-        assert all(0.0 <= s <= 1.0 for s in scores)
-        assert max(scores) == 1.0
-
-
 def test_clips_scores_are_those_of_its_cosines(clip):
     scorer = ClipScorer(clip)
     pictures = np.stack([view.rgb for view in (RED, GREY, BLUE)])
@@ -61,6 +52,7 @@ def test_clips_scores_are_those_of_its_cosines(clip):
     assert scorer.score("red post", [RED, GREY, BLUE]) == pytest.approx(
         np.exp(100 * (cosine - cosine.max())), abs=1e-3
     )
+    assert scorer.score("blue post", [BLUE, RED, GREY])[0] == scorer.score("blue post", [RED])[0] == 1.0
 
 
 def test_clip_selects_the_side_that_the_name_tells(clip, tmp_path):
@@ -190,42 +182,28 @@ def test_a_service_that_refuses_ends_it_in_one_line_without_the_key(key):
     assert "\n" not in str(said.value)
 
 
-@pytest.mark.parametrize("act", [Hang(), Trickle(), Drip()])
-def test_a_service_that_takes_too_long_is_given_up(key, act):
-    with serving(act) as service, pytest.raises(AgentUnavailable, match=r"no complete answer within 0\.3 s"):
-        VlmScorer(vlm(service, timeout_s=0.3)).score("post", [RED, BLUE])
-
-
-def test_a_busy_service_is_asked_again(key):
+def test_a_busy_service_is_asked_again_and_a_slow_one_is_given_up(key):
     with serving(Status(503, headers={"retry-after": "0"}), Say('{"order": [1, 2]}')) as service:
         scorer = VlmScorer(vlm(service).model_copy(update={"retries": 1}))
         assert scorer.score("post", [RED, BLUE]) == [1.0, 0.0]
+    with serving(Hang()) as service, pytest.raises(AgentUnavailable, match=r"no complete answer within 0\.3 s"):
+        VlmScorer(vlm(service, timeout_s=0.3)).score("post", [RED, BLUE])
 
 
-@pytest.mark.parametrize(
-    ("text", "order"),
-    [
-        ('{"order": [2, 3, 1]}', [1, 2, 0]),
-        ('<think>the third?</think>\n{"order": [3, 1, 2]}', [2, 0, 1]),
-        ('```\n{"order": [1, 2, 3]}\n```', [0, 1, 2]),
-    ],
-)
-def test_orders_that_are_read(text, order):
-    assert read_order(text, 3) == order
+def test_orders_that_are_read():
+    assert read_order('<think>the third?</think>\n{"order": [3, 1, 2]}', 3) == [2, 0, 1]
+    assert read_order('```\n{"order": [1, 2, 3]}\n```', 3) == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
         ("", "JSON"),
-        ("2, 3, 1", "JSON"),
         ('{"order": [1, 2, 3]} and more', "JSON"),
         ("[1, 2, 3]", "order"),
         ('{"order": [1, 2, 3], "why": "x"}', "order"),
-        ('{"order": "123"}', "order"),
         ('{"order": [1, 2]}', "1 to 3"),
         ('{"order": [1, 2, 2]}', "1 to 3"),
-        ('{"order": [0, 1, 2]}', "1 to 3"),
         ('{"order": [1, 2, 3.0]}', "1 to 3"),
         ('{"order": [true, 2, 3]}', "1 to 3"),
         ("[" * 100_000, "JSON"),

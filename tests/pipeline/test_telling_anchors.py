@@ -16,7 +16,7 @@ from aerialdojo_gen.geometry.rays import RayCaster
 from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
-from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, step_back_m
+from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m
 from aerialdojo_gen.scenes.anatomy import Anatomy, Run
 from aerialdojo_gen.scenes.model import Instance
 
@@ -102,40 +102,6 @@ def test_as_far_back_as_it_fits_a_thing_fits_and_no_nearer(dx, dy, dz, away, yaw
     assert fits(back + 1e-6)
     if back > 0.5:
         assert not fits(back - 0.06 * (reach + back + dz) - 0.5)
-
-
-def test_the_camera_steps_back_from_what_is_large_and_stops_before_a_wall():
-    bus = instance("bus", box((-5.0, -1.2, 0.3), (5.0, 1.2, 3.2)))
-    eye, south = np.array([0.0, -2.2, 1.6]), NORTH
-
-    def back(*others, most=15.0):
-        place = scene(bus, *others)
-        world = World.of(place, RADIUS, CONFIG.margin_m)
-        k = world.index["bus"]
-        points = np.asarray(bus.vertices[bus.faces].mean(axis=1))
-        return step_back_m(world, k, points, eye, south, 90.0, most)
-
-    free = back()
-    assert free == pytest.approx(fitting_m(bus.vertices, eye, south, 90.0), abs=0.011)
-    assert 3.5 < free < 6.0
-    assert back(most=0.0) == 0.0
-    assert back(most=2.0) == 2.0
-    wall = instance("wall", box((-20.0, -5.2, 0.0), (20.0, -5.0, 4.0)))
-    assert 1.5 < back(wall) <= 2.5
-    # A wall close behind leaves no room worth a step.
-    near = instance("near", box((-20.0, -2.7, 0.0), (20.0, -2.6, 4.0)))
-    assert back(near) == 0.0
-
-
-def test_what_comes_between_keeps_the_camera_near():
-    bus = instance("bus", box((-5.0, -1.2, 0.3), (5.0, 1.2, 3.2)))
-    # Two screens with a slit that the viewing axis goes through: from behind them next to nothing is seen.
-    screens = [instance(f"screen{k}", box((x, -3.4, 0.0), (x + 9.7, -3.3, 5.0))) for k, x in enumerate((-10.0, 0.3))]
-    place = scene(bus, *screens)
-    world = World.of(place, RADIUS, CONFIG.margin_m)
-    points = np.asarray(bus.vertices[bus.faces].mean(axis=1))
-    back = step_back_m(world, world.index["bus"], points, np.array([0.0, -2.2, 1.6]), NORTH, 90.0, 15.0)
-    assert back < 1.2
 
 
 def test_a_post_between_is_stepped_round(tmp_path):

@@ -4,16 +4,12 @@ import json
 import re
 
 import pytest
-from typer.testing import CliRunner
+from support.command_line import said
 
-import aerialdojo_gen
 from aerialdojo_gen.base.config.keys import config_keys, section_meanings
 from aerialdojo_gen.base.config.pipeline import Pipeline, load_pipeline
 from aerialdojo_gen.base.errors import AerialDojoError, ConfigError, UsageError
-from aerialdojo_gen.cli.app import app
 from aerialdojo_gen.pipeline.template import init_config, pipeline_text
-
-UNITS = {"_m": "m", "_deg": "°", "_px": "px", "_s": "s"}
 
 
 def schema_keys():
@@ -45,13 +41,6 @@ def test_every_key_of_the_models_is_listed_once_with_its_meaning():
     assert len(listed) == len(set(listed)) > 90
     assert [f"{key.section} {key.name}" for key in keys if not key.meaning] == []
     assert all(section_meanings().values())
-
-
-def test_a_name_that_ends_in_a_unit_has_it():
-    for key in config_keys():
-        for end, unit in UNITS.items():
-            if re.search(rf"(?<!_m)(?<!_deg)(?<!_per){end}$", key.name):
-                assert key.unit == unit, key.name
 
 
 def test_values_are_the_pipelines_and_defaults_the_models(project):
@@ -113,33 +102,27 @@ def test_what_cannot_be_written(tmp_path):
     assert path.read_bytes() == before
     init_config(path, Pipeline(seed=3), force=True)
     assert load_pipeline(path).seed == 3
-    for name, said in (("mine.json", "NAME.toml"), ("no name.toml", "name = 'no name'")):
-        with pytest.raises(AerialDojoError, match=said):
+    for name, words in (("mine.json", "NAME.toml"), ("no name.toml", "name = 'no name'")):
+        with pytest.raises(AerialDojoError, match=words):
             init_config(tmp_path / name)
     with pytest.raises(ConfigError, match=r"no pipeline file .*q\.toml"):
         init_config(tmp_path / "other.toml", tmp_path / "q.toml")
     assert {p.name for p in tmp_path.iterdir()} == {"mine.toml"}
 
 
-def test_the_command_shows_what_the_function_lists(project, tmp_path, monkeypatch):
+def test_the_command_shows_what_the_function_lists(project, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
-    runner = CliRunner()
-    shown = runner.invoke(app, ["config", "show", "--json", "--pipeline", str(project / "pipelines/smoke.toml")])
-    assert json.loads(shown.stdout) == [key.as_json() for key in config_keys(project / "pipelines/smoke.toml")]
-    for args in ([], ["plan"], ["embodiment"], ["anchor-sample"]):
-        text = runner.invoke(app, ["config", "show", *args]).stdout
+    smoke, mine = project / "pipelines/smoke.toml", tmp_path / "mine.toml"
+    _, text, _ = said(capsys, "config", "show", "--json", "--pipeline", smoke)
+    assert json.loads(text) == [key.as_json() for key in config_keys(smoke)]
+    for args in ([], ["embodiment"], ["anchor-sample"], ["plan"]):
+        _, text, _ = said(capsys, "config", "show", *args)
         assert max(map(len, text.splitlines())) <= 80
         assert re.search(r"^[ *] (name|cell_m|radius_m|standoff_m) = ", text, re.MULTILINE)
-    text = runner.invoke(app, ["config", "show", "plan"]).stdout
     assert "* min_detour_ratio = 1.05  (default: 0.0)" in text
     assert "  cell_m = 0.5 m" in text
-    wrong = runner.invoke(app, ["config", "show", "plann"])
-    assert str(wrong.exception) == "no section 'plann': did you mean 'plan'?"
-    made = runner.invoke(app, ["config", "init", str(tmp_path / "mine.toml")])
-    assert made.stdout.splitlines()[1] == f"next: aerialdojo-gen run {tmp_path / 'mine.toml'} --data data-mine"
-    assert load_pipeline(tmp_path / "mine.toml") == Pipeline(name="mine")
-
-
-def test_the_functions_are_public():
-    assert aerialdojo_gen.config_keys is config_keys
-    assert aerialdojo_gen.init_config is init_config
+    code, _, err = said(capsys, "config", "show", "plann")
+    assert (code, err) == (2, "error: no section 'plann': did you mean 'plan'?\n")
+    _, text, _ = said(capsys, "config", "init", mine)
+    assert text.splitlines()[1] == f"next: aerialdojo-gen run {mine} --data data-mine"
+    assert load_pipeline(mine) == Pipeline(name="mine")
