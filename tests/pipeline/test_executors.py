@@ -53,22 +53,17 @@ def test_what_cannot_be_is_said_in_one_line(monkeypatch, tmp_path):
         make_executor("ray", address="nowhere")
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "ray", None)
-        with pytest.raises(
-            MissingPackage, match=r"--executor ray lacks the package ray: pip install 'aerialdojo-gen\[cluster\]'"
-        ):
+        with pytest.raises(MissingPackage, match=r"--executor ray lacks .* 'aerialdojo-gen\[cluster\]'"):
             make_executor("ray")
     refused = r"no Ray cluster answers at 127.0.0.1:1 \(.*refused\): start one"
     with pytest.raises(AerialDojoError, match=refused), make_executor("ray", address="127.0.0.1:1") as pool:
         list(pool.map(chores.square, tasks(tmp_path, 1)))
 
 
-def test_results_are_the_same_whoever_computes_them(pool, tmp_path):
+def test_results_are_the_same_whoever_computes_them_and_come_in_the_order_of_finishing(pool, tmp_path):
     assert pool.workers == 2
     assert sorted(pool.map(chores.square, tasks(tmp_path))) == [(k, k * k) for k in range(6)]
     assert list(pool.map(chores.square, [])) == []
-
-
-def test_results_come_in_the_order_of_finishing(pool, tmp_path):
     order = list(pool.map(chores.wait_for_the_others, tasks(tmp_path, 4)))
     assert sorted(order) == [0, 1, 2, 3]
     assert order.index(0) >= 2
