@@ -151,6 +151,10 @@ def serve() -> None:
         "exchange.importing",
     ):
         importlib.import_module(f"aerialdojo_gen.{name}")
+    # Which sources a stage imports takes seconds to find out; a child knows it from here.
+    runner = importlib.import_module("aerialdojo_gen.pipeline.runner")
+    for stage in runner.STAGES:
+        runner.stage_code(stage.name)
     cli = importlib.import_module("aerialdojo_gen.cli.app")
     for line in iter(sys.stdin.readline, ""):
         arguments, env, said = json.loads(line)

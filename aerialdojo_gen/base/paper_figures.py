@@ -37,8 +37,8 @@ def inventory() -> dict[str, PaperScene]:
     """Read the paper's Table 10: 42 scenes by name."""
     return {
         row["scene"]: PaperScene(
-            row["scene"], int(row["landmarks"]), int(row["objects"]), *(int(row[s]) // 2 for s in SETTINGS),
-            1000.0 * float(row["path_km"]),
+            row["scene"], int(row["landmarks"]), int(row["objects"]), int(row["base"]) // 2,
+            int(row["standard"]) // 2, int(row["long_horizon"]) // 2, 1000.0 * float(row["path_km"]),
         )
         for row in _rows("inventory.csv")
     }  # fmt: skip

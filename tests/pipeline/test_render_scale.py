@@ -81,7 +81,7 @@ run_whole(Path(sys.argv[1]), CONFIG.model_copy(update={"limit": 0, "trajectories
 
 
 @pytest.mark.kill
-def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes_by_two_processes(tmp_path, whole):
+def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole):
     write_inputs(tmp_path)
     process = subprocess.Popen([sys.executable, "-c", RUN, tmp_path], cwd=Path(__file__).parents[1])
     media = tmp_path / "media" / SCENE
@@ -98,7 +98,7 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes_by_
     (half / "new" / "front_rgb.mp4").write_bytes(b"half")
     (half / "lease").write_text(f"media/{SCENE}/nav_05")
 
-    run_whole(tmp_path, ALL, workers=2)
+    run_whole(tmp_path, ALL)
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
     assert not (tmp_path / AREA).exists()

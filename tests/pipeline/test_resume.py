@@ -37,7 +37,9 @@ def start(project, data):
 @pytest.fixture(scope="module")
 def bench(smoke, tmp_path_factory):
     """Its server has imported everything and becomes a command in a child: imports are not what is tried here."""
-    bench = torture.Bench(tmp_path_factory.mktemp("torture"), smoke)
+    folder = tmp_path_factory.mktemp("torture")
+    bench = torture.Bench(folder, smoke)
+    assert bench.server.run(["--version"], {}, folder / "said", -1.0) == 0
     yield bench
     bench.close()
 
