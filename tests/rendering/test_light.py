@@ -25,12 +25,8 @@ PLANS = sorted((ASSETS / "scenes").glob("*.toml"))
 
 def court() -> Scene:
     """A square court between four walls of one grey, which is the same from all sides."""
-    walls = [
-        block("east", (8, -9, 0), (9, 9, 8), "grey"),
-        block("west", (-9, -9, 0), (-8, 9, 8), "grey"),
-        block("north", (-8, 8, 0), (8, 9, 8), "grey"),
-        block("south", (-8, -9, 0), (8, -8, 8), "grey"),
-    ]
+    places = (((8, -9, 0), (9, 9, 8)), ((-9, -9, 0), (-8, 9, 8)), ((-8, 8, 0), (8, 9, 8)), ((-8, -9, 0), (8, -8, 8)))
+    walls = [block(f"wall_{k}", low, high, "grey") for k, (low, high) in enumerate(places)]
     ground = block("ground", (-12, -12, -1), (12, 12, 0), "grey")
     return Scene("U_Court_0", (ground, *walls), MATERIALS, np.array([[-12.0] * 3, [12.0] * 3]))
 
@@ -65,15 +61,14 @@ def test_the_suns_of_the_scenes_stand_all_round():
 def test_walls_do_not_tell_north():
     """A linear probe on the brightness of columns, fitted in half of the lights, knows no heading in the others."""
     scene, camera = court(), Camera(32, 32, 90.0)
-    seen, heading = [], []
+    renderer, seen, headings = RayRenderer(scene), [], np.arange(8) * math.pi / 4
     for light in lights():
-        renderer = RayRenderer(replace(scene, sun=light.sun, weather=light.weather))
-        for k in range(8):
-            rgb = renderer.render(camera, view_pose((0.0, 0.0, 3.0), k * math.pi / 4, "front")).rgb
+        renderer.relight(light)
+        for heading in headings:
+            rgb = renderer.render(camera, view_pose((0.0, 0.0, 3.0), heading, "front")).rgb
             seen.append(np.append(rgb.astype(float).mean(axis=(0, 2)) / 255.0, 1.0))
-            heading.append(k * math.pi / 4)
-    x, angle = np.array(seen), np.array(heading)
-    target = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    x = np.array(seen)
+    target = np.tile(np.stack([np.cos(headings), np.sin(headings)], axis=1), (len(PLANS), 1))
     right = []
     for k in range(30):
         train = np.repeat(generator(0, "probe", k).permutation(len(PLANS)) < len(PLANS) // 2, 8)
@@ -85,27 +80,31 @@ def test_walls_do_not_tell_north():
     assert np.mean(right) < 0.08
 
 
-@pytest.mark.parametrize("name", ["pybullet", "gl"])
+@pytest.mark.parametrize("name", ["pybullet", "gl", "rays"])
 def test_a_renderer_that_is_lit_anew_draws_as_one_of_that_light(name):
     scene, camera, pose = court(), Camera(48, 48, 90.0), view_pose((1.0, 1.0, 3.0), 0.5, "front")
-    own = scene_renderer(scene, name).render(camera, pose).rgb
     wet = chosen_light(scene.light, "wet")
-    lit = scene_renderer(scene, name, wet).render(camera, pose).rgb
-    with open_renderer(replace(scene, sun=wet.sun, weather=wet.weather), name) as fresh:
+    with opened(scene, name) as renderer, opened(replace(scene, sun=wet.sun, weather=wet.weather), name) as fresh:
+        own = renderer.render(camera, pose).rgb
+        renderer.relight(wet)
+        assert renderer.light == wet
+        lit = renderer.render(camera, pose).rgb
         assert np.array_equal(lit, fresh.render(camera, pose).rgb)
-    assert not np.array_equal(lit, own)
-    assert np.array_equal(scene_renderer(scene, name).render(camera, pose).rgb, own)
+        assert not np.array_equal(lit, own)
 
 
-def test_rays_that_are_lit_anew_draw_as_those_of_that_light():
+def opened(scene, name):
+    return RayRenderer(scene) if name == "rays" else open_renderer(scene, name)
+
+
+def test_a_scenes_renderer_is_lit_as_is_asked_for_each_time():
     scene, camera, pose = court(), Camera(48, 48, 90.0), view_pose((1.0, 1.0, 3.0), 0.5, "front")
-    renderer, wet = RayRenderer(scene), chosen_light(scene.light, "wet")
-    own = renderer.render(camera, pose).rgb
-    renderer.relight(wet)
-    lit = renderer.render(camera, pose).rgb
-    assert renderer.light == wet
-    assert np.array_equal(lit, RayRenderer(replace(scene, sun=wet.sun, weather=wet.weather)).render(camera, pose).rgb)
-    assert not np.array_equal(lit, own)
+    own, wet, again = (
+        scene_renderer(scene, "gl", light).render(camera, pose).rgb
+        for light in (None, chosen_light(scene.light, "wet"), None)
+    )
+    assert not np.array_equal(wet, own)
+    assert np.array_equal(again, own)
 
 
 def test_drawn_lights_are_those_of_their_key_and_differ():

@@ -8,6 +8,7 @@ from aerialdojo_gen.rendering.orthographic import OrthographicPictures, Plane
 from aerialdojo_gen.scenes.model import Scene
 
 X, Y, Z = np.eye(3)
+RED = 210, 30, 30
 
 
 @pytest.fixture(scope="module")
@@ -30,17 +31,10 @@ def test_the_map_is_where_the_world_is(pictures):
         (a, b), *_ = plane.project([[x, y, 1.0]])
         return picture[int((10 - b) / 0.05), int((a + 10) / 0.05)]
 
-    red, blue, grass = ((210, 30, 30), (40, 70, 190), (140, 140, 140))
-    for x, y, inside in (
-        (5.05, 1.05, True),
-        (5.95, 1.95, True),
-        (4.9, 1.5, False),
-        (6.1, 1.5, False),
-        (5.5, 2.1, False),
-    ):
-        assert looks(red, pixel(x, y)) == inside, (x, y)
-    assert looks(blue, pixel(-2, -5))
-    assert looks(grass, pixel(8.5, 0))
+    assert all(looks(RED, pixel(*inside)) for inside in ((5.05, 1.05), (5.95, 1.95)))
+    assert not any(looks(RED, pixel(*beside)) for beside in ((4.9, 1.5), (6.1, 1.5), (5.5, 2.1)))
+    assert looks((40, 70, 190), pixel(-2, -5)), "the blue cube"
+    assert looks((140, 140, 140), pixel(8.5, 0)), "a wall"
 
 
 def test_what_lies_before_the_plane_is_cut_away(pictures):
@@ -50,7 +44,7 @@ def test_what_lies_before_the_plane_is_cut_away(pictures):
     assert whole.mean() > 2 * opened.mean()
     # Below the red cube's top, above its bottom: it is cut, the ground beside it is not.
     low = pictures.take(Plane(1.5 * Z, X, Y, (5.2, 5.8, 1.2, 1.8)), 0.1)
-    assert all(looks((210, 30, 30), p) for p in low.reshape(-1, 3))
+    assert all(looks(RED, p) for p in low.reshape(-1, 3))
 
 
 def test_the_side_view_fills_the_ground_and_looks_the_right_way(pictures):
@@ -60,7 +54,7 @@ def test_the_side_view_fills_the_ground_and_looks_the_right_way(pictures):
     picture = pictures.take(plane, 0.1)
     earth = picture[-5]
     assert (earth == earth[0]).all()
-    red = [looks((210, 30, 30), p) for p in picture[int((9 - 1.5) / 0.1)]]
+    red = [looks(RED, p) for p in picture[int((9 - 1.5) / 0.1)]]
     columns = np.flatnonzero(red)
     assert columns.min() == pytest.approx((5 + 4) / 0.1, abs=1)
     assert columns.max() == pytest.approx((6 + 4) / 0.1, abs=1)
@@ -69,9 +63,8 @@ def test_the_side_view_fills_the_ground_and_looks_the_right_way(pictures):
 def test_the_suns_shadow_falls_where_rays_say():
     ground = block("ground", (-20, -20, -1), (20, 20, 0), "grey")
     tower = block("tower", (-1, -1, 0), (1, 1, 6), "blue")
-    scene = Scene(
-        "U_Sun_0", (ground, tower), MATERIALS, np.array([[-20.0, -20, 0], [20, 20, 20]]), sun=(0.0, -0.6, 0.8)
-    )
+    bounds = np.array([[-20.0, -20, 0], [20, 20, 20]])
+    scene = Scene("U_Sun_0", (ground, tower), MATERIALS, bounds, sun=(0.0, -0.6, 0.8))
     picture = OrthographicPictures(scene).from_above((-10.0, 10.0, -10.0, 10.0), 0.1)
     grey = picture[..., 0].astype(int)
     # The sun stands in the south at atan(0.8 / 0.6): the tower of 6 m throws 4.5 m of shadow to the north.

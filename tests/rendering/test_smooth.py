@@ -15,29 +15,15 @@ def rows_of(body: Mesh) -> np.ndarray:
     return rows
 
 
-def test_a_ball_is_round_and_a_box_is_not() -> None:
-    ball = rows_of(sphere(radius=1.0))
-    flat = ball["normal"].copy()
+def test_each_group_is_smooth_by_its_own_angle_and_what_has_none_is_flat() -> None:
+    ball, crate = rows_of(sphere(radius=1.0)), rows_of(box(size=[1.0, 2.0, 3.0]))
     two = np.concatenate([ball[::2], ball[1::2]])  # Of two materials
-    smooth(two, np.zeros(len(two), np.int64), np.array([0.7]))
-    for half, before in zip(np.split(two, [len(ball[::2])]), (flat[::2], flat[1::2]), strict=True):
-        out = half["position"] / np.linalg.norm(half["position"], axis=2, keepdims=True)
-        assert (half["normal"] * out).sum(axis=2).min() > 0.99
-        assert (before * out).sum(axis=2).min() < 0.98
-    crate = rows_of(box(size=[1.0, 2.0, 3.0]))
-    before = crate["normal"].copy()
-    smooth(crate, np.zeros(len(crate), np.int64), np.array([0.45]))
-    np.testing.assert_allclose(crate["normal"], before, atol=1e-6)
-
-
-def test_groups_are_smooth_by_themselves_and_what_has_none_is_flat() -> None:
-    ball = rows_of(sphere(radius=1.0))
-    whole, flat = ball.copy(), ball["normal"].copy()
-    smooth(whole, np.zeros(len(ball), np.int64), np.array([0.7]))
-    three = np.concatenate([ball, ball, ball])
-    group = np.repeat(np.array([1, -1, 0]), len(ball))
-    smooth(three, group, np.array([0.7, 0.999]))
-    sharp, none, soft = np.split(three["normal"], 3)
-    np.testing.assert_array_equal(none, flat)
-    np.testing.assert_allclose(sharp, flat, atol=1e-6)
-    np.testing.assert_array_equal(soft, whole["normal"])
+    rows = np.concatenate([ball, ball, two, crate])
+    flat = rows["normal"].copy()
+    smooth(rows, np.repeat([1, -1, 0, 2], [*[len(ball)] * 3, len(crate)]), np.array([0.7, 0.999, 0.45]))
+    soft, others = np.split(np.arange(len(rows)), [2 * len(ball), 3 * len(ball)])[1], np.ones(len(rows), bool)
+    others[soft] = False
+    np.testing.assert_allclose(rows["normal"][others], flat[others], atol=1e-6)
+    out = rows["position"][soft] / np.linalg.norm(rows["position"][soft], axis=2, keepdims=True)
+    assert (rows["normal"][soft] * out).sum(axis=2).min() > 0.99
+    assert (flat[soft] * out).sum(axis=2).min() < 0.98

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from support import handmade
 
+from aerialdojo_gen.rendering.picture import Picture
 from aerialdojo_gen.scenes.model import Instance, Material, Scene
 
 CHECKS = np.kron([[0, 1], [1, 0]], np.ones((8, 8))).astype(np.uint8)
@@ -50,3 +51,8 @@ def boxes_and_a_wall() -> Scene:
         for x in (14, -14) for k in range(200)
     ]  # fmt: skip
     return handmade.scene(wall, *boxes, half=90.0, ceiling=70.0)
+
+
+def same_picture(one: Picture, other: Picture) -> bool:
+    """Whether two pictures are equal to the bit."""
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ("rgb", "depth_m", "instance"))
