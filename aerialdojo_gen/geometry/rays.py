@@ -56,43 +56,23 @@ def _hits(
 
 
 @njit(cache=True, error_model="numpy")
-def _segments(
-    origins: Floats, points: Floats, row: Ints, column: Ints, centre: Floats, tolerance_m: float
-) -> tuple[NDArray[np.int64], Singles, Singles, Singles]:
-    """Rays from rows of origins to rows of points: which are longer than a tolerance, and what Embree wants."""
-    n, k = len(row), 0
-    which, far = np.empty(n, np.int64), np.empty(n, np.float32)
-    start, aim = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-    for i in range(n):
-        o, p = origins[row[i]], points[column[i]]
-        x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
-        away = np.sqrt(x * x + y * y + z * z)
-        if not away > tolerance_m:
-            continue
-        which[k], far[k] = i, away - tolerance_m
-        aim[k, 0], aim[k, 1], aim[k, 2] = x / away, y / away, z / away
-        start[k, 0], start[k, 1], start[k, 2] = o[0] - centre[0], o[1] - centre[1], o[2] - centre[2]
-        k += 1
-    return which[:k], start[:k], aim[:k], far[:k]
-
-
-@njit(cache=True, error_model="numpy")
 def _towards(
-    origins: Floats, points: Floats, centre: Floats, least_m: float
+    origins: Floats, points: Floats, row: Ints, column: Ints, centre: Floats, least_m: float
 ) -> tuple[NDArray[np.int64], Floats, Floats, Singles, Singles]:
-    """Rays to points further away than `least_m`: which, distances, directions, and what Embree wants."""
-    n, k = len(points), 0
+    """Rays between rows of origins and points beyond `least_m`: which, lengths, directions, and Embree's input."""
+    n, k = len(row), 0
     which, length = np.empty(n, np.int64), np.empty(n)
     unit, start, aim = np.empty((n, 3)), np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     for i in range(n):
-        x, y, z = points[i, 0] - origins[i, 0], points[i, 1] - origins[i, 1], points[i, 2] - origins[i, 2]
+        o, p = origins[row[i]], points[column[i]]
+        x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
         away = np.sqrt(x * x + y * y + z * z)
         if not away > least_m:
             continue
         which[k], length[k] = i, away
         unit[k, 0], unit[k, 1], unit[k, 2] = x / away, y / away, z / away
         for a in range(3):
-            aim[k, a], start[k, a] = unit[k, a], origins[i, a] - centre[a]
+            aim[k, a], start[k, a] = unit[k, a], o[a] - centre[a]
         k += 1
     return which[:k], length[:k], unit[:k], start[:k], aim[:k]
 
@@ -147,14 +127,15 @@ class TriangleRayCaster:
         (n,) bool. `ends` names the rows of origins and points that each segment joins, where these are not in pairs.
         """
         if ends is None:
-            o, p = _pairs(origins, points)
-            ends = (np.arange(len(p), dtype=np.int32),) * 2
+            o, p, row = _pairs(origins, points)
+            ends = row, row
         else:
             o, p = np.ascontiguousarray(origins, dtype=np.float64), np.ascontiguousarray(points, dtype=np.float64)
         free = np.ones(len(ends[0]), dtype=np.bool_)
-        far, start, aim, dists = _segments(o, p, *ends, self._centre, tolerance_m)
+        far, length, _, start, aim = _towards(o, p, *ends, self._centre, tolerance_m)
         if len(far):
             # Any hit will do, and Embree need not find the first one: twice as fast as `first_hit`.
+            dists = (length - tolerance_m).astype(np.float32)
             free[far] = np.asarray(self._scene.run(start, aim, dists=dists, query="OCCLUDED")) < 0
         return free
 
@@ -162,8 +143,8 @@ class TriangleRayCaster:
         self, origins: ArrayLike, points: ArrayLike, least_m: float
     ) -> tuple[NDArray[np.int64], Floats, Floats, Ints]:
         """First hit towards points further than `least_m`: which (k,), and length, distance and face of the hit."""
-        o, p = _pairs(origins, points)
-        far, length, unit, start, aim = _towards(o, p, self._centre, least_m)
+        o, p, row = _pairs(origins, points)
+        far, length, unit, start, aim = _towards(o, p, row, row, self._centre, least_m)
         if not len(far):
             return far, length, np.zeros(0), np.zeros(0, np.int32)
         hit = self._scene.run(start, aim, output=True)
@@ -171,9 +152,10 @@ class TriangleRayCaster:
         return far, length, *_hits(hit["primID"], hit["tfar"], origin, unit, self._corner, self._normal, self._face)
 
 
-def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats]:
+def _pairs(origins: ArrayLike, points: ArrayLike) -> tuple[Floats, Floats, Ints]:
     o, p = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(points, dtype=np.float64))
-    return np.ascontiguousarray(np.atleast_2d(o)), np.ascontiguousarray(np.atleast_2d(p))
+    o, p = np.ascontiguousarray(np.atleast_2d(o)), np.ascontiguousarray(np.atleast_2d(p))
+    return o, p, np.arange(len(p), dtype=np.int32)
 
 
 class RayCaster:

@@ -1,4 +1,4 @@
-"""The certificate of a route: its sweep touches no surface, and its smallest clearance.
+"""What certifies a route: its sweep touches no surface, and its smallest clearance is known.
 
 Every leg is checked by FCL as a capsule, the exact sweep of the body, except where the clearance grid proves it free:
 the grid's distances are lower bounds of FCL's, and the tests check that on random segments.
@@ -6,26 +6,14 @@ the grid's distances are lower bounds of FCL's, and the tests check that on rand
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerialdojo_gen.base.kernels import njit
-from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, polyline_clearance, segment_free
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """Collision check and clearance of a route."""
-
-    collision_free: bool  # It touches no surface and stays in the flight volume
-    min_clearance_m: float  # Smallest distance from the centre line to any surface, metres, up to the grid's `cap_m`
-    legs: int  # Straight legs of the route, and how many of them FCL checked
-    fcl_checks: int
 
 
 class ClearanceProfile(NamedTuple):
@@ -86,23 +74,9 @@ def clearance_profile(points: NDArray[np.float64], radius: float, bound: float, 
     )
 
 
-def certify(
-    points: NDArray[np.float64], radius_m: float, grid: ClearanceGrid, world: CollisionWorld, prove: bool = True
-) -> Certificate:
-    """Certify a route's points (n, 3), world metres; FCL checks every leg that the grid does not prove free."""
-    profile = clearance_profile(np.ascontiguousarray(points, np.float64), radius_m, grid.cap_m, grid.arrays)
-    return certify_profile(profile, radius_m, world, prove)
-
-
-def certify_profile(profile: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool) -> Certificate:
-    """Check by FCL the legs that a profile leaves undecided; with `prove` False, every leg."""
-    p = profile.corners
-    legs = max(1, len(p) - 1)
-    if not profile.inside:
-        return Certificate(False, profile.clearance, legs, 0)
-    fcl_checks = 0
-    for i in np.flatnonzero(profile.undecided) if prove else range(legs):
-        fcl_checks += 1
-        if world.segment_in_collision(p[i], p[min(i + 1, len(p) - 1)], radius_m):
-            return Certificate(False, profile.clearance, legs, fcl_checks)
-    return Certificate(True, profile.clearance, legs, fcl_checks)
+def certify(profile: ClearanceProfile, radius_m: float, world: CollisionWorld, prove: bool = True) -> bool:
+    """Whether a route stays in the flight volume and touches nothing: FCL decides the undecided legs, or all."""
+    p, legs = profile.corners, np.flatnonzero(profile.undecided | np.bool_(not prove)).tolist()
+    return profile.inside and not any(
+        world.segment_in_collision(p[i], p[min(i + 1, len(p) - 1)], radius_m) for i in legs
+    )

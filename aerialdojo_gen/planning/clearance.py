@@ -17,46 +17,39 @@ from aerialdojo_gen.planning.bvh import build_bvh, crossings_above, point_distan
 from aerialdojo_gen.planning.bvh_groups import group_boxes
 from aerialdojo_gen.planning.connectivity import connected_with_ceiling, passable_moves, reaches_marked_cell
 from aerialdojo_gen.planning.distance_field import build_distance_field
-from aerialdojo_gen.planning.grid_kernels import GridArrays, inside, segment_free
+from aerialdojo_gen.planning.grid_kernels import GridArrays, inside
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Scene
 
 # Longer triangles are split: their bounding boxes would be mostly empty.
 _LONGEST_EDGE_M = 4.0
+# Distances are exact up to this.
+_BAND_M = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class _SolidSpace:
-    """The part of a `ClearanceGrid` that does not depend on the margin; attributes as there."""
-
-    arrays: GridArrays
-    ground: Ground | None
-    has_curtain: bool
-
-    @classmethod
-    def build(
-        cls, scene: Scene, cell_m: float, radius_m: float, band_m: float, cap_m: float, closed_ground: bool
-    ) -> _SolidSpace:
-        low, high = np.asarray(scene.bounds, np.float64)
-        reach = cap_m + 1.0
-        parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
-        triangles = np.concatenate(parts) if parts else np.empty((0, 9))
-        triangles, _ = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
-        real, real_boxes, _ = build_bvh(triangles)
-        ground = Ground.of(scene, radius_m) if closed_ground else None
-        curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
-        solid, boxes = real, real_boxes
-        if len(curtain):
-            curtain, _ = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
-            solid, boxes, _ = build_bvh(np.concatenate([triangles, curtain]))
-        nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
-        # The bound beyond the band needs at least half a cell's diagonal.
-        band_m = max(band_m, 0.87 * cell_m)
-        field = build_distance_field(solid, low, (nx, ny, nz), cell_m, band_m, cap_m)
-        arrays = GridArrays(
-            field, low.copy(), cell_m, solid, group_boxes(boxes), real, real_boxes, low + radius_m, high - radius_m
-        )
-        return cls(arrays, ground, len(curtain) > 0)
+def _distances(
+    scene: Scene, cell_m: float, radius_m: float, cap_m: float, closed_ground: bool
+) -> tuple[GridArrays, Ground | None, bool]:
+    """The part of a `ClearanceGrid` that does not depend on the margin: its arrays, ground and `has_curtain`."""
+    low, high = np.asarray(scene.bounds, np.float64)
+    reach = cap_m + 1.0
+    parts = [i.vertices[i.faces].reshape(-1, 9) for i in scene.instances]
+    triangles = np.concatenate(parts) if parts else np.empty((0, 9))
+    triangles, _ = split_triangles(triangles, _LONGEST_EDGE_M, low - reach, high + reach)
+    real, real_boxes, _ = build_bvh(triangles)
+    ground = Ground.of(scene, radius_m) if closed_ground else None
+    curtain = np.empty((0, 9)) if ground is None else ground.curtain(low, high, radius_m)
+    solid, boxes = real, real_boxes
+    if len(curtain):
+        curtain, _ = split_triangles(curtain, _LONGEST_EDGE_M, low - reach, high + reach)
+        solid, boxes, _ = build_bvh(np.concatenate([triangles, curtain]))
+    nx, ny, nz = (max(1, int(n)) for n in np.ceil((high - low) / cell_m - 1e-9))
+    # The bound beyond the band needs at least half a cell's diagonal.
+    field = build_distance_field(solid, low, (nx, ny, nz), cell_m, max(_BAND_M, 0.87 * cell_m), cap_m)
+    arrays = GridArrays(
+        field, low.copy(), cell_m, solid, group_boxes(boxes), real, real_boxes, low + radius_m, high - radius_m
+    )
+    return arrays, ground, len(curtain) > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,47 +66,36 @@ class ClearanceGrid:
 
     @classmethod
     def build(
-        cls,
-        scene: Scene,
-        cell_m: float = 0.5,
-        radius_m: float = RADIUS_M,
-        band_m: float = 1.0,
-        cap_m: float = 5.0,
-        margin_m: float = 0.0,
+        cls, scene: Scene, cell_m: float = 0.5, radius_m: float = RADIUS_M, cap_m: float = 5.0, margin_m: float = 0.0,
         closed_ground: bool = True,
-    ) -> ClearanceGrid:
+    ) -> ClearanceGrid:  # fmt: skip
         """Build the grid over a scene's flight volume (metres); it depends on the scene and the parameters alone."""
-        space = _SolidSpace.build(scene, cell_m, radius_m, band_m, cap_m, closed_ground)
-        return cls._with_radius(space, radius_m + margin_m, cap_m)
+        return cls._with_radius(_distances(scene, cell_m, radius_m, cap_m, closed_ground), radius_m + margin_m, cap_m)
 
     @classmethod
     def of(
-        cls,
-        scene: Scene,
-        cell_m: float = 0.5,
-        radius_m: float = RADIUS_M,
-        band_m: float = 1.0,
-        cap_m: float = 5.0,
-        margin_m: float = 0.0,
+        cls, scene: Scene, cell_m: float = 0.5, radius_m: float = RADIUS_M, cap_m: float = 5.0, margin_m: float = 0.0,
         closed_ground: bool = True,
-    ) -> ClearanceGrid:
+    ) -> ClearanceGrid:  # fmt: skip
         """Return the scene context's grid, by the parameters of `build`; other parameters replace it.
 
         The distance field is a part of its own: grids of another margin share it.
         """
-        context, key = context_of(scene), (cell_m, radius_m, band_m, cap_m, closed_ground)
+        context, key = context_of(scene), (cell_m, radius_m, cap_m, closed_ground)
 
         def make() -> ClearanceGrid:
-            space = context.part("clearance space", lambda: _SolidSpace.build(scene, *key), key)
-            return cls._with_radius(space, radius_m + margin_m, cap_m)
+            made = context.part("clearance space", lambda: _distances(scene, *key), key)
+            return cls._with_radius(made, radius_m + margin_m, cap_m)
 
         return context.part("clearance grid", make, (key, margin_m))
 
     @classmethod
-    def _with_radius(cls, space: _SolidSpace, radius_m: float, cap_m: float) -> ClearanceGrid:
-        moves = passable_moves(space.arrays, radius_m)
-        sky = connected_with_ceiling(moves)
-        return cls(space.arrays, moves, sky, radius_m, cap_m, space.ground, space.has_curtain)
+    def _with_radius(
+        cls, made: tuple[GridArrays, Ground | None, bool], radius_m: float, cap_m: float
+    ) -> ClearanceGrid:
+        arrays, ground, has_curtain = made
+        moves = passable_moves(arrays, radius_m)
+        return cls(arrays, moves, connected_with_ceiling(moves), radius_m, cap_m, ground, has_curtain)
 
     def distance_m(self, points: ArrayLike) -> NDArray[np.float64]:
         """Exact distances (n,), metres, from points (n, 3) or (3,) to the nearest surface, up to `cap_m`."""
@@ -140,12 +122,3 @@ class ClearanceGrid:
     def below_ground(self, points: ArrayLike) -> bool:
         """Whether any of some points, (n, 3) float metres, lies below open ground; (3,) is one."""
         return self.ground is not None and bool(self.ground.below(points).any())
-
-    def segment_proven_free(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether the grid alone proves that a ball moving from `p` to `q` touches nothing; False is undecided."""
-        return bool(segment_free(*np.asarray(p, np.float64), *np.asarray(q, np.float64), radius_m, self.arrays, True))
-
-    def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
-        """Whether a ball moving from `p` to `q` touches a surface, exact by the triangles."""
-        a, b = np.asarray(p, np.float64), np.asarray(q, np.float64)
-        return not bool(segment_free(*a, *b, radius_m, self.arrays, False))

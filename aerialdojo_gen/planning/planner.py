@@ -14,7 +14,7 @@ from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
 from aerialdojo_gen.base.constants import RADIUS_M
 from aerialdojo_gen.geometry.motion import TURN_RAD, nearest_heading
 from aerialdojo_gen.planning.attempt import costs_at, lengths_at, plan_once
-from aerialdojo_gen.planning.certify import certify_profile
+from aerialdojo_gen.planning.certify import certify
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.planning.column_lanes import MIN_CELLS
@@ -295,13 +295,12 @@ class Planner:
             expansions += result.expansions
             if result.status != FOUND:
                 continue
-            certificate = certify_profile(result.profile, self.radius_m, self.world, c.prove_by_grid)
             # The curtain hangs from the rim only; holes in the ground have none.
             if g.has_curtain and g.below_ground(result.poses[:, :3]):
                 continue
-            if certificate.collision_free:
+            if certify(result.profile, self.radius_m, self.world, c.prove_by_grid):
                 return Route(
-                    "SOLVED", result.poses, result.actions, result.length, expansions, certificate.min_clearance_m,
+                    "SOLVED", result.poses, result.actions, result.length, expansions, result.profile.clearance,
                     value, number,
                 )  # fmt: skip
         outcome = "NO_PATH" if result.status == EXHAUSTED else "BUDGET_EXHAUSTED"

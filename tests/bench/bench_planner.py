@@ -21,7 +21,7 @@ from support.flying import turned
 from support.handmade import box, instance
 
 from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
-from aerialdojo_gen.planning.certify import certify
+from aerialdojo_gen.planning.certify import certify, clearance_profile
 from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.planning.planner import Planner
@@ -120,8 +120,10 @@ def main() -> None:
         for r in found:
             if r.outcome == "SOLVED":
                 t = clock()
-                c = certify(r.poses[:, :3], RADIUS, planner.grid, collisions)
-                certificates.append((clock() - t, c.legs, c.fcl_checks))
+                points, grid = np.ascontiguousarray(r.poses[:, :3]), planner.grid
+                profile = clearance_profile(points, RADIUS, grid.cap_m, grid.arrays)
+                assert certify(profile, RADIUS, collisions)
+                certificates.append((clock() - t, len(profile.undecided), profile.undecided.sum()))
         if options.exact:
             some = [i for i, r in enumerate(found) if r.outcome == "SOLVED"][: options.exact]
             for i, b in zip(some, exact.plan_target(goal, starts[some]), strict=True):

@@ -9,7 +9,8 @@ from support.handmade import box, instance, scene
 
 from aerialdojo_gen.planning.attempt import lengths_at
 from aerialdojo_gen.planning.clearance import ClearanceGrid
-from aerialdojo_gen.planning.connectivity import MOVE_LENGTHS, MOVES
+from aerialdojo_gen.planning.column_kernels import move_lengths
+from aerialdojo_gen.planning.connectivity import MOVES
 from aerialdojo_gen.planning.cost_to_go import columns_by_distance, cost_at, expand_cost, seed_goal
 from aerialdojo_gen.planning.preference import NO_PREFERENCE, Preference, clearance_cost_field
 
@@ -23,44 +24,39 @@ def field(grid, goal, bound=200.0, prefer=NO_PREFERENCE):
     return cost, seeds, visits
 
 
+def small_town(ceiling):
+    grid = ClearanceGrid.build(town(half=12.0, ceiling=ceiling, n=16))
+    return grid, next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
+
+
 @pytest.mark.parametrize("prefer", [NO_PREFERENCE, Preference(1.0, 2.0, 0.5, 3.0)])
 @pytest.mark.parametrize("ceiling", [6.0, 8.0, 13.0])
-def test_it_is_dijkstras_on_the_same_graph(prefer, ceiling):
+def test_it_is_dijkstras_on_the_same_graph_to_the_bit(prefer, ceiling):
     """Visits to columns, lower and higher than a group of cells, against scipy's heap over every passable move."""
-    grid = ClearanceGrid.build(town(half=12.0, ceiling=ceiling, n=16))
-    goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
+    grid, goal = small_town(ceiling)
     cost, seeds, _ = field(grid, goal, prefer=prefer)
-    clearance_cost = clearance_cost_field(grid.arrays.field, prefer).ravel()
-    shape = grid.moves.shape
-    n = grid.moves.size
-    i, j, k = np.indices(shape).reshape(3, -1)
-    rows, columns, lengths = [], [], []
-    for m, (dx, dy, dz) in enumerate(MOVES):
-        has = ((grid.moves.ravel() >> np.uint32(m)) & 1).astype(bool)
-        rows.append(np.flatnonzero(has))
-        columns.append(np.ravel_multi_index((i[has] + dx, j[has] + dy, k[has] + dz), shape))
-        lengths.append(MOVE_LENGTHS[m] * grid.arrays.cell * (1.0 + clearance_cost[has]))
-    again = np.full(shape, np.inf, np.float32)
+    clearance_cost = clearance_cost_field(grid.arrays.field, prefer)
+    again = np.full(cost.shape, np.inf, np.float32)
     seed_goal(*goal, 0.0, 1.0, grid.radius_m, grid.arrays, grid.moves, again, prefer)
-    source = np.full(len(seeds), n)
-    rows.append(source)
-    columns.append(seeds)
-    lengths.append(again.ravel()[seeds] + 1e-9)
+    lengths, factors = (values.astype(float) for values in move_lengths(grid.arrays.cell))
+    # From a node of its own the seeds are as far as they are from the goal.
+    rows, columns, costs = [np.full(len(seeds), cost.size)], [seeds], [again.ravel()[seeds]]
+    for m, move in enumerate(MOVES):
+        cells = np.argwhere(grid.moves >> np.uint32(m) & 1)
+        rows.append(np.ravel_multi_index(cells.T, cost.shape))
+        columns.append(np.ravel_multi_index((cells + move).T, cost.shape))
+        costs.append(lengths[m] + factors[m] * clearance_cost[tuple(cells.T)])
     graph = coo_array(
-        (np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns))), shape=(n + 1, n + 1)
-    ).tocsr()
-    expected = dijkstra(graph, indices=n)[:n].reshape(shape)
-    assert (np.isfinite(expected) == np.isfinite(cost)).all()
-    finite = np.isfinite(expected)
-    assert finite.mean() > 0.5
-    # Move lengths are rounded to 2^-12 m, and a path has a few hundred of them; what narrowness adds, to a hundredth.
-    assert np.abs(expected[finite] - cost[finite]).max() < (0.02 if prefer.weight == 0.0 else 0.1)
+        (np.concatenate(costs), (np.concatenate(rows), np.concatenate(columns))), shape=[cost.size + 1] * 2
+    )
+    expected = dijkstra(graph.tocsr(), indices=cost.size)[:-1].reshape(cost.shape)
+    assert np.isfinite(expected).mean() > 0.5
+    assert (expected == cost).all()
 
 
 def test_what_is_not_metres_is_told_apart():
     """A cheapest path is no shorter than the shortest, and no dearer than the shortest is when it is paid for."""
-    grid, prefer = ClearanceGrid.build(town(half=12.0, ceiling=8.0, n=16)), Preference(1.0, 1.0, 0.5, 3.0)
-    goal = next(p for p in [(0.1, 0.2, 1.4), (4, 4, 1.4), (-7, 2, 3.4)] if grid.reachable(p))
+    (grid, goal), prefer = small_town(8.0), Preference(1.0, 1.0, 0.5, 3.0)
     plain, _, _ = field(grid, goal)
     cost, _, _ = field(grid, goal, prefer=prefer)
     clearance_cost = clearance_cost_field(grid.arrays.field, prefer)
@@ -94,32 +90,16 @@ def test_in_the_open_it_is_the_action_metric_up_to_the_grids_directions():
     assert (value[far] <= metric[far] * 1.028 + 0.1).all()
 
 
-def test_a_sealed_box_is_never_entered():
-    walls = [box((2, 2, -0.1), (8, 2.2, 4)), box((2, 7.8, -0.1), (8, 8, 4)), box((2, 2, -0.1), (2.2, 8, 4)),
-             box((7.8, 2, -0.1), (8, 8, 4)), box((2, 2, 3.8), (8, 8, 4))]  # fmt: skip
-    grid = ClearanceGrid.build(scene(instance("room", *walls)))
-    cost, _, _ = field(grid, (5.0, 5.0, 1.5))
-    inside = cost[np.isfinite(cost)]
-    assert len(inside) > 100
-    assert inside.max() < 12
-    assert not np.isfinite(cost_at(0.0, 0.0, 1.5, grid.arrays, cost))
-
-
-def test_the_bound_is_kept_and_what_lies_within_is_final():
+def test_the_bound_is_kept_and_in_the_open_a_column_is_visited_once():
     grid = ClearanceGrid.build(scene(half=20.0, ceiling=10.0))
-    full, _, _ = field(grid, (0.0, 0.0, 3.0))
-    some, _, _ = field(grid, (0.0, 0.0, 3.0), bound=8.0)
+    full, _, visits = field(grid, (0.3, 0.2, 3.0))
+    reached = np.isfinite(full).any(axis=2).sum()
+    assert reached <= visits <= 1.03 * reached
+    some, _, _ = field(grid, (0.3, 0.2, 3.0), bound=8.0)
     assert (some[full <= 8.0] == full[full <= 8.0]).all()
     # Beyond the bound only the vertical goes on, in columns that hold something within it.
     beyond = np.isfinite(some) & (some > 8.0)
     assert (some.min(axis=2)[beyond.any(axis=2)] <= 8.0).all()
-
-
-def test_in_the_open_a_column_is_visited_once():
-    grid = ClearanceGrid.build(scene(half=20.0, ceiling=10.0))
-    cost, _, visits = field(grid, (0.3, 0.2, 3.0))
-    reached = np.isfinite(cost).any(axis=2).sum()
-    assert reached <= visits <= 1.03 * reached
 
 
 def test_ways_back_round_a_wall_are_found():

@@ -46,9 +46,8 @@ def built():
 
 @pytest.fixture(scope="module")
 def empty():
-    return Planner(
-        scene(half=60.0, ceiling=50.0), PlanConfig(clearance_weight=0.0, max_approach_angle_deg=180.0), RADIUS
-    )
+    config = PlanConfig(clearance_weight=0.0, max_approach_angle_deg=180.0)
+    return Planner(scene(half=60.0, ceiling=50.0), config, RADIUS)
 
 
 def test_direct_ways_are_free_end_at_the_goal_and_cost_what_they_say(built):
@@ -62,15 +61,11 @@ def test_direct_ways_are_free_end_at_the_goal_and_cost_what_they_say(built):
         found += 1
         points = np.vstack([corners_of(start, legs), goal[:3]])
         assert not built.world.route_in_collision(points, RADIUS)
-        way = points[-1] - points[-2]
+        way, a = points[-1] - points[-2], built.grid.arrays
         gap = float(np.linalg.norm(way))
         assert gap <= APPROACH_M
-        a = built.grid.arrays
-        paid = (
-            sum(m for _, m in legs)
-            + gap
-            + approach_penalty(*way[:2], goal[3], gap, PREFER.ahead_cos, PREFER.approach_penalty)
-        )
+        paid = sum(m for _, m in legs) + gap
+        paid += approach_penalty(*way[:2], goal[3], gap, PREFER.ahead_cos, PREFER.approach_penalty)
         paid += sum(
             clearance_penalty(*p, *q, PREFER.clearance, PREFER.weight, *a.origin, a.cell, a.field)
             for p, q in pairwise(points)
@@ -87,12 +82,7 @@ def metres(low, high):
 @settings(max_examples=60, deadline=None)
 @example((1.0, 0.0, 2.0), (0.0, 0.0, 2.0), 0.0, -1.0)  # Backwards onto the goal: what is left has no direction
 @example((0.0, -18.03125, 2.0), (15.210938, -10.703125, 2.0), 0.0, 0.0)  # An Approach between two directions
-@given(
-    st.tuples(*[metres(-40, 40)] * 2, metres(2, 40)),
-    st.tuples(*[metres(-40, 40)] * 2, metres(2, 40)),
-    st.floats(-3, 3),
-    st.floats(-3, 3),
-)
+@given(*[st.tuples(metres(-40, 40), metres(-40, 40), metres(2, 40))] * 2, *[st.floats(-3, 3)] * 2)
 def test_in_the_open_no_way_along_those_headings_is_cheaper(empty, p, q, yaw, goal_yaw):
     start, goal = (*p, yaw), (*q, goal_yaw)
     prefer = PREFER._replace(weight=0.0)

@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from support.flying import town
+from support.flying import free_poses
 
-from aerialdojo_gen.base.config.sections import PlanConfig
 from aerialdojo_gen.planning.column_kernels import QUANTUM_M
 from aerialdojo_gen.planning.field_cache import FieldCache
-from aerialdojo_gen.planning.planner import Planner
 
 FIELDS = arrays.arrays(
     np.float32,
@@ -43,20 +41,13 @@ def test_no_more_is_kept_than_there_is_room_for():
     assert there == [True, True, True, False, False]
 
 
-@pytest.fixture(scope="module")
-def planner():
-    return Planner(town(), PlanConfig(), 0.25)
-
-
 @pytest.mark.parametrize("room", [(0.0, 0.0), (0.0, 50.0), (1000.0, 0.0)])
-def test_routes_are_the_same_however_fields_are_kept(planner, room):
-    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
-    rng = np.random.default_rng(5)
-    points = rng.uniform([*low, -3.0], [*high, 3.0], (200, 4))
-    free = [p for p in points if planner.grid.distance_m(p[:3]) > 0.3 and planner.grid.reachable(p[:3])]
-    goals, starts = free[:3], np.array(free[3:15])
+def test_routes_are_the_same_however_fields_are_kept(planned, room):
+    planner = planned.planner
+    goal, *others, level = free_poses(planner.grid, np.random.default_rng(5), 16)
     # A goal of the same place that faces elsewhere is another goal, and so is one above it.
-    goals += [goals[0] + [0, 0, 0, 3.0], goals[0] + [0, 0, 0.5, 0]]
+    moved = np.array([[0, 0, 0, 0], [0, 0, 0, 3.0], [0, 0, 0.5, 0]])
+    goals, starts = [level, *(goal + moved)], np.array(others)
     assert not planner.grid.in_collision(goals[-1][:3])
     expected = [planner.plan_target(goal, starts) for goal in goals]
     with planner.keeping_fields(*room):

@@ -8,7 +8,16 @@ import numpy as np
 import trimesh
 from support.handmade import box, instance, mesh_of, scene
 
+from aerialdojo_gen.base.config.sections import PlanConfig, SearchAttempt
+from aerialdojo_gen.planning.clearance import ClearanceGrid
 from aerialdojo_gen.scenes.model import Scene
+
+# Metres alone, the fewest there are: the control that preferences are seen against.
+METRES = PlanConfig(
+    clearance_weight=0.0,
+    max_approach_angle_deg=180.0,
+    ladder=(SearchAttempt(weight=1.05, budget=20_000, tolerance_growth_m=0.0),),
+)
 
 
 def turned(mesh: trimesh.Trimesh, angle: float, at: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -58,3 +67,14 @@ def along(points: np.ndarray, spacing: float) -> np.ndarray:
         n = max(1, int(np.ceil(np.linalg.norm(q - p) / spacing)))
         pieces.append(p + (q - p) * (np.arange(1, n + 1) / n)[:, None])
     return np.concatenate(pieces)
+
+
+def free_poses(grid: ClearanceGrid, rng: np.random.Generator, n: int, room_m: float = 0.4) -> list[np.ndarray]:
+    """Draw poses up to 7 m high that have some room and are connected with the sky."""
+    low, high = grid.arrays.lower, np.minimum(grid.arrays.upper, [np.inf, np.inf, 7.0])
+    found: list[np.ndarray] = []
+    while len(found) < n:
+        pose = rng.uniform([*low, -np.pi], [*high, np.pi])
+        if grid.distance_m(pose[:3]) > room_m and grid.reachable(pose[:3]):
+            found.append(pose)
+    return found
