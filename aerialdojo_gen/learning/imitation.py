@@ -39,35 +39,17 @@ class Progress:
     sums: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
-class Epoch:
-    """What came of an epoch: loss and accuracy of choices given the goal's place, and what `Learner.assess` finds."""
-
-    phase: int
-    number: int
-    loss: float
-    accuracy: float
-    held_out: Assessment | None
-    left_s: float
-
-
-@dataclass(frozen=True)
-class Assessment:
-    """How well a network does on steps that it was not trained on."""
-
-    accuracy: float
-    goal_off_m: float  # Median distance between where the goal is and where it is thought to be, metres
-    goal_off_at_start_m: float  # That at the first steps of episodes
-    blocked_told: float | None
-    free_told: float | None
+# How well a network does on steps that it was not trained on: share of right actions, how far off it thinks goals are
+# (metres, medians over all steps and over first ones), and the shares of blocked and of free actions told.
+Assessment = dict[str, float | None]
 
 
 @dataclass(frozen=True)
 class TrainingLog:
-    """Receives a training's progress."""
+    """Receives a training's progress; loss and accuracy are of choices given the goal's place."""
 
     on_batch: Callable[[int, int, float, float], None]  # Batches done and in all, loss, accuracy
-    on_epoch: Callable[[Epoch], None]
+    on_epoch: Callable[[dict[str, Any], float], None]  # The epoch's line of the history, and seconds left
 
 
 def epoch_batches(
@@ -189,9 +171,10 @@ class Learner:
                 p.sums = [a + b for a, b in zip(p.sums, (loss * n, right, n), strict=True)]
                 log.on_batch(done, total, loss, right / max(n, 1))
             left_s = (time.monotonic() - started) / max(done - first, 1) * (total - done)
-            sums, number, n_all = p.sums, p.epoch, max(p.sums[2], 1.0)
+            mean_loss, accuracy = (value / max(p.sums[2], 1.0) for value in p.sums[:2])
+            row: dict[str, Any] = {"phase": p.phase, "epoch": p.epoch, "loss": mean_loss, "accuracy": accuracy}
             p.epoch, p.batch, p.sums = p.epoch + 1, 0, [0.0, 0.0, 0.0]
-            log.on_epoch(Epoch(p.phase, number, sums[0] / n_all, sums[1] / n_all, assess(), left_s))
+            log.on_epoch(row | {"kept_back": assess()}, left_s)
 
     def assess(self, pool: Pool, frames: Any, chosen: NDArray[np.bool_]) -> Assessment | None:
         """See how well the network does on some episodes; None without any."""
@@ -214,7 +197,8 @@ class Learner:
         median = [float(self.torch.cat(one).median()) for one in (off, first)]
         rates = [self.torch.cat(one).float() for one in (blocked_at, free)]
         shares = [float(one.mean()) if len(one) else None for one in rates]
-        return Assessment(float(self.torch.cat(right).float().mean()), *median, *shares)
+        names = ("accuracy", "goal_off_m", "goal_off_at_start_m", "blocked_told", "free_told")
+        return dict(zip(names, (float(self.torch.cat(right).float().mean()), *median, *shares), strict=True))
 
     def rate(self, done: int, total: int, highest: float) -> float:
         """Learning rate after so many of all batches of a phase."""

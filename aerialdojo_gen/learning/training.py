@@ -40,7 +40,7 @@ from aerialdojo_gen.store.files import file_digest
 from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
 
 if TYPE_CHECKING:
-    from aerialdojo_gen.learning.imitation import Assessment, Epoch, TrainingLog
+    from aerialdojo_gen.learning.imitation import TrainingLog
 
 _SETTINGS, _CHECKPOINT, _HISTORY = "training.json", "checkpoint.safetensors", "history.jsonl"
 # Seconds between progress lines.
@@ -302,15 +302,12 @@ class _Training:
             if now - self._kept >= self._recipe.train.checkpoint_s:
                 self._save_checkpoint()
 
-        def on_epoch(epoch: Epoch) -> None:
-            k = epoch.held_out
-            kept = "" if k is None else f" (kept back: {_describe(k)})"
+        def on_epoch(row: dict[str, Any], left_s: float) -> None:
+            kept = f" (kept back: {_describe(row['kept_back'])})" if row["kept_back"] else ""
             self._reporter.line(
-                f"{what}: epoch {epoch.number + 1} of {epochs}, loss {epoch.loss:.3f}, accuracy "
-                f"{epoch.accuracy:.1%}{kept}, {duration(epoch.left_s)} left"
+                f"{what}: epoch {row['epoch'] + 1} of {epochs}, loss {row['loss']:.3f}, accuracy "
+                f"{row['accuracy']:.1%}{kept}, {duration(left_s)} left"
             )
-            row = {"phase": epoch.phase, "epoch": epoch.number, "loss": epoch.loss, "accuracy": epoch.accuracy,
-                   "kept_back": None if k is None else asdict(k)}  # fmt: skip
             with (self._folder / _HISTORY).open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
             self._save_checkpoint()
@@ -364,13 +361,13 @@ def _rows(file: Path) -> Iterator[dict[str, Any]]:
             return
 
 
-def _describe(kept: Assessment) -> str:
-    """Describe the accuracy on what was not trained on."""
-    shares = [(kept.blocked_told, "blocked"), (kept.free_told, "free")]
+def _describe(kept: dict[str, Any]) -> str:
+    """Describe an `Assessment`: the accuracy on what was not trained on."""
+    shares = [(kept["blocked_told"], "blocked"), (kept["free_told"], "free")]
     known = [f"{share:.1%} of {what}" for share, what in shares if share is not None]
     suffix = f"; {' and '.join(known)} actions told" if known else ""
-    off = f"{kept.goal_off_at_start_m:.1f} m at the start, {kept.goal_off_m:.1f} m in all"
-    return f"{kept.accuracy:.1%}; goal off by {off}{suffix}"
+    off = f"{kept['goal_off_at_start_m']:.1f} m at the start, {kept['goal_off_m']:.1f} m in all"
+    return f"{kept['accuracy']:.1%}; goal off by {off}{suffix}"
 
 
 def _tensorboard(folder: Path) -> Any:

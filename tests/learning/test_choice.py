@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.trainings import network, train_here
 
 from aerialdojo_gen.base.config.shared import Embodiment
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
@@ -17,8 +18,6 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
 from aerialdojo_gen.learning.collect import parts_of  # noqa: E402
-from aerialdojo_gen.learning.policy import network_of  # noqa: E402
-from aerialdojo_gen.learning.training import train  # noqa: E402
 
 # The map learns nothing: where the goal is, is told or not known at all.
 RECIPE = Recipe.model_validate({
@@ -30,22 +29,22 @@ RECIPE = Recipe.model_validate({
 })  # fmt: skip
 
 
-def flown(root, network, sensors, index, k, led):
+def flown(root, net, sensors, index, k, led):
     """Fly a task, told the goal's offset at every step or not; say whether it ends at the goal."""
     episode = Episode(
         flight_space(*mesh_of(root, index.scenes[0]), Embodiment().radius_m), tuple(index.start[k].tolist()),
         tuple(index.goal[k].tolist()), int(index.budget[k]),
     )  # fmt: skip
     (part,) = parts_of(root, index.take(np.array([k])), root.path, (("id_test",), ()), sensors, 32, 0, "gl")
-    reckoning, goal, memory = DeadReckoning(), torch.zeros(1, network.shape.features), network.blank(1)
+    reckoning, goal, memory = DeadReckoning(), torch.zeros(1, net.shape.features), net.blank(1)
     step = torch.ones((1, 1), dtype=torch.bool)
     while episode.termination is None:
         pose = np.array([[*episode.position, episode.yaw_rad]])
-        seen = network.features(torch.from_numpy(pictures(part, pose)), goal, step)
-        guess, memory = network.whereabouts(seen, goal, torch.from_numpy(reckoning.odometry[None, None]), memory)
+        seen = net.features(torch.from_numpy(pictures(part, pose)), goal, step)
+        guess, memory = net.whereabouts(seen, goal, torch.from_numpy(reckoning.odometry[None, None]), memory)
         if led:
             guess = guess.with_goal_offset(torch.from_numpy(offsets(pose, index.goal[k : k + 1]))[None])
-        action = int(network.choose(seen, guess).actions(torch.from_numpy(reckoning.back[None, None]))[0, 0])
+        action = int(net.choose(seen, guess).actions(torch.from_numpy(reckoning.back[None, None]))[0, 0])
         episode.step(action)
         reckoning.add(action, episode.refused)
     return episode.success(3.0)
@@ -54,13 +53,12 @@ def flown(root, network, sensors, index, k, led):
 @pytest.mark.nightly
 def test_told_where_goals_are_it_flies_there_though_its_map_knows_nothing(smoke, tmp_path):
     root = open_root(smoke)
-    done = train(smoke, RECIPE, out=tmp_path / "out", cache=tmp_path / "cache", device="cpu", workers=1)
-    tensors, about, _ = checkpoints.read(done.policy)
-    network = network_of(about, tensors, "weights").eval()
+    policy = train_here(smoke, RECIPE, tmp_path / "out", tmp_path / "cache").policy
+    net, about = network(policy), checkpoints.read(policy)[1]
     index = read_index(root, Selection(("id_test",)))
     rows = np.linspace(0, len(index) - 1, min(len(index), 40)).astype(int)
     with torch.inference_mode():
-        told, untold = ([flown(root, network, about.sensors, index, k, led) for k in rows] for led in (True, False))
+        told, untold = ([flown(root, net, about.sensors, index, k, led) for k in rows] for led in (True, False))
     # 18 and 0 of 39 as measured; a choice that learned beside its own guess ended none when told.
     assert np.mean(told) > 0.25
     assert np.mean(untold) < 0.1

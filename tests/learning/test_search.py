@@ -9,18 +9,21 @@ from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.flight import nodes_of
 from aerialdojo_gen.benchmark.observations import renderer_for
 from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
+from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.geometry.cameras import view_pose
 from aerialdojo_gen.learning.exploration_views import NOTHING, UNNAMED, collect_views, patch_labels
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.parts import Exploration, Part
+from aerialdojo_gen.learning.parts import Exploration, Part, pictures
 from aerialdojo_gen.learning.search import Search, patch_depths_m, patch_rays
 from aerialdojo_gen.learning.words import name_vocabulary, word_targets
+from aerialdojo_gen.planning.flight_space import flight_space
 from aerialdojo_gen.scenes.context import SEVERAL, open_scene
 from aerialdojo_gen.store import shards as store
 from aerialdojo_gen.store.root import open_root
 
 SENSORS = Sensors(("front", "left", "right", "down"), width=32, height=32)
 WORDS = ("blue", "red", "van")
+RED_VAN = word_targets(["red van"], WORDS)[0]
 coordinates = st.floats(-60.0, 60.0)
 poses = st.tuples(coordinates, coordinates, st.floats(-8.0, 8.0), st.floats(-3.2, 3.2)).map(
     lambda p: np.array(p, np.float32)
@@ -33,7 +36,7 @@ def looks(smoke, tmp_path_factory):
     root = open_root(smoke)
     (scene, *_) = read_index(root, Selection(("id_train",))).scenes
     part = Part(root, ("id_train",), (), scene, (), SENSORS, 32, "gl", tmp_path_factory.mktemp("looks"))
-    return root, scene, collect_views(part, Exploration(60, 3, 0, "train"))
+    return part, collect_views(part, Exploration(60, 3, 0, "train"))
 
 
 def seeing(shown, number):
@@ -70,14 +73,15 @@ def test_a_patch_shows_what_most_of_its_pixels_do(seed, blocky):
 
 
 def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
-    root, name, found = looks
+    part, found = looks
+    root, name = part.data, part.scene
     scene = open_scene(*mesh_of(root, name), SEVERAL).scene
     rows = store.read_scene(root, "release/objects", name, ("object_id", "name")).to_pylist()
     called = {nodes_of(root, name)[row["object_id"]]: row["name"] for row in rows}
     targets = {"train": set(), "test": set()}
     for side in ("train", "test"):
-        told = {row["nav_id"]: row["target_split"] for row in store.read_scene(
-            root, f"tasks/{side}", name, ("nav_id", "target_split")).to_pylist()}  # fmt: skip
+        tasks = store.read_scene(root, f"tasks/{side}", name, ("nav_id", "target_split")).to_pylist()
+        told = {row["nav_id"]: row["target_split"] for row in tasks}
         for row in store.read_scene(root, f"routes/{side}", name, ("nav_id", "target_object_id")).to_pylist():
             targets[told[row["nav_id"]]].add(nodes_of(root, name)[row["target_object_id"]])
     assert targets["test"]
@@ -98,39 +102,61 @@ def test_looks_about_tell_targets_of_their_side_and_no_others(looks):
     assert seen > 20
 
 
+def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(looks):
+    part, found = looks
+    followed = read_index(part.data, Selection(("id_train",), scenes=(part.scene,)), "train")
+    places = np.concatenate([followed.poses_of(k)[:, :3] for k in range(len(followed))])
+    apart = np.linalg.norm(found.pose[:, None, :3] - places[None], axis=2).min(axis=1)
+    assert 0.2 < np.median(apart) < apart.max() <= 3.0
+    space = flight_space(*mesh_of(part.data, part.scene), 0.25)
+    for pose, blocked_at in zip(found.pose.astype(np.float64), found.blocked, strict=True):
+        # A look may be at a contact: single precision moves it by some micrometres.
+        assert space.grid.distance_m(pose[:3]) > 0.25 - 0.01
+        for action in range(16):
+            episode = Episode(space, tuple(pose), (0.0, 0.0, 0.0), 9)
+            episode.step(action)
+            assert blocked_at[action] == (episode.refused or episode.termination == "collision"), (pose, action)
+    assert set(found.scene) == {part.scene}
+    assert (found.first == np.arange(61)).all()
+    # All four quarters, each by more than a tenth.
+    assert np.bincount(((found.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 6
+    # Poses are kept in single precision: an edge may fall on the other side of a pixel's middle.
+    assert (pictures(part, found.pose[:5].astype(np.float64)) == found.frames[:5]).mean() > 0.99
+    assert len(np.unique(found.frames.reshape(60, -1), axis=0)) > 50
+
+
 def test_who_sees_the_goal_is_led_to_it(looks):
-    root, name, found = looks
-    rows = store.read_scene(
-        root, "release/objects", name, ("name", "x_m", "y_m", "z_m", "size_x_m", "size_y_m", "size_z_m")
-    ).to_pylist()
-    known = {row["name"]: row for row in rows if [r["name"] for r in rows].count(row["name"]) == 1}
+    part, found = looks
+    size_of, columns = [f"size_{axis}_m" for axis in "xyz"], ("name", "x_m", "y_m", "z_m")
+    rows = store.read_scene(part.data, "release/objects", part.scene, (*columns, *size_of)).to_pylist()
+    names = [row["name"] for row in rows]
+    known = {row["name"]: row for row in rows if names.count(row["name"]) == 1}
     off = []
-    wanted = word_targets(["red van"], WORDS)[0]
-    for k, pose in enumerate(found.pose):
-        distance_m = np.linalg.norm(
-            patch_rays(SENSORS) * patch_depths_m(found.frames[k], SENSORS.max_depth_m)[:, None], axis=1
-        )
-        near = np.where((distance_m > 0.0) & (distance_m < 12.0), found.shown[k], NOTHING)
+    for pose, frames, shown in zip(found.pose, found.frames, found.shown, strict=True):
+        away_m = patch_rays(SENSORS) * patch_depths_m(frames, SENSORS.max_depth_m)[:, None]
+        distance_m = np.linalg.norm(away_m, axis=1)
+        near = np.where((distance_m > 0.0) & (distance_m < 12.0), shown, NOTHING)
         for number in np.unique(near[near >= 0]).tolist():
             row = known.get(str(found.names[number]))
             if row is None or (near == number).sum() < 3:
                 continue
-            search = Search(wanted, SENSORS)
             # From another pose the same sighting leads to the same place.
             for begun in ((0.0, 0.0, 0.0, 0.0), (4.0, -2.0, 1.0, 1.2)):
-                odometry = np.array(begun, np.float32)
-                search = Search(wanted, SENSORS)
-                search.observe(seeing(found.shown[k], number), found.frames[k], odometry)
-                ahead, left, up = search.towards(odometry, 1).astype(float)
-                c, s = np.cos(pose[3]), np.sin(pose[3])
-                place = pose[:3] + np.array([c * ahead - s * left, s * ahead + c * left, up])
+                odometry, search = np.array(begun, np.float32), Search(RED_VAN, SENSORS)
+                search.observe(seeing(shown, number), frames, odometry)
+                place = pose[:3] + turned(search.towards(odometry, 1), pose[3])
                 outside = np.abs(place - [row["x_m"], row["y_m"], row["z_m"]])
-                size = np.array([row["size_x_m"], row["size_y_m"], row["size_z_m"]])
-                off.append(np.linalg.norm(np.maximum(outside - size / 2.0, 0.0)))
+                off.append(np.linalg.norm(np.maximum(outside - np.array([row[s] for s in size_of]) / 2.0, 0.0)))
     assert len(off) > 20
     # It stands 1.5 m before the object; a patch's depth may be that of what is behind the object or in front of it.
     assert np.median(off) < 2.0
     assert np.quantile(off, 0.85) < 3.0
+
+
+def turned(away, yaw):
+    """What is so far ahead, to the left and above, in the frame that the yaw is in."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([c * away[0] - s * away[1], s * away[0] + c * away[1], away[2]])
 
 
 # The patches ahead and to the left.
@@ -149,7 +175,7 @@ def looking(search, odometry, distance_m, chances):
 
 
 def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby():
-    search, start = Search(word_targets(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
+    search, start = Search(RED_VAN, SENSORS), np.zeros(4, np.float32)
     # 9 m away; what is ahead is red, what is to the left is a red van.
     looking(search, start, 9.0, {AHEAD: [0.01, 0.9, 0.04, 0.05], LEFT: [0.01, 0.45, 0.45, 0.09]})
     first = search.towards(start, 60)
@@ -164,36 +190,32 @@ def test_it_goes_to_what_looks_most_like_the_goal_until_it_was_seen_from_nearby(
 
 @given(st.lists(poses, min_size=1, max_size=40), st.integers(20, 90))
 def test_who_has_seen_nothing_flies_round_and_stops_nowhere(places, remaining):
-    search = Search(word_targets(["red van"], WORDS)[0], SENSORS)
+    search = Search(RED_VAN, SENSORS)
     nothing = np.log(np.full((256, 4), [1e-3, 1e-3, 1e-3, 0.997]))
     for odometry in places:
         search.observe(nothing, np.zeros((4, 32, 32, 4), np.uint8), odometry)
         away = search.towards(odometry, remaining)
         assert np.linalg.norm(away) > 2.0
-        c, s = np.cos(odometry[3]), np.sin(odometry[3])
-        moved = np.array([c * away[0] - s * away[1], s * away[0] + c * away[1], away[2]])
-        place = odometry[:3] + moved
+        place = odometry[:3] + turned(away, odometry[3])
         assert np.hypot(place[0], place[1]) == pytest.approx(12.0, abs=1e-3)
         assert place[2] == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_ring_is_flown_round_once_in_its_order():
-    search = Search(word_targets(["red van"], WORDS)[0], SENSORS)
+    search = Search(RED_VAN, SENSORS)
     odometry, bearings = np.zeros(4, np.float32), []
     for _ in range(60):
         away = search.towards(odometry, 90)
         # As a body does that flies 3 m at a time, and turns nowhere.
         odometry[:3] += away * min(1.0, 3.0 / np.linalg.norm(away))
-        corner = odometry[:3] + away
         bearings.append(np.arctan2(odometry[1], odometry[0]))
-        assert np.isfinite(corner).all()
-    turned = np.unwrap(bearings)
-    assert turned[-1] - turned[3] > 2.0 * np.pi
+    bearings = np.unwrap(bearings)
+    assert bearings[-1] - bearings[3] > 2.0 * np.pi
 
 
 def test_the_last_way_leads_to_one_thing_and_is_begun_in_time():
     """Whatever is seen on it: who changes his mind arrives nowhere."""
-    search, odometry = Search(word_targets(["red van"], WORDS)[0], SENSORS), np.zeros(4, np.float32)
+    search, odometry = Search(RED_VAN, SENSORS), np.zeros(4, np.float32)
     van = [0.01, 0.45, 0.45, 0.09]
     looking(search, odometry, 9.0, {LEFT: van})
     # It has looked at it, in vain, and is as far from it as it was: round the start, until the way there is due.

@@ -22,13 +22,11 @@ def alike(a, b) -> bool:
 @pytest.fixture(scope="module")
 def halves(smoke, tmp_path_factory):
     """The smoke run's two scenes, a data directory each, the last one first."""
-    folder = tmp_path_factory.mktemp("halves")
-    found = []
-    for scene in ("U_Courtyard_1", "U_Courtyard_0"):
+    found = [tmp_path_factory.mktemp("halves") / scene for scene in ("U_Courtyard_1", "U_Courtyard_0")]
+    for half in found:
         for part in ("release", "meshes"):
-            shutil.copytree(smoke / part, folder / scene / part)
-        prune_release(folder / scene, [scene])
-        found.append(folder / scene)
+            shutil.copytree(smoke / part, half / part)
+        prune_release(half, [half.name])
     return found
 
 
@@ -45,12 +43,14 @@ def test_two_directories_are_read_as_the_one_that_has_both(smoke, halves):
     assert batch["rgb"].std() > 10
 
 
-def test_a_directory_in_which_nothing_fits_is_left_out(halves):
+def test_a_directory_in_which_nothing_fits_is_left_out_and_a_scene_in_two_refused(smoke, halves):
     own = Trajectories(halves, "id_train", views=())
     assert own.index.scenes == ("U_Courtyard_0",)
     assert own.fingerprint == Trajectories(halves[1], "id_train", views=()).fingerprint
     with pytest.raises(UsageError, match="no scene 'U_Nowhere_0'"):
         Trajectories(halves, scene="U_Nowhere_0")
+    with pytest.raises(UsageError, match=r"scene U_Courtyard_0 is in .* and in .*: name one"):
+        Trajectories([smoke, halves[1]], "all", views=())
 
 
 @pytest.mark.parametrize(
@@ -67,11 +67,6 @@ def test_a_directory_in_which_nothing_fits_is_left_out(halves):
 def test_requests_that_make_no_sense(given, said):
     with pytest.raises(UsageError, match=said):
         Trajectories(**given)
-
-
-def test_a_scene_that_two_directories_have_is_refused(smoke, halves):
-    with pytest.raises(UsageError, match=r"scene U_Courtyard_0 is in .* and in .*: name one"):
-        Trajectories([smoke, halves[1]], "all", views=())
 
 
 @pytest.mark.slow

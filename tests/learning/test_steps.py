@@ -12,24 +12,23 @@ LENGTHS = ((2, 3), (4,), (1, 2, 3))
 WORDS = ("red", *(f"thing{number}{k}" for number, lengths in enumerate(LENGTHS) for k in range(len(lengths))))
 
 
-def part(number: int, lengths: tuple[int, ...], marks: np.ndarray) -> Steps:
-    """A part whose every value tells of which step or episode it is, by `marks`, and of which part."""
-    n, m = len(lengths), sum(lengths)
-    images = np.zeros((n, 2, 2, 4), np.uint8)
-    images[:] = (10 * number + np.arange(n))[:, None, None, None]
+def part(number: int, lengths: tuple[int, ...], begin: int) -> Steps:
+    """A part whose every value tells of which step or episode it is, and of which part."""
+    n, marks = len(lengths), begin + np.arange(sum(lengths))
+    names = [f"thing{number}{k}" for k in range(n)]
     return Steps(
-        frames=np.broadcast_to(marks[:, None, None, None, None], (m, 1, 2, 2, 4)).astype(np.uint8),
+        frames=np.tile(marks[:, None, None, None, None], (1, 1, 2, 2, 4)).astype(np.uint8),
         first=np.concatenate([[0], np.cumsum(lengths)]),
         label=marks % 16,
         odometry=np.repeat(marks[:, None], 4, axis=1).astype(np.float32),
         offset=np.repeat(marks[:, None], 3, axis=1).astype(np.float32),
         pose=np.repeat(-marks[:, None], 4, axis=1).astype(np.float32),
         blocked=np.repeat(marks[:, None] % 2 == 0, 16, axis=1),
-        text=np.array([[f"thing{number}{k}", f"thing{number}{k} red"] for k in range(n)]),
+        text=np.array([[name, f"{name} red"] for name in names]),
         # The last episode of a part has no picture, the first none but that.
         image=np.array([*range(n - 1), -1]) if n > 1 else np.array([0]),
         semantic=np.arange(n) != 0,
-        images=images,
+        images=np.tile((10 * number + np.arange(n))[:, None, None, None], (1, 2, 2, 4)).astype(np.uint8),
         nav_id=np.array([f"nav{number}{k}" for k in range(n)]),
         scene=np.array([SCENES[(number + k) % 2] for k in range(n)]),
         shown=np.repeat((marks[:, None] % 2).astype(np.int16) - 1, 3, axis=1),
@@ -41,9 +40,8 @@ def part(number: int, lengths: tuple[int, ...], marks: np.ndarray) -> Steps:
 def pool(tmp_path_factory):
     folder, begin, parts = tmp_path_factory.mktemp("steps"), 0, []
     for number, lengths in enumerate(LENGTHS):
-        made = part(number, lengths, begin + np.arange(sum(lengths)))
+        part(number, lengths, begin).write(folder / str(number))
         begin += sum(lengths)
-        made.write(folder / str(number))
         parts.append(read_steps(folder / str(number)))
     return Pool(parts, SCENES, Vocabulary(WORDS, 3))
 
@@ -57,13 +55,11 @@ def test_steps_are_numbered_through_all_parts(pool):
     pose, scene, blocked = pool.places(rows)
     assert pose[:, 0].tolist() == (-rows).tolist()
     assert blocked[:, 5].tolist() == (rows % 2 == 0).tolist()
-    owner = np.repeat(np.arange(len(lengths)), lengths)
-    scenes = [(number + k) % 2 for number, part in enumerate(LENGTHS) for k in range(len(part))]
-    assert scene.tolist() == [scenes[owner[row]] for row in rows]
+    scenes = np.repeat([(number + k) % 2 for number, part in enumerate(LENGTHS) for k in range(len(part))], lengths)
+    assert scene.tolist() == scenes[rows].tolist()
     # Names are numbered through too; -1 stays -1.
     of_part = np.repeat(np.arange(len(LENGTHS)), [sum(part) for part in LENGTHS])
-    shown = pool.shown(rows)
-    assert shown[:, 0].tolist() == [of_part[row] if row % 2 else -1 for row in rows]
+    assert pool.shown(rows)[:, 0].tolist() == np.where(rows % 2, of_part[rows], -1).tolist()
     assert pool.names == ["name0", "name1", "name2"]
 
 
@@ -84,6 +80,6 @@ def test_a_batch_has_each_episodes_own_steps_and_goal(pool, by_image):
         assert batch["goal_by_image"][i] == told
         assert batch["images"][i, 0, 0, 0] == (10 * number + own if told else 0)
         assert batch["scene"][i] == (number + own) % 2
-        words = [WORDS[n - 2] for n in batch["tokens"][i].tolist() if n]
         # A description goes with the words alone: it would tell what the picture shows.
-        assert words == ([f"thing{number}{own}"] if told else [f"thing{number}{own}", "red"])
+        words = [WORDS[n - 2] for n in batch["tokens"][i].tolist() if n]
+        assert words == [f"thing{number}{own}", *([] if told else ["red"])]

@@ -8,23 +8,29 @@ from functools import partial
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from support.extended import set_columns
-from support.flying import town
-from support.trainings import assert_same_training, history, kill_at_first_checkpoint, recipe_of
+from support.flying import free_poses, town
+from support.trainings import (
+    assert_same_training,
+    history,
+    kill_at_first_checkpoint,
+    network,
+    recipe_of,
+    rewritten,
+    train_here,
+)
 
 from aerialdojo_gen.base.errors import ConfigError, StoreError, UsageError
 from aerialdojo_gen.benchmark.agents.goal import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
-from aerialdojo_gen.benchmark.tasks import Selection, mesh_of
-from aerialdojo_gen.dataset.contents import part_name
+from aerialdojo_gen.benchmark.tasks import Selection
 from aerialdojo_gen.dataset.episode import Episode
 from aerialdojo_gen.learning.collect import collect, parts_of, view_parts
 from aerialdojo_gen.learning.flights import Teacher
 from aerialdojo_gen.learning.index import read_index
-from aerialdojo_gen.learning.parts import pictures
+from aerialdojo_gen.learning.labels import odometry
 from aerialdojo_gen.learning.recipe import load_recipe
 from aerialdojo_gen.learning.steps import read_steps
 from aerialdojo_gen.learning.trajectories import sample_evenly
@@ -32,7 +38,7 @@ from aerialdojo_gen.pipeline.code_digest import code_of
 from aerialdojo_gen.pipeline.executors import make_executor
 from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.planning.difficulty import agent_actions
-from aerialdojo_gen.planning.flight_space import FlightSpace, flight_space
+from aerialdojo_gen.planning.flight_space import FlightSpace
 from aerialdojo_gen.planning.planner import Planner
 from aerialdojo_gen.store.root import open_root
 from aerialdojo_gen.store.schemas import STOP, TURN_LEFT, TURN_RIGHT
@@ -42,8 +48,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed: it is the
 
 from aerialdojo_gen.learning import checkpoints  # noqa: E402 - it needs torch
 from aerialdojo_gen.learning.localization import pose_loss  # noqa: E402
-from aerialdojo_gen.learning.policy import Policy, network_of  # noqa: E402
-from aerialdojo_gen.learning.training import train  # noqa: E402
+from aerialdojo_gen.learning.policy import Policy  # noqa: E402
 
 POLICY = "policy"
 TEXT = """
@@ -77,8 +82,7 @@ recipe = partial(recipe_of, TEXT)
 @pytest.fixture(scope="module")
 def learned(smoke, cache, tmp_path_factory):
     """A policy that saw eight trajectories six times."""
-    out = tmp_path_factory.mktemp("policy")
-    return train(smoke, recipe(), out=out, cache=cache, device="cpu", workers=1)
+    return train_here(smoke, recipe(), tmp_path_factory.mktemp("policy"), cache)
 
 
 def test_a_short_training_fits_better_at_its_end(learned):
@@ -90,7 +94,7 @@ def test_a_short_training_fits_better_at_its_end(learned):
 @pytest.mark.nightly
 def test_eight_trajectories_are_learned_by_heart_and_flown(smoke, cache, tmp_path):
     by_heart = recipe(model=LARGER, train={"epochs": 80})
-    learned = train(smoke, by_heart, out=tmp_path / "out", cache=cache, device="cpu", workers=1)
+    learned = train_here(smoke, by_heart, tmp_path / "out", cache)
     assert history(learned.policy.parent)[-1]["accuracy"] > 0.95
     assert learned.imitation.is_file()
     options = {"weights": str(learned.policy)}
@@ -111,7 +115,7 @@ def test_killed_and_gone_on_with_it_ends_with_the_same_weights(smoke, cache, lea
     assert load_recipe(file) == recipe()
     kill_at_first_checkpoint(file, smoke, broken, cache)
     assert not (broken / "policy.safetensors").exists()
-    train(smoke, recipe(), out=broken, cache=cache, device="cpu", workers=1)
+    train_here(smoke, recipe(), broken, cache)
     assert_same_training(learned.policy, broken / "policy.safetensors")
 
 
@@ -124,8 +128,10 @@ def test_successful_flights_of_a_run_are_learned_from(planted, tmp_path):
     evaluate(planted.data, Evaluation("turning", "oracle", {"actions": "agent_action"}, three))
     for side, rows in known.items():
         set_columns(planted, f"routes/{side}", agent_action=pa.array(rows, list_of(pa.int8())))
-    drawn, own = tmp_path / "drawn", recipe(data={"runs": ["turning"]}, train={"epochs": 1, "looks": 0})
-    train(planted.data, own, out=tmp_path / "out", cache=drawn, device="cpu", workers=1)
+    drawn = tmp_path / "drawn"
+    train_here(
+        planted.data, recipe(data={"runs": ["turning"]}, train={"epochs": 1, "looks": 0}), tmp_path / "out", drawn
+    )
     (steps,) = [read_steps(file.parent) for file in drawn.glob("*/steps.npz")]
     assert set(steps.nav_id) == set(read_run(planted.data, "turning")["nav_id"].to_pylist())
     assert len(steps) == 3
@@ -133,31 +139,17 @@ def test_successful_flights_of_a_run_are_learned_from(planted, tmp_path):
         assert steps.label[begin : begin + 2].tolist() == [TURN_LEFT, TURN_RIGHT]
 
 
-def test_another_training_does_not_take_the_folder(smoke, cache, learned, tmp_path):
-    other = recipe(train={"epochs": 3})
-    with pytest.raises(UsageError, match=r"another recipe: its fingerprint is [0-9a-f]{16}, and that of this one is"):
-        train(smoke, other, out=learned.policy.parent, cache=cache, device="cpu", workers=1)
-
-
 @pytest.mark.nightly
 def test_to_restart_is_to_learn_anew(smoke, cache, learned, tmp_path):
     out = tmp_path / "again"
-    options = {"out": out, "cache": cache, "device": "cpu", "workers": 1}
     for epochs in (1, 2):
-        done = train(smoke, recipe(train={"epochs": epochs}), restart=True, **options)
+        done = train_here(smoke, recipe(train={"epochs": epochs}), out, cache, restart=True)
         assert [row["epoch"] for row in history(out)] == list(range(epochs))
         assert checkpoints.read(done.policy)[2]["epoch"] == epochs
     # A line that was cut short is no line.
     (out / "history.jsonl").write_text((out / "history.jsonl").read_text() + '{"phase": 0, "ep')
-    train(smoke, recipe(train={"epochs": 2}), **options)
+    train_here(smoke, recipe(train={"epochs": 2}), out, cache)
     assert len(history(out)) == 2
-
-
-def test_a_shape_beyond_its_weights_is_refused_before_it_takes_memory(learned, changed):
-    _, about, _ = checkpoints.read(learned.policy)
-    path = changed(shape={**about.shape, "hidden": 10**7})
-    with pytest.raises(StoreError, match="holds no policy of this version"):
-        Policy(str(path))
 
 
 def parts_by_name(root, index, folder, seed=0):
@@ -169,15 +161,12 @@ def parts_by_name(root, index, folder, seed=0):
 def test_other_pictures_of_the_goals_are_drawn_from_anew(planted, tmp_path):
     index = read_index(open_root(planted.data), Selection(("id_train",)))
     before = parts_by_name(open_root(planted.data), index, tmp_path)
-    part = planted.data / part_name("release/objects", planted.scene)
-    table = pq.read_table(part)
-    shown = [None if png is None else png + b"x" for png in table["reference_image"].to_pylist()]
-    at = table.column_names.index("reference_image")
-    pq.write_table(table.set_column(at, table.schema.field(at), pa.array(shown, table.schema.field(at).type)), part)
+    shown = "reference_image"
+    planted.edit("release/objects", lambda row: row.update({shown: row[shown] + b"x"}), lambda row: row[shown])
     after = parts_by_name(open_root(planted.data), index, tmp_path)
     assert len(after) == len(before)
-    changed = [part.scene == planted.scene for name, part in before.items() if name not in after]
-    assert changed == [True] * sum(part.scene == planted.scene for part in before.values())
+    own = {name for name, part in before.items() if part.scene == planted.scene}
+    assert before.keys() - after.keys() == own != set()
 
 
 def test_references_and_looks_are_not_drawn_again_where_only_the_network_is_another():
@@ -206,40 +195,6 @@ def test_of_more_trajectories_or_other_scenes_what_was_drawn_stays_drawn(smoke, 
     assert fewer | last < all_of_them
 
 
-def test_looks_about_are_taken_near_where_references_lead_and_turned_at_random(smoke, tmp_path):
-    root = open_root(smoke)
-    index = read_index(root, Selection(("id_train",)))
-    sensors = Sensors(("front", "down"), width=32, height=32)
-    (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), sensors, 32, 0, "gl")
-    parts = view_parts(root, index.scenes, tmp_path, "id_train", "train", 40, 7, like)
-    assert [part.scene for part in parts] == list(index.scenes)
-    with make_executor("local", 1) as executor:
-        surveys = collect(parts, executor, Reporter(False), "looking")
-    followed = read_index(root, Selection(("id_train",)), "train")
-    for part, looks in zip(parts, surveys, strict=True):
-        own = [k for k in range(len(followed)) if followed.scenes[followed.scene[k]] == part.scene]
-        places = np.concatenate([followed.poses_of(k) for k in own])[:, :3]
-        apart = np.linalg.norm(looks.pose[:, None, :3] - places[None], axis=2).min(axis=1)
-        assert 0.2 < np.median(apart) < apart.max() <= 3.0
-        space = flight_space(*mesh_of(root, part.scene), 0.25)
-        for pose, blocked_at in zip(looks.pose.astype(np.float64), looks.blocked, strict=True):
-            # A look may be at a contact: single precision moves it by some micrometres.
-            assert space.grid.distance_m(pose[:3]) > 0.25 - 0.01
-            for action in range(16):
-                episode = Episode(space, tuple(pose), (0.0, 0.0, 0.0), 9)
-                episode.step(action)
-                assert blocked_at[action] == (episode.refused or episode.termination == "collision"), (pose, action)
-        assert set(looks.scene) == {part.scene}
-        assert (looks.first == np.arange(41)).all()
-        # All four quarters, each by more than a tenth.
-        assert np.bincount(((looks.pose[:, 3] + np.pi) // (np.pi / 2)).astype(int), minlength=4).min() > 4
-        again = pictures(part, looks.pose[:5].astype(np.float64))
-        assert again.shape == (5, 2, 32, 32, 4)
-        # Poses are kept in single precision: an edge may fall on the other side of a pixel's middle.
-        assert (again == looks.frames[:5]).mean() > 0.99
-        assert len(np.unique(looks.frames.reshape(40, -1), axis=0)) > 30
-
-
 @pytest.mark.nightly
 def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
     """With them places and headings are known better, at looks that no network was trained on."""
@@ -250,44 +205,31 @@ def test_a_map_is_learned_from_looks_about_too(smoke, cache, tmp_path):
     for looks, seed in [(0, 0), (0, 1), (300, 0), (300, 1)]:
         thorough = {"epochs": 12, "looks": 128, "batch_steps": 256}
         own = recipe(seed=seed, data={"looks": looks, "limit": None}, model=LARGER, train=thorough)
-        done = train(smoke, own, out=tmp_path / f"{looks}-{seed}", cache=cache, device="cpu", workers=1)
-        tensors, about, _ = checkpoints.read(done.policy)
-        network = network_of(about, tensors, str(done.policy)).eval()
+        policy = train_here(smoke, own, tmp_path / f"{looks}-{seed}", cache).policy
+        net, about = network(policy), checkpoints.read(policy)[1]
         (like, *_) = parts_of(root, index, tmp_path, (("id_train",), ()), about.sensors, 32, 0, "gl")
         unseen = view_parts(root, index.scenes, tmp_path, "id_train", None, 200, 7, like)
         with make_executor("local", 1) as executor, torch.no_grad():
             (found,) = collect(unseen, executor, Reporter(False), "looking")
-            seen = network.encode_pictures(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
-            place, heading, scene, _ = network.whereabouts.locate(seen)
+            seen = net.encode_pictures(torch.from_numpy(np.array(found.frames)).flatten(0, 1)).reshape(200, -1)
+            place, heading, scene, _ = net.whereabouts.locate(seen)
         pose, number = torch.from_numpy(found.pose), torch.zeros(200, dtype=torch.int64)
         loss[looks] += float(pose_loss(place, heading, scene, pose, number))
     assert loss[300] < loss[0]
 
 
-@pytest.fixture
-def changed(learned, tmp_path):
-    """The learned weights, with something else said of them."""
-
-    def make(**said):
-        tensors, about, state = checkpoints.read(learned.policy)
-        path = tmp_path / "changed.safetensors"
-        checkpoints.write(path, tensors, type(about)(**{**vars(about), **said}), state)
-        return path
-
-    return make
-
-
-def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerprints(smoke, changed, tmp_path):
-    def fly(path, **options):
+def test_weights_of_another_action_set_or_release_are_refused_with_both_fingerprints(smoke, learned, tmp_path):
+    def fly(options=(), **said):
+        path = rewritten(learned.policy, tmp_path / "changed.safetensors", **said)
         chosen = Selection(("id_train",), limit=1)
-        evaluation = Evaluation("refused", POLICY, {"weights": str(path), **options}, chosen)
+        evaluation = Evaluation("refused", POLICY, {"weights": str(path), **dict(options)}, chosen)
         return evaluate(smoke, evaluation, out=tmp_path / "log", workers=1)
 
     with pytest.raises(UsageError, match=r"another action set: its fingerprint is f{16}, and .* [0-9a-f]{16}"):
-        fly(changed(actions="f" * 64))
+        fly(actions="f" * 64)
     with pytest.raises(UsageError, match=r"another release: its fingerprint is e{16}, and .* [0-9a-f]{16};"):
-        fly(changed(release="e" * 64))
-    assert fly(changed(release="e" * 64), any_release=True).finished == 1
+        fly(release="e" * 64)
+    assert fly({"any_release": True}, release="e" * 64).finished == 1
 
 
 def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
@@ -298,6 +240,10 @@ def test_what_is_no_policy_is_said_in_a_line(tmp_path, learned):
         cut.write_bytes(content)
         with pytest.raises(StoreError, match="holds no policy"):
             checkpoints.read(cut)
+    # A shape beyond its weights, before it takes memory.
+    shape = checkpoints.read(learned.policy)[1].shape
+    with pytest.raises(StoreError, match="holds no policy of this version"):
+        Policy(str(rewritten(learned.policy, cut, shape={**shape, "hidden": 10**7})))
     file = tmp_path / "wrong.toml"
     file.write_text("[train]\nepoch = 3\n")
     with pytest.raises(ConfigError, match="did you mean 'epochs'"):
@@ -317,14 +263,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
     """From wherever the body is: the label is the plan's first action, and to follow labels is to arrive."""
     world = town()
     planner, teacher = Planner(world), Teacher(world)
-    draw = np.random.default_rng(1)
-    low, high = planner.grid.arrays.lower, planner.grid.arrays.upper
-    free = []
-    while len(free) < 9:
-        p = draw.uniform(low, high)
-        if planner.grid.distance_m(p) > 0.4 and planner.grid.reachable(p):
-            free.append(np.array([*p, draw.uniform(-np.pi, np.pi)]))
-    goal, starts = free[0], free[1:]
+    goal, *starts = free_poses(planner.grid, np.random.default_rng(1), 5)
     with teacher.cache_fields():
         ways = teacher.ways([goal] * len(starts), starts)
         for start, way in zip(starts, ways, strict=True):
@@ -346,7 +285,7 @@ def test_the_teachers_labels_are_the_planners_own_plan():
 def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache, learned, tmp_path):
     own = tmp_path / "drawn"
     again = recipe(train={"epochs": 1}, dagger={"rounds": 1, "episodes": 4, "epochs": 1, "teacher_share": 0.0})
-    done = train(smoke, again, out=tmp_path / "out", cache=own, device="cpu", workers=1)
+    done = train_here(smoke, again, tmp_path / "out", own)
     assert (done.policy.parent / "dagger-1.safetensors").is_file()
     assert [row["phase"] for row in history(done.policy.parent)] == [0, 1]
     parts = [read_steps(path) for path in sorted(own.iterdir()) if path.is_dir()]
@@ -360,13 +299,10 @@ def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache
         assert part.blocked.any()
         for k in range(len(part)):
             steps = slice(part.first[k], part.first[k + 1])
-            own, pose = part.odometry[steps].astype(float), part.pose[steps].astype(float)
-            assert not own[0].any()
+            moved, pose = part.odometry[steps].astype(float), part.pose[steps].astype(float)
             # Own motion leads to where the body was: whatever the world did not allow is not in it.
-            c, s = np.cos(pose[0, 3]), np.sin(pose[0, 3])
-            led = np.column_stack([c * own[:, 0] - s * own[:, 1], s * own[:, 0] + c * own[:, 1], own[:, 2]])
-            assert np.abs(pose[0, :3] + led - pose[:, :3]).max() < 1e-4
-            assert np.abs(np.sin(pose[:, 3] - pose[0, 3] - own[:, 3])).max() < 1e-4
+            assert np.abs(odometry(pose) - moved)[:, :3].max() < 1e-4
+            assert np.abs(np.sin(pose[:, 3] - pose[0, 3] - moved[:, 3])).max() < 1e-4
 
 
 def test_weights_are_read_without_torchs_compiler(learned):

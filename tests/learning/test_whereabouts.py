@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from aerialdojo_gen.geometry.motion import replay
@@ -18,7 +18,7 @@ from aerialdojo_gen.learning.localization import (  # noqa: E402
     offset_loss,
     places,
 )
-from aerialdojo_gen.learning.network import Network, Shape  # noqa: E402 - it needs torch
+from aerialdojo_gen.learning.network import Network, PolicyOutput, Shape  # noqa: E402 - it needs torch
 
 T, SCENES = 9, 3
 START, GOAL = np.array([31.0, -12.0, 6.0, 2.3]), np.array([-8.0, 20.0, 9.0])
@@ -34,10 +34,8 @@ def flight():
         moved.append(reckoning.odometry)
         reckoning.add(int(action))
     away, yaw = GOAL - poses[:, :3], poses[:, 3]
-    offset = np.column_stack([
-        away[:, 0] * np.cos(yaw) + away[:, 1] * np.sin(yaw), away[:, 1] * np.cos(yaw) - away[:, 0] * np.sin(yaw),
-        away[:, 2],
-    ])  # fmt: skip
+    ahead = (away[:, 0] + 1j * away[:, 1]) * np.exp(-1j * yaw)
+    offset = np.column_stack([ahead.real, ahead.imag, away[:, 2]])
     return {
         name: torch.from_numpy(np.asarray(value, np.float32)[None])
         for name, value in {"pose": poses, "odometry": moved, "offset": offset}.items()
@@ -118,22 +116,18 @@ def test_what_intervals_tell_is_a_place_and_a_direction():
     assert float((torch.remainder(turned + np.pi, 2 * np.pi) - np.pi).abs().max()) < np.deg2rad(0.1)
 
 
-def test_right_guesses_say_where_the_goal_is_seen_from_the_body(flight):
-    trust = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
-    guess = asked(guessing(*truth(flight), trust), flight)
-    assert float(error_m(guess, flight).max()) < 0.1
-
-
-def test_one_sure_look_is_remembered_through_steps_that_know_nothing(flight):
+def test_right_guesses_say_where_the_goal_is_and_one_sure_look_is_remembered(flight):
     """What is wildly wrong and unsure afterwards does not matter: own motion carries the one good look on."""
     place, yaw, goal = truth(flight)
+    trust = torch.randn(1, T, 1, generator=torch.Generator().manual_seed(1))
+    assert float(error_m(asked(guessing(place, yaw, goal, trust), flight), flight).max()) < 0.1
     place[:, 1:] += 40.0
     yaw[:, 1:] = 1.0
-    trust = torch.full((1, T, 1), -20.0)
-    trust[:, 0] = 50.0
-    assert float(error_m(asked(guessing(place, yaw, goal, trust), flight), flight).max()) < 0.2
+    sure = torch.full((1, T, 1), -20.0)
+    sure[:, 0] = 50.0
+    assert float(error_m(asked(guessing(place, yaw, goal, sure), flight), flight).max()) < 0.2
     # The same looks, all trusted alike, are far off.
-    assert float(error_m(asked(guessing(place, yaw, goal, torch.zeros(1, T, 1)), flight), flight)[0, -1]) > 10.0
+    assert float(error_m(asked(guessing(place, yaw, goal, 0.0 * sure), flight), flight)[0, -1]) > 10.0
 
 
 def test_the_loss_falls_only_where_each_guess_is_right(flight):
@@ -144,12 +138,11 @@ def test_the_loss_falls_only_where_each_guess_is_right(flight):
     )  # fmt: skip
     least = float(offset_loss(right, flight))
     assert float(offset_loss(right._replace(offset=right.offset + 0.5), flight)) == pytest.approx(least + 0.125)
-    wrong = {
-        "place": place_logits(place + 3.0), "goal": place_logits(goal - 3.0), "heading": heading_logits(yaw + 0.5),
-        "scene": scene_logits(2),
-    }  # fmt: skip
-    for name, logits in wrong.items():
-        assert float(offset_loss(right._replace(**{name: logits}), flight)) > least + 1.0, name
+    for wrong in (
+        {"place": place_logits(place + 3.0)}, {"goal": place_logits(goal - 3.0)},
+        {"heading": heading_logits(yaw + 0.5)}, {"scene": scene_logits(2)},
+    ):  # fmt: skip
+        assert float(offset_loss(right._replace(**wrong), flight)) > least + 1.0
 
 
 @pytest.fixture(scope="module")
@@ -166,12 +159,6 @@ def episode():
     with torch.no_grad():
         goal = network.encode_goal(torch.randint(1, 50, (2, 64), generator=draw), images, torch.tensor([True, False]))
     return network, goal, given
-
-
-@pytest.fixture
-def thought(episode):
-    network, goal, given = episode
-    return network(goal=goal, **given)[0]
 
 
 def test_flown_step_by_step_it_chooses_as_it_learned(episode):
@@ -195,55 +182,33 @@ def test_choices_teach_the_guess_nothing(episode):
     assert network.choice[0].weight.grad.any()
 
 
-def test_it_stops_where_it_thinks_to_have_arrived_and_nowhere_else(thought):
-    logits = thought.logits.detach().clone()
-    logits[..., 0] = 50.0
-    away_m = torch.tensor([1.9, 2.1, 30.0]).repeat(T // 3).expand(2, T)
-    offset = torch.nn.functional.normalize(thought.estimate.offset.detach(), dim=-1) * away_m[..., None] / UNIT_M
-    clear = torch.full_like(logits, -50.0)
-    actions = thought._replace(
-        logits=logits, blocked=clear, estimate=thought.estimate._replace(offset=offset)
-    ).actions(torch.zeros(2, T, 16, dtype=torch.bool))
-    assert torch.equal(actions == 0, away_m < 2.0), "though Stop is the likeliest of the actions everywhere"
-    assert torch.equal(actions[away_m > 2.0], logits[..., 1:].argmax(dim=-1)[away_m > 2.0] + 1)
+TURN = {14: 51.0, 15: 50.0}
 
 
-def test_who_would_come_back_goes_on(thought):
-    """The likeliest translation in the place of a turn that leads back; what does not lead back is left."""
-    logits = thought.logits.detach().clone()
-    logits[..., 14:] = 50.0
-    logits[..., 14] = 51.0
-    clear, far = torch.full_like(logits, -50.0), thought.estimate._replace(offset=torch.ones(2, T, 3))
-    back = torch.zeros(2, T, 16, dtype=torch.bool)
-    back[:, ::2, 14], back[:, ::2, 3] = True, True
-    actions = thought._replace(logits=logits, blocked=clear, estimate=far).actions(back)
-    assert (actions[:, 1::2] == 14).all()
-    logits[..., 3] = -50.0
-    assert torch.equal(actions[:, ::2], logits[:, ::2, 1:14].argmax(dim=-1) + 1)
-    everywhere = torch.ones_like(back)
-    assert (thought._replace(logits=logits, blocked=clear, estimate=far).actions(everywhere) != 0).all()
+@pytest.mark.parametrize(
+    ("logits", "blocked", "away_m", "back", "chosen"),
+    [
+        ({0: 9.0, 5: 8.0}, {}, 1.9, (), 0),  # it stops where it thinks to have arrived
+        ({5: 8.0}, {}, 1.9, (), 0),
+        ({0: 9.0, 5: 8.0}, {}, 2.1, (), 5),  # and nowhere else, likely as it may be
+        (TURN, {}, 30.0, (), 14),
+        (TURN | {3: 8.0}, {}, 30.0, (14,), 3),  # who would come back goes on: by no turn,
+        (TURN | {3: 8.0}, {}, 30.0, (14, 3), 1),  # and by nothing that leads back;
+        (TURN, {}, 30.0, range(16), 14),  # where all lead back by anything but Stop
+        ({3: 9.0, 2: 8.0}, {3: 20.0, 2: -4.6}, 30.0, (), 2),  # likely but surely blocked, then blocked 1 in 100
+        ({3: 9.0, 2: 8.0}, {3: 20.0, 2: 2.2}, 30.0, (), 1),  # and 9 in 10
+    ],
+)
+def test_of_likely_actions_it_takes_one_that_is_free_and_leads_on(logits, blocked, away_m, back, chosen):
+    def row(of, rest, kind=torch.float32):
+        out = torch.full((1, 1, 16), rest, dtype=kind)
+        for action, value in of.items():
+            out[..., action] = value
+        return out
 
-
-def test_what_leads_back_is_told_by_own_motion_alone():
-    reckoning = DeadReckoning()
-    assert not reckoning.back.any()
-    reckoning.add(14)
-    assert reckoning.back.nonzero()[0].tolist() == [15], "the turn undone"
-    for _ in range(10):
-        reckoning.add(14)
-        assert not reckoning.back[14]
-    reckoning.add(14)
-    assert reckoning.back.nonzero()[0].tolist() == [14, 15], "half a circle, of 24 headings"
-    reckoning.add(10)
-    assert reckoning.back.nonzero()[0].tolist() == [12], "down again"
-    # Once about a square, each corner turned in the other direction: the last side leads to where it began.
-    square = DeadReckoning()
-    for _ in range(4):
-        assert not square.back[2]
-        square.add(2)
-        for _ in range(6):
-            square.add(15)
-    assert square.back.nonzero()[0].tolist() == [2, 14]
+    estimate = LocalizationOutput(torch.tensor([[[0.6, 0.0, -0.8]]]) * away_m / UNIT_M, *[None] * 4)
+    output = PolicyOutput(row({1: 4.0, 2: 3.9} | logits, 0.0), row(blocked, -20.0), estimate)
+    assert output.actions(row(dict.fromkeys(back, True), False, torch.bool)).item() == chosen
 
 
 def test_what_was_refused_is_not_tried_again_from_there():
@@ -251,11 +216,14 @@ def test_what_was_refused_is_not_tried_again_from_there():
     reckoning.add(2, refused=True)
     assert not reckoning.odometry.any()
     assert reckoning.back.nonzero()[0].tolist() == [2]
-    # A turn aside it is another action.
     reckoning.add(14)
-    assert reckoning.back.nonzero()[0].tolist() == [15]
+    assert reckoning.back.nonzero()[0].tolist() == [15], "a turn aside it is another action"
 
 
+@example([14] * 11, 14)
+@example([14] * 12, 14)  # half a circle, of 24 headings
+@example([14] * 12 + [10], 12)
+@example([2, *[15] * 6] * 4, 2)  # about a square: its last side leads to where it began
 @given(st.lists(st.integers(1, 15), max_size=40), st.integers(1, 15))
 def test_only_what_leads_back_is_said_to(actions, last):
     """By poses that are replayed: the same place and heading as before, or turns beyond half a circle."""
@@ -273,19 +241,6 @@ def test_only_what_leads_back_is_said_to(actions, last):
         assert reckoning.back[last]
     elif same or apart:
         assert reckoning.back[last] == same
-
-
-def test_of_likely_actions_it_takes_one_that_is_free(thought):
-    logits, blocked = torch.zeros(2, T, 16), torch.full((2, T, 16), -20.0)
-    logits[..., 3], logits[..., 2], logits[..., 1] = 9.0, 8.0, 4.0
-    # The likeliest is surely blocked, the next one perhaps: 1 in 100, then 9 in 10.
-    blocked[..., 3], blocked[:, 0, 2], blocked[:, 1:, 2] = 20.0, -4.6, 2.2
-    far = thought.estimate._replace(offset=torch.ones(2, T, 3))
-    actions = thought._replace(logits=logits, blocked=blocked, estimate=far).actions(
-        torch.zeros(2, T, 16, dtype=torch.bool)
-    )
-    assert (actions[:, 0] == 2).all()
-    assert (actions[:, 1:] == 1).all()
 
 
 def test_the_goal_knows_no_more_of_the_pictures_than_the_scene(flight):

@@ -1,10 +1,12 @@
 """Trainings that are killed and gone on with."""
 
+import dataclasses
 import json
 import signal
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 from typing import Any
 
 from support.chores import until
@@ -18,6 +20,32 @@ def recipe_of(text: str, **changed: Any) -> Recipe:
     for key, value in changed.items():
         given[key] = {**given[key], **value} if isinstance(value, dict) else value
     return Recipe.model_validate(given)
+
+
+def train_here(data: Any, recipe: Recipe, out: Path, cache: Path, **options: Any) -> Any:
+    """Train on the CPU, in this process."""
+    from aerialdojo_gen.learning.training import train
+
+    return train(data, recipe, out=out, cache=cache, device="cpu", workers=1, **options)
+
+
+def network(policy: Path) -> Any:
+    """The network of a policy's weights."""
+    from aerialdojo_gen.learning import checkpoints
+    from aerialdojo_gen.learning.policy import network_of
+
+    tensors, about, _ = checkpoints.read(policy)
+    return network_of(about, tensors, str(policy)).eval()
+
+
+def rewritten(policy: Path, path: Path, lacking: str | None = None, **said: Any) -> Path:
+    """Write weights elsewhere, without tensors of some name, or with something else said of them."""
+    from aerialdojo_gen.learning import checkpoints
+
+    tensors, about, state = checkpoints.read(policy)
+    tensors = {name: tensor for name, tensor in tensors.items() if not (lacking and lacking in name)}
+    checkpoints.write(path, tensors, dataclasses.replace(about, **said), state)
+    return path
 
 
 def history(folder):
