@@ -138,8 +138,17 @@ def _thing(catalogue, category: str, **attributes: str) -> str:
         ("wildflowers", {"colour": "purple"}, "purple wildflowers"),
         ("deer", {"state": "with antlers", "place": "at the pond"}, "deer with antlers"),
         ("kiosk", {"colour": "teal", "sign": "news"}, "teal kiosk with a sign reading “NEWS”"),
+        # The article that the head noun asks for.
+        *(
+            ("brick_pallet", {"equipment": what}, f"pallet of bricks with {article}{what}")
+            for article, what in (
+                ("", "bands of film around it"), ("", "loose bricks on top"), ("a ", "cone on top"), ("", "two arms"),
+                ("a ", "blue tarpaulin over one end"), ("an ", "orange banner"),
+                ("", "a spade and a rake leaning on it"),
+            )
+        ),
     ],
-)
+)  # fmt: skip
 def test_noun_phrases(catalogue, category, attributes, said):
     assert _thing(catalogue, category, **attributes) == said
 

@@ -76,54 +76,52 @@ def test_lines_are_those_of_the_values():
     assert read_json(text).lines == {(): 1, ("a",): 2, ("a", 0): 3, ("a", 1): 4, ("a", 1, "b"): 5}
 
 
+FILE = '{"format": "aerialdojo-annotations", "version": 1, "scene": "U_Yard_0", "landmarks": [], "objects": [\n%s]}'
+ENTRY = '{"id": 0, "name": "van", "category": "delivery_van", "description": "A van.", "node": "delivery_van_000"}'
+LONG = "a" * 100_000
+
+
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
         ("", 1, "not JSON"),
+        ("\ufeff{}", 1, "not JSON"),
         ('{\n"format": "x",,}', 2, "not JSON"),
         ("[1]", 1, "must be an object"),
         ("[" * 100_000, 0, "line 1, column 65: nested more than 64 deep"),
+        (FILE % ("[" * 50_000), 0, "nested more than 64 deep"),
+        (FILE % "0,".join([""] * 300_000), 0, "holds more than 200000 values"),
+        (FILE % ENTRY.replace("A van.", "\\ud800"), 2, "\\ud800 is half of a surrogate pair: no character"),
+        (FILE % ENTRY.replace('"name"', '"\\udfff"'), 2, "\\udfff is half of a surrogate pair: no character"),
+        (FILE.replace("U_Yard_0", "\\udc00") % ENTRY, 1, "\\udc00 is half of a surrogate pair: no character"),
+        (FILE % ENTRY.replace('"id": 0', '"id": ' + "9" * 5000), 0, "digits"),
         ('{"scene": "a",\n "scene": "b"}', 2, "occurs twice"),
-        ('{\n"landmarks": [{\n"name": "\\ud800"}]}', 3, "\\ud800 is half of a surrogate pair: no character"),
+        (f'{{"{LONG}": 1, "{LONG}": 2}}', 1, "occurs twice"),
+        (f'{{"version": 1, "{LONG}": 0, "scene": "{LONG}"}}', 1, "unknown key"),
     ],
 )
-def test_faults_of_the_text(text, line, words):
+def test_faults_of_the_text_are_told_in_few_words(text, line, words):
     faults = parse_annotations(text).faults
-    assert any(f.line == line and words in f.message for f in faults), faults
+    assert any(f.line == line and words in f.message for f in faults), [str(f) for f in faults]
+    assert max(len(str(fault)) for fault in faults) < 700
 
 
 def test_every_fault_of_form_is_listed():
     lines = format_annotations(street_annotations()).splitlines()
-    edits = {
-        '"version": 1,': '"version": 2,',
-        '"node": "clock_tower_000"': '"nod": "clock_tower_000"',
-        '"id": 1,': '"id": "one",',
-        '"id": 2,': '"id": true,',
-        '"name": "blue delivery van",': '"name": "x", "anchor": {"position_m": [1, 2], "yaw_deg": NaN},',
-    }
-    expected = []
-    for old, new in edits.items():
+    anchor = '"name": "x", "anchor": {"position_m": [1, 2], "yaw_deg": NaN},'
+    expected = set()
+    for old, new, *paths in (
+        ('"version": 1,', '"version": 2,', "version"),
+        ('"node": "clock_tower_000"', '"nod": "clock_tower_000"', "landmarks[0].nod"),
+        ('"id": 1,', '"id": "one",', "objects[1].id"),
+        ('"id": 2,', '"id": true,', "objects[2].id"),
+        ('"name": "blue delivery van",', anchor, "objects[2].anchor.position_m[2]", "objects[2].anchor.yaw_deg"),
+    ):
         k = next(i for i, line in enumerate(lines) if line.strip() == old)
         lines[k] = new
-        expected.append(k + 1)
+        expected |= {(k + 1, path) for path in paths}
     source = parse_annotations("\n".join(lines))
-    found = {(f.line, f.path) for f in source.faults}
-    version, nod, one, true, anchor = expected
-    assert {
-        (version, "version"),
-        (nod, "landmarks[0].nod"),
-        (one, "objects[1].id"),
-        (true, "objects[2].id"),
-        (anchor, "objects[2].anchor.position_m[2]"),
-        (anchor, "objects[2].anchor.yaw_deg"),
-    } <= found
+    assert expected <= {(f.line, f.path) for f in source.faults}
     assert any("did you mean 'node'?" in f.message for f in source.faults)
     assert any(f.path == "landmarks[0].node" and "missing" in f.message for f in source.faults)
     assert sorted(source.objects) == [0, 3]
-
-
-@pytest.mark.parametrize("text", ['{"%s": 1, "%s": 2}', '{"version": 1, "%s": 0, "scene": "%s"}'])
-def test_a_fault_is_told_in_few_words_whatever_stands_in_the_file(text):
-    faults = parse_annotations(text % ("a" * 100_000, "a" * 100_000)).faults
-    assert faults
-    assert max(len(str(fault)) for fault in faults) < 700

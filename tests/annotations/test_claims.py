@@ -1,6 +1,8 @@
-"""Claims about instances: each is true of its own, comes back from JSON, and tells it from its like."""
+"""Claims and relations of instances, computed from the mesh: each is true of its own, and tells it from its like."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 import pytest
@@ -8,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.annotation_scenes import box, street, street_vocabulary
 
+from aerialdojo_gen.annotations.bearings import BORDER_DEG, lies_towards, nearest_landmark
 from aerialdojo_gen.annotations.claims import KINDS, Claim, Mention, SceneClaims
 from aerialdojo_gen.annotations.format import Landmark
-from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
+from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.base.constants import DIRECTIONS
+from aerialdojo_gen.base.rng import generator
 
 TOWER = Landmark(id=0, name="clock tower", node="clock_tower_000")
 
@@ -50,42 +54,123 @@ def test_all_claims_are_true_and_fit_with_slack_as_well(claims):
             assert claims.holds(claim, i, DISTRACTOR_SLACK), (instance.node, claim)
 
 
-def test_claims_say_colour_place_relation_and_direction(claims):
-    own = claims.of(claims.geometry.index["delivery_van_000"])
-    mailbox = Mention("mailbox_000", "mailbox", ("yellow",), True)
-    assert {Claim("colour", "red"), Claim("relation", "beside", (mailbox,))} <= set(own)
-    assert Claim("direction", "northeast", (Mention("clock_tower_000", "clock tower", (), True),)) in own
-    assert Claim("relation", "south of", (mailbox,)) in own
-
-
-def test_only_claims_that_differ_tell_twins_apart(claims):
+def test_claims_say_colour_place_relation_and_direction_and_those_that_differ_tell_twins_apart(claims):
     first, second, blue = (claims.geometry.index[f"delivery_van_00{k}"] for k in range(3))
-    own = {c.key: c for c in claims.of(first)}
-    assert claims.candidates(first) == [second, blue]
-    assert claims.distractors(first, []) == [second, blue]
+    mailbox = Mention("mailbox_000", "mailbox", ("yellow",), True)
+    own = {claim.key: claim for claim in claims.of(first)}
+    assert own["red"] == Claim("colour", "red")
+    assert own["beside"] == Claim("relation", "beside", (mailbox,))
+    assert own["northeast"] == Claim("direction", "northeast", (Mention("clock_tower_000", "clock tower", (), True),))
+    assert own["south of"] == Claim("relation", "south of", (mailbox,))
+    assert claims.candidates(first) == claims.distractors(first, []) == [second, blue]
     assert claims.distractors(first, [own["red"]]) == [second]
     assert claims.distractors(first, [own["red"], own["beside"]]) == []
+
+
+def test_a_relation_holds_to_any_thing_that_the_words_fit(claims):
+    first, second = (claims.geometry.index[f"delivery_van_00{k}"] for k in range(2))
+    # The lamp by the second van is not the one that is meant, but is called the same.
+    for node, noun, so in (
+        ("elsewhere", "street lamp", True), ("street_lamp_000", "lamp", True), ("street_lamp_000", "tree", False),
+    ):  # fmt: skip
+        assert claims.holds(Claim("relation", "beside", (Mention(node, noun),)), second) is so
     plain = Claim("relation", "beside", (Mention("bench_000", "bench"),))
     assert claims.holds(plain, second)
     assert not claims.holds(plain, first)
 
 
-def test_a_relation_holds_to_any_thing_that_the_words_fit(claims):
-    second = claims.geometry.index["delivery_van_001"]
-    lamp = claims.scene["street_lamp_000"].node
-    # The lamp by the second van is not the one that is meant, but is called the same.
-    assert claims.holds(Claim("relation", "beside", (Mention("elsewhere", "street lamp"),)), second)
-    assert claims.holds(Claim("relation", "beside", (Mention(lamp, "lamp"),)), second)
-    assert not claims.holds(Claim("relation", "beside", (Mention(lamp, "tree"),)), second)
-
-
-def test_near_a_border_nothing_is_said(claims):
-    scene = street()
+def test_near_a_border_nothing_is_said():
     angle = np.radians(22.5 + 4.0)
     edge = box("bench_001", (8 * np.cos(angle), 8 * np.sin(angle), 0), (1, 1, 1))
-    extended = type(scene)(scene.name, (*scene.instances, edge), scene.materials, scene.bounds)
-    own = SceneClaims(street_vocabulary(extended), [TOWER])
+    scene = dataclasses.replace(street(), instances=(*street().instances, edge))
+    own = SceneClaims(street_vocabulary(scene), [TOWER])
     i = own.geometry.index["bench_001"]
-    said = [c for c in own.of(i) if c.kind == "direction" or c.key.removesuffix(" of") in DIRECTIONS]
     assert own.bearings[i].direction == "northeast"
-    assert said == []
+    assert [c for c in own.of(i) if c.kind == "direction" or c.key.removesuffix(" of") in DIRECTIONS] == []
+
+
+# ---- relations ----
+
+
+def test_vertical_relations():
+    g = SceneGeometry(street())
+    mailbox, canopy, ground = (g.index[n] for n in ("mailbox_001", "canopy_000", "ground_000"))
+    assert g.under(mailbox, canopy)
+    assert g.above(canopy, mailbox)
+    assert not g.beside(mailbox, canopy)
+    assert g.support(mailbox) == ground
+    assert g.support(canopy) is None
+
+
+def test_in_front_and_behind_ask_for_the_front_that_a_thing_has(catalogue):
+    sign = catalogue.instantiate("stop_sign", "stop_sign_000", generator(0, "test", "front"), yaw_deg=0.0)
+    (front,) = sign.anatomy.fronts_rad
+    assert front == pytest.approx(0.0)
+    before, after = (box(f"bench_{k:03d}", (x, 0, 0), (1, 1, 1)) for k, x in enumerate((2.5, -2.5)))
+    g = SceneGeometry(dataclasses.replace(street(), instances=(sign, before, after)))
+    assert [g.front(1, 0), g.behind(2, 0), g.front(2, 0), g.behind(1, 0)] == [True, True, False, False]
+
+
+_spot = st.tuples(st.floats(-30, 30), st.floats(-30, 30))
+
+
+@given(_spot, _spot)
+def test_relations_grow_with_slack_and_near_is_mutual(a, b):
+    pair = box("bench_000", (*a, 0), (2, 0.6, 0.8)), box("mailbox_000", (*b, 0), (0.6, 0.6, 1.2))
+    g = SceneGeometry(dataclasses.replace(street(), instances=pair))
+    assert g.near(0, 1) == g.near(1, 0)
+    assert g.gap_m(0, 1) == pytest.approx(g.gap_m(1, 0), abs=1e-9)
+    for relation in (g.near, g.beside):
+        assert not relation(0, 1) or relation(0, 1, 1.35)
+    sides = [d for d in DIRECTIONS if g.side(0, 1, d)]
+    assert len(sides) <= 2
+    assert all(g.side(0, 1, d, 1.35) for d in sides)
+
+
+@given(st.lists(_spot, min_size=1, max_size=6), _spot)
+def test_nearest_landmark_is_nearest_and_its_direction_is_the_octant_from_there(places, here):
+    bearing = nearest_landmark(np.array(here), np.array(places))
+    offsets = np.array(here) - np.array(places)
+    away = np.hypot(*offsets.T)
+    if bearing is None:
+        assert away.min() < 1e-3
+        return
+    assert away[bearing.landmark] <= away.min() + 1e-3
+    dx, dy = offsets[bearing.landmark]
+    degrees = np.degrees(np.arctan2(dy, dx)) % 360.0
+    off = (degrees - 45.0 * DIRECTIONS.index(bearing.direction) + 180.0) % 360.0 - 180.0
+    assert abs(off) <= 22.5 + 1e-9
+    assert bearing.clear == (abs(off) <= 22.5 - BORDER_DEG) or abs(abs(off) - 22.5 + BORDER_DEG) < 1e-9
+    assert [d for d in DIRECTIONS if lies_towards((dx, dy), d, 22.4999)] in ([bearing.direction], [])
+
+
+def test_the_first_of_equally_near_landmarks_is_taken():
+    bearing = nearest_landmark(np.array([0.0, 0.0]), np.array([[3.0, 4.0], [5.0, 0.0], [0.0, -5.0]]))
+    assert bearing.landmark == 0
+    assert nearest_landmark(np.array([1.0, 1.0]), np.array([[1.0, 1.0]])) is None
+    assert nearest_landmark(np.array([1.0, 1.0]), np.zeros((0, 2))) is None
+
+
+def test_boxes_reject_no_pair_that_outlines_would_not():
+    g = SceneGeometry(street())
+    some = range(len(g.boxes))
+    found = [(g._within(i, j, r), g.gap_m(i, j) <= r) for i in some for j in some for r in (0.5, 3.0, 8.0, 20.0)]
+    assert all(told == true for told, true in found)
+    assert {told for told, _ in found} == {True, False}
+
+
+def test_heights_over_a_place_are_those_of_the_triangles_there():
+    geometry = SceneGeometry(street())
+    for i, (x, y, _) in enumerate(geometry.centres.tolist()):
+        for j, instance in enumerate(geometry.scene.instances):
+            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+            upright = np.abs(np.cross(b - a, c - a)[:, 2]) <= 1e-12
+            basis = np.stack([b - a, c - a], axis=2)[~upright]
+            u, v = np.linalg.solve(basis[:, :2], (np.array([x, y]) - a[~upright, :2])[:, :, None])[:, :, 0].T
+            inside = (u >= 1e-9) & (v >= 1e-9) & (u + v <= 1 - 1e-9)
+            edge = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+            z = a[~upright, 2] + u * basis[:, 2, 0] + v * basis[:, 2, 1]
+            heights = np.sort(geometry._heights(j, x, y))
+            assert inside.sum() <= len(heights) <= edge.sum(), (i, j)
+            assert np.isin(heights.round(6), z[edge].round(6)).all()
+            assert np.isin(z[inside].round(6), heights.round(6)).all()

@@ -1,12 +1,13 @@
-"""What the tests of the pages share: one server of `view`."""
+"""What the tests of the pages share: one server of `view`, and its page of the yard."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from support.viewing import served
+from support.viewing import YARD, draw, ready, served
 
 
 @pytest.fixture(scope="session")
@@ -14,3 +15,23 @@ def view_url(smoke: Path) -> Iterator[str]:
     """The start page's address of a server of the whole smoke release."""
     with served(smoke) as url:
         yield url
+
+
+@pytest.fixture
+def yard(browser: Any, view_url: str) -> Any:
+    """The page of the yard, with nothing left of what another test has selected or put in place of its own."""
+    address = f"{view_url}scenes/{YARD}/"
+    if browser.current_url.partition("#")[0] != address:
+        browser.get(address)
+        ready(browser)
+    browser.execute_script(
+        """page.routes.ways = (window.real ??= page.routes.ways); delete page.routes.wanted;
+        page.letGo(); page.mode("orbit"); page.view.home(); page.tabs.show("panel");
+        page.view.setVisible("scene", true);
+        for (const box of document.querySelectorAll("[data-layer]")) {
+          box.checked = box.dataset.layer !== "anchors";
+          page.setLayer(box.dataset.layer, box.checked);
+        }"""
+    )
+    draw(browser, setting="", split="", modality="", target="", colour="setting", most="")
+    return browser

@@ -1,14 +1,14 @@
-"""The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; a killed server."""
+"""The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; servers that die."""
 
 import contextlib
 import http.client
 import itertools
 import json
-import math
 import os
 import signal
 import socket
 import threading
+import time
 import urllib.request
 
 import pyarrow.compute as pc
@@ -19,26 +19,44 @@ from support.annotate_page import Page, entries
 from support.browser import until
 
 from aerialdojo_gen.dataset.build import run_pipeline
-from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.imports.command import add_scene
 from aerialdojo_gen.imports.import_mesh import MeshOptions
 from aerialdojo_gen.store import shards as store
 
-NAME = "Helsinki"
+NAME = "Village"
 WORDS = ("one", "two", "three")
 UNLABELLED = """
   const named = (e) => e.labels?.length || e.getAttribute("aria-label") || e.textContent.trim();
   return [...document.querySelectorAll("input, select, textarea, button, progress, [role=application]")]
     .filter((e) => !named(e)).map((e) => e.outerHTML);
 """
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    """A block of Helsinki, as add-scene makes it of OpenStreetMap's buildings."""
-    folder = tmp_path_factory.mktemp("helsinki")
-    foreign.helsinki(folder / "helsinki.glb")
-    return add_scene(NAME, folder / "helsinki.glb", folder / "mine", MeshOptions(crop_m=(628.0, 97.0, 70.0)))
+# Of axe's rules: listitem, aria-allowed-role, and what may stand in a label.
+MISPLACED = """
+  const wrong = [];
+  for (const item of document.querySelectorAll("li")) {
+    const list = item.parentElement, role = list.getAttribute("role");
+    if (!["UL", "OL"].includes(list.tagName) || !["list", null].includes(role)) wrong.push(item.outerHTML);
+  }
+  for (const list of document.querySelectorAll("ul[role], ol[role], label ul, label div")) wrong.push(list.outerHTML);
+  return wrong;
+"""
+# Every text of the status, with what was unsaved when it was said; how often the page comes to ask for news.
+WATCH = """
+  window.said = [];
+  const status = document.getElementById("saved");
+  const unsaved = () => JSON.parse(sessionStorage.getItem("aerialdojo-annotate-queue-" + arguments0) ?? "[]").length;
+  new MutationObserver(() => window.said.push([status.textContent, unsaved()])).observe(status, { childList: true });
+""".replace("arguments0", json.dumps(annotating.YARD))
+TICKS = """
+  const later = window.setTimeout;
+  window.ticks = 0;
+  window.setTimeout = (what, ms, ...rest) => { window.ticks += ms === 1500; return later(what, ms, ...rest); };
+"""
+# Whether an element is on the screen, as wide and high as it is.
+INSIDE = """
+  const b = document.querySelector(arguments[0]).getBoundingClientRect();
+  return b.left >= 0 && b.top >= 0 && b.right <= innerWidth + 0.5 && b.bottom <= innerHeight + 0.5 && b.width > 0;
+"""
 
 
 def roof(house):
@@ -46,23 +64,15 @@ def roof(house):
     return x, y, house.bounds[1, 2]
 
 
-def told_apart(scene):
-    """The house in the middle, and three near it whose colour no other has in their direction."""
-    houses = sorted(
-        (i for i in scene.instances if i.category == "building"), key=lambda i: math.hypot(*i.centroid[:2])
-    )
-    mark, *others = houses
-    looks = [(compass_direction(*(i.centroid - mark.centroid)[:2]), i.attributes["colour"]) for i in others]
-    return [mark, *[i for i, look in zip(others, looks, strict=True) if looks.count(look) == 1][:3]]
-
-
-def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, scene, project, tmp_path):
-    data = tmp_path / "data"
-    mark, *targets = told_apart(scene.scene)
+def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, project, tmp_path):
+    foreign.village().export(tmp_path / "village.glb")
+    scene = add_scene(NAME, tmp_path / "village.glb", tmp_path / "mine", MeshOptions())
+    place = annotating.Place(NAME, scene.pipeline, tmp_path / "data", scene.annotations)
+    mark = scene.scene["clock_tower_0000"]
+    targets = [scene.scene[f"house_{k:04d}"] for k in (2, 3, 4)]  # each alone in its direction
     bounds = scene.scene.bounds.tolist()
-    with annotating.served(project, NAME, scene.pipeline, data) as (url, _):
+    with annotating.served(project, place) as (url, _):
         page = Page(browser, url)
-        page.one("#who").send_keys("Ada")
         assert page.text("#objects .empty").startswith("none yet")
         # A landmark: pick, L, a name.
         page.click_at(roof(mark), bounds)
@@ -70,25 +80,20 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         assert page.text("#panel .node") == mark.node
         page.press("l")
         until("the fields", lambda: page.all("#field-name"))
-        page.write("name", "corner house")
+        page.write("name", "old tower")
         page.leave()
         page.saved()
-        assert entries(scene.annotations, "landmarks") == [{"id": 0, "name": "corner house", "node": mark.node}]
+        assert entries(scene.annotations, "landmarks") == [{"id": 0, "name": "old tower", "node": mark.node}]
         # Objects: pick, O, a name, a description; a warning while typing; an anchor by key.
-        for k, house in enumerate(targets):
+        for word, house in zip(WORDS, targets, strict=True):
             page.click_at(roof(house), bounds)
-            until(
-                "the pick", lambda house=house: page.all("#panel .node") and page.text("#panel .node") == house.node
-            )
+            until("the pick", lambda node=house.node: page.all("#panel .node") and page.text("#panel .node") == node)
             page.press("o")
             until("the fields", lambda: page.all("#field-description"))
-            page.write("name", f"<b>{WORDS[k]}</b> house")
-            page.write("description", "A building at x=3")
+            page.write("name", f"<b>{word}</b> house")
+            page.write("description", "A house at x=3")
             until("a warning while typing", lambda: "coordinates" in page.text("#faults-description"))
-            page.write(
-                "description",
-                f"A {house.attributes['colour']} building, the number {WORDS[k]} here.",
-            )
+            page.write("description", f"A {house.attributes['colour']} house, the number {word} here.")
             until("no warning", lambda: page.text("#faults-description") == "")
             page.leave()
             page.saved()
@@ -108,12 +113,8 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         names = [item.get_property("textContent") for item in page.all("#objects .name")]
         assert names == [f"<b>{word}</b> house" for word in WORDS]
         page.click("#objects li:nth-child(2) button")
-        until(
-            "the choice",
-            lambda: (
-                [c.get_attribute("aria-pressed") for c in page.all(".anchors button")] == ["false", "true", "false"]
-            ),
-        )
+        pressed = "return [...document.querySelectorAll('.anchors button')].map((b) => b.ariaPressed)"
+        until("the choice", lambda: browser.execute_script(pressed) == ["false", "true", "false"])
         assert page.text("#panel .task").startswith("As the task will say it<b>two</b> house, ")
         assert scene.annotations.read_text() == written
         # By keys alone: to the view, above the middle of the scene, pick what is there.
@@ -134,12 +135,100 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, s
         until("redone", lambda: page.text("#progress-text") == "3 of 3 objects done")
         assert scene.annotations.read_text() == written
         assert chrome.errors(browser) == []
-    run_pipeline(scene.pipeline, data, stages=["filter"], scenes=[NAME], workers=1)
-    anchors = store.read_scene(data, "anchors", NAME).to_pylist()
-    assert {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]} == dict.fromkeys(
-        range(3), "annotation"
-    )
-    assert pc.sum(store.read_scene(data, "verdicts", NAME)["keep"]).as_py() >= 1
+    run_pipeline(scene.pipeline, place.data, stages=["filter"], scenes=[NAME], workers=1)
+    anchors = store.read_scene(place.data, "anchors", NAME).to_pylist()
+    chosen = {a["object_id"]: a["selected_by"] for a in anchors if a["selected"]}
+    assert chosen == dict.fromkeys(range(3), "annotation")
+    assert pc.sum(store.read_scene(place.data, "verdicts", NAME)["keep"]).as_py() >= 1
+
+
+class Yard:
+    """The yard's annotations, and its server, always on one port, which may die and be started again."""
+
+    def __init__(self, project, place):
+        self._project, self.annotations, self._place = project, place.annotations, place
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self._running = contextlib.ExitStack()
+        self._process = None
+
+    def start(self):
+        if self._process is None:
+            served = annotating.served(self._project, self._place, self.port)
+            self.url, self._process = self._running.enter_context(served)
+
+    def kill(self):
+        os.kill(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._process = None
+        self._running.close()
+
+    def close(self):
+        self._running.close()
+
+
+@pytest.fixture(scope="module")
+def yard(project, tmp_path_factory):
+    yard = Yard(project, annotating.yard_in(project, tmp_path_factory.mktemp("yard")))
+    with contextlib.closing(yard):
+        yield yard
+
+
+@pytest.fixture
+def page(browser, yard):
+    yard.start()
+    page = Page(browser, yard.url)
+    chrome.errors(browser)  # those of servers that died before
+    return page
+
+
+def select(page, number=0):
+    page.click(f'#objects li[data-key="objects-{number}"] button')
+    until("the fields", lambda: page.all("#field-name"))
+
+
+def test_the_page_keeps_its_shape_its_selection_and_what_is_typed(browser, page, yard):
+    annotations = yard.annotations
+    # No anchor is lacking: the sampler chooses it, and the page says so.
+    count = len(entries(annotations))
+    assert page.text("#progress-text") == f"{count} of {count} objects done · anchors chosen by the sampler"
+    assert "lacks" not in page.text("#objects")
+    page.one("#who").send_keys("Ada Lovelace\ue007")
+    select(page, 1)
+    until("the candidates", lambda: len(page.all(".anchors button")) == 3)
+    assert "sampler" in page.text(".anchors button:nth-child(1)")
+    assert browser.execute_script(MISPLACED) == []
+    browser.execute_script(
+        "localStorage.clear()"
+    )  # another start may take another port, which has a store of its own
+    browser.refresh()
+    page.ready()
+    assert not page.one("#who").is_displayed()
+    assert page.text("#who-name") == "Ada Lovelace"
+    assert page.text("#panel h2") == "Object 1"
+    assert page.one("#field-name").get_property("value") == entries(annotations)[1]["name"]
+    # What is too long is not cut: it stays, and says why it is not saved.
+    before, long = annotations.read_bytes(), "A bench. " + "very " * 450 + "long."
+    page.one("#field-description").click()
+    browser.execute_script(
+        "const f = document.querySelector('#field-description'); f.value = arguments[0];"
+        "f.dispatchEvent(new Event('input')); f.dispatchEvent(new Event('change'));", long,
+    )  # fmt: skip
+    until("the warning", lambda: f"{len(long)} characters, 2000 at most" in page.text("#faults-description"))
+    select(page, 0)
+    assert "not saved" in page.text("#saved")
+    assert "object 1, description too long" in page.text("#saved")
+    select(page, 1)
+    assert page.one("#field-description").get_property("value") == long
+    assert annotations.read_bytes() == before
+    page.write("description", "A short one.")
+    page.leave()
+    page.saved()
+    assert entries(annotations)[1]["description"] == "A short one."
+    line = json.loads(annotations.with_suffix(".history.jsonl").read_text().splitlines()[-1])
+    assert line["who"] == "Ada Lovelace"
+    assert chrome.errors(browser) == []
 
 
 def rename_on_and_on(url, answered):
@@ -155,89 +244,129 @@ def rename_on_and_on(url, answered):
             answered.append(n)
 
 
-@pytest.fixture(scope="module")
-def yard(project, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("yard")
-    pipeline = annotating.yard_pipeline(project, folder)
-    return pipeline, folder / "data", folder / "annotations" / f"{annotating.YARD}.json"
+def conflict_open(driver):
+    return driver.execute_script("return document.getElementById('conflict').open")
 
 
-def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, yard, project):
-    pipeline, data, annotations = yard
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with annotating.served(project, annotating.YARD, pipeline, data, port) as (url, process):
-        first = Page(browser, url)
-        one = browser.current_window_handle
-        browser.switch_to.new_window("tab")
-        second, two = Page(browser, url), browser.current_window_handle
+def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, page, yard):
+    annotations, first, one = yard.annotations, page, browser.current_window_handle
+    browser.switch_to.new_window("tab")
+    second, two = Page(browser, yard.url), browser.current_window_handle
 
-        def begin(page):
-            page.click('#objects li[data-key="objects-0"] button')
-            until("the fields", lambda: page.all("#field-name"))
-            page.one("#field-name").click()
+    def begin(page):
+        select(page)
+        page.one("#field-name").click()
 
-        # Both have the field open; the first saves.
-        begin(second)
-        browser.switch_to.window(one)
-        begin(first)
-        first.write("name", "crimson van")
-        first.leave()
-        first.saved()
-        # The second writes something else: it is shown both, and nothing is overwritten.
-        browser.switch_to.window(two)
-        second.write("name", "scarlet van")
-        second.press("\ue004")
-        until("the conflict", lambda: browser.execute_script("return document.getElementById('conflict').open"))
-        assert "crimson van" in second.text("#conflict")
-        assert "scarlet van" in second.text("#conflict")
-        assert entries(annotations)[0]["name"] == "crimson van"
-        second.one("#keep-theirs").click()
-        until("theirs", lambda: second.one("#field-name").get_property("value") == "crimson van")
-        # What does not overlap is merged, and said.
-        second.one("#field-description").click()
-        browser.switch_to.window(one)
-        begin(first)
-        first.write("name", "ruby van")
-        first.leave()
-        first.saved()
-        browser.switch_to.window(two)
-        second.write("description", "A red delivery van in the corner of the yard, of which there is one.")
-        second.press("\ue004")
-        second.saved()
-        until(
-            "both",
-            lambda: (
-                (entries(annotations)[0]["name"], "of which" in entries(annotations)[0]["description"])
-                == ("ruby van", True)
-            ),
-        )
-
-        # The server is killed; what is typed meanwhile is kept, and saved when there is a server again.
-        second.leave()
-        begin(second)
-        answered = []
-        saving = threading.Thread(target=rename_on_and_on, args=(url, answered))
-        saving.start()
-        until("saves under way", lambda: len(answered) >= 5)
-        os.kill(process.pid, signal.SIGKILL)
-        saving.join()
-        process.wait()
-        on_disk = entries(annotations)[1]["name"]
-        assert on_disk in (f"thing {len(answered) - 1}", f"thing {len(answered)}")
-        second.write("name", "van of the night")
-        second.press("\ue004")
-        until("said that it is not saved", lambda: "not saved" in second.text("#saved"))
-        assert entries(annotations)[0]["name"] == "ruby van"
-    with annotating.served(project, annotating.YARD, pipeline, data, port):
-        second.saved()
-        assert entries(annotations)[0]["name"] == "van of the night"
-        browser.switch_to.window(one)
-        until("the other tab sees it", lambda: "van of the night" in first.text("#objects"))
-        lines = [json.loads(line) for line in annotations.with_suffix(".history.jsonl").read_text().splitlines()]
-        assert lines[-1]["what"] == "name of object 0 (van of the night)"
-        assert all(a["after"] == b["before"] for a, b in itertools.pairwise(lines))
+    # Both have the field open; the first saves.
+    begin(second)
+    browser.switch_to.window(one)
+    begin(first)
+    first.write("name", "crimson van")
+    first.leave()
+    first.saved()
+    # The second writes something else: it is shown both, and nothing is overwritten.
+    browser.switch_to.window(two)
+    second.write("name", "scarlet van")
+    second.press("\ue004")
+    until("the conflict", lambda: conflict_open(browser))
+    assert "crimson van" in second.text("#conflict")
+    assert "scarlet van" in second.text("#conflict")
+    assert entries(annotations)[0]["name"] == "crimson van"
+    second.one("#keep-theirs").click()
+    until("theirs", lambda: second.one("#field-name").get_property("value") == "crimson van")
+    # What does not overlap is merged, and said.
+    second.one("#field-description").click()
+    browser.switch_to.window(one)
+    begin(first)
+    first.write("name", "ruby van")
+    first.leave()
+    first.saved()
+    browser.switch_to.window(two)
+    merged = "A red delivery van in the corner of the yard, of which there is one."
+    second.write("description", merged)
+    second.press("\ue004")
+    second.saved()
+    until("both", lambda: entries(annotations)[0]["description"] == merged)
+    assert entries(annotations)[0]["name"] == "ruby van"
+    # The server is killed; what is typed meanwhile is kept, and saved when there is a server again.
+    second.leave()
+    begin(second)
+    answered = []
+    saving = threading.Thread(target=rename_on_and_on, args=(yard.url, answered))
+    saving.start()
+    until("saves under way", lambda: len(answered) >= 5)
+    yard.kill()
+    saving.join()
+    on_disk = entries(annotations)[1]["name"]
+    assert on_disk in (f"thing {len(answered) - 1}", f"thing {len(answered)}")
+    second.write("name", "van of the night")
+    second.press("\ue004")
+    until("said that it is not saved", lambda: "not saved" in second.text("#saved"))
+    # The page says so, and its panel stays where it was.
+    until("lost", lambda: "does not answer" in second.text("#saved"))
+    for selector in ("#panel", "#saved", "#show-help", "#remove", "#field-description"):
+        assert browser.execute_script(INSIDE, selector), selector
+    assert entries(annotations)[0]["name"] == "ruby van"
+    yard.start()
+    second.saved()
+    assert entries(annotations)[0]["name"] == "van of the night"
+    browser.switch_to.window(one)
+    until("the other tab sees it", lambda: "van of the night" in first.text("#objects"))
+    lines = [json.loads(line) for line in annotations.with_suffix(".history.jsonl").read_text().splitlines()]
+    assert lines[-1]["what"] == "name of object 0 (van of the night)"
+    assert all(a["after"] == b["before"] for a, b in itertools.pairwise(lines))
     browser.switch_to.window(two)
     browser.close()
     browser.switch_to.window(one)
+
+
+def answer_nonsense(port, still):
+    """Be a server of another kind on the port: what it says is no reason to forget a change."""
+    answers = [
+        b"HTTP/1.1 500 No\r\nConnection: close\r\n\r\nInternal", b"HTTP/1.1 200 OK\r\n\r\n{}", b"",
+        b"HTTP/1.1 401 No\r\nConnection: close\r\n\r\nopen the address", b"HTTP/1.1 200 OK\r\n\r\n<html>",
+    ]  # fmt: skip
+    heard, end = 0, time.monotonic() + 120
+    with socket.create_server(("127.0.0.1", port)) as other:
+        other.settimeout(0.2)
+        while heard < len(answers):
+            assert time.monotonic() < end
+            with contextlib.suppress(TimeoutError):
+                client, _ = other.accept()
+                with client, contextlib.suppress(OSError):
+                    client.recv(65536)
+                    client.sendall(answers[heard])
+                    heard += 1
+            assert still()
+
+
+def test_nothing_says_saved_while_a_conflict_is_open_servers_die_and_others_answer(browser, page, yard):
+    annotations = yard.annotations
+    select(page)
+    page.one("#field-name").click()
+    document = json.loads(annotations.read_text())  # as an editor changes it
+    document["objects"][0]["name"] = "vermilion van"
+    annotations.write_text(json.dumps(document, indent=2) + "\n")
+    until("their name", lambda: "vermilion van" in page.text("#objects"))
+    browser.execute_script(WATCH)
+    yard.kill()
+    page.write("name", "scarlet van")
+    page.press("\ue004")
+    until("the conflict", lambda: conflict_open(browser))
+    yard.start()
+    # Twice the page comes to where it would ask the server, which is there again.
+    browser.execute_script(TICKS)
+    until("two ticks", lambda: browser.execute_script("return window.ticks") >= 2)
+    assert page.text("#saved") != "saved"
+    assert entries(annotations)[0]["name"] == "vermilion van"
+    assert conflict_open(browser)
+    yard.kill()
+    page.one("#use-mine").click()
+    until("said that it is not saved", lambda: "not saved" in page.text("#saved"))
+    answer_nonsense(yard.port, lambda: page.text("#saved") != "saved")
+    yard.start()
+    page.saved()
+    assert entries(annotations)[0]["name"] == "scarlet van"
+    said = browser.execute_script("return window.said")
+    assert [text for text, unsaved in said if text == "saved" and unsaved] == []
+    assert not conflict_open(browser)

@@ -9,14 +9,10 @@ import pytest
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from support.browser import errors, until
-from support.viewing import YARD
+from support.viewing import YARD, draw, ready, texts
 
+from aerialdojo_gen.base.pictures import decode_rgb
 from aerialdojo_gen.dataset.release import open_release
-
-
-def ready(driver):
-    state = "return document.body?.dataset.ready"
-    assert until("the page is ready", lambda: driver.execute_script(state)) == "yes"
 
 
 @pytest.fixture(scope="module")
@@ -26,65 +22,30 @@ def start(browser, view_url):
     return browser
 
 
-@pytest.fixture
-def yard(browser, view_url):
-    """The page of the yard: nothing selected, and nothing left of what another test has put in place of its own."""
-    address = f"{view_url}scenes/{YARD}/"
-    if browser.current_url.partition("#")[0] != address:
-        browser.get(address)
-        ready(browser)
-    browser.execute_script(
-        "page.routes.ways = (window.real ??= page.routes.ways); delete page.routes.wanted;"
-        "for (const name of ['objects', 'landmarks', 'routes']) page.view.setVisible(name, true);"
-        "page.letGo(); page.view.home(); page.tabs.show('panel')"
-    )
-    draw(browser, setting="", split="", modality="", target="", colour="setting", most="")
-    return browser
-
-
-def draw(driver, **choice):
-    driver.execute_async_script(
-        "for (const [id, value] of Object.entries(arguments[0])) document.getElementById(id).value = value;"
-        "page.routes.draw().then(arguments[1])", choice,
-    )  # fmt: skip
-
-
-def texts(driver, selector):
-    return driver.execute_script(
-        "return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)", selector
-    )
-
-
 # ---- the start page ----
 
 
-def test_the_start_page_shows_scenes_and_tasks_with_pictures(smoke, start):
+def test_the_start_page_shows_scenes_and_tasks_with_pictures_and_opens_one(smoke, start):
     release = open_release(smoke)
     assert texts(start, "#scenes strong") == release.scenes
     assert texts(start, "#n-tasks") == [f"{release.routes().num_rows:,}"]
     loaded = (
-        "return [...document.querySelectorAll(arguments[0])].every((i) => i.complete && i.naturalWidth > 100)"
-        " && document.querySelectorAll(arguments[0]).length"
+        "const all = [...document.querySelectorAll(arguments[0])];"
+        "return all.every((i) => i.complete && i.naturalWidth > 100) && all.length"
     )
     assert until("pictures", lambda: start.execute_script(loaded, "#scenes img")) == len(release.scenes)
     start.find_element("css selector", f"#scenes [data-scene={YARD}] button").click()
-    wanted = release.routes(scene=YARD).num_rows
-    until("the tasks of the yard", lambda: texts(start, "#n-tasks") == [f"{wanted:,}"])
+    routes = release.routes(scene=YARD)["nav_id"].to_pylist()
+    until("the tasks of the yard", lambda: texts(start, "#n-tasks") == [f"{len(routes):,}"])
     assert all(YARD in text for text in texts(start, "#tasks li"))
     until("goals", lambda: start.execute_script(loaded, "#tasks li:nth-child(-n+4) img") == 4)
-    assert errors(start) == []
-
-
-def test_a_task_of_the_start_page_opens_its_route(smoke, start):
-    box = start.find_element("css selector", "#words")
-    route = open_release(smoke).routes(scene=YARD).to_pylist()[3]
-    box.clear()
-    box.send_keys(f"{route['nav_id']}-i")
+    start.find_element("css selector", "#words").send_keys(f"{routes[3]}-i")
     until("the task", lambda: texts(start, "#n-tasks") == ["1"])
+    assert errors(start) == []
     start.find_element("css selector", "#tasks li a").click()
-    until("the scene", lambda: start.execute_script("return document.getElementById('title')?.textContent") == YARD)
+    until("the scene", lambda: texts(start, "#title") == [YARD])
     ready(start)
-    assert texts(start, "#picked-route") == [route["nav_id"]]
+    assert texts(start, "#picked-route") == [routes[3]]
     assert start.execute_script("return document.querySelector('#busy').hidden")
 
 
@@ -93,8 +54,8 @@ def test_a_task_of_the_start_page_opens_its_route(smoke, start):
 
 def test_search_takes_words_in_any_order_and_arrows_lead_into_what_is_found(yard):
     name = yard.execute_script("return page.index.objects.map((o) => o.name).find((n) => n.split(' ').length > 1)")
-    box = yard.find_element("css selector", "#search")
-    box.clear()
+    ActionChains(yard).send_keys("/").perform()
+    box = yard.switch_to.active_element
     box.send_keys(" ".join(reversed(name.lower().split())))
     found = texts(yard, "#results [role=option]")
     assert found[0].startswith(name)
@@ -111,11 +72,9 @@ def test_search_takes_words_in_any_order_and_arrows_lead_into_what_is_found(yard
     box.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
     assert yard.execute_script(chosen) == [f"found-{len(found) - 1}"]
     # The last one is the routes with these words.
-    assert re.match(r"[\d,]+ routes", found[-1])
     box.send_keys(Keys.ENTER)
-    until("the list", lambda: yard.find_element("css selector", "#list").is_displayed())
-    wanted = int(found[-1].split()[0].replace(",", ""))
-    until("these routes", lambda: texts(yard, "#route-count") == [f"{wanted:,} routes"])
+    until("these routes", lambda: texts(yard, "#route-count") == [re.match(r"[\d,]+ routes", found[-1])[0]])
+    assert yard.find_element("css selector", "#list").is_displayed()
     yard.execute_script("page.routes.words = []; page.list.find.value = ''")
     box.send_keys(Keys.ESCAPE)
     assert texts(yard, "#results li") == []
@@ -132,7 +91,7 @@ def shown_in_list(driver):
     )
 
 
-def test_the_list_holds_all_routes_sorted_and_makes_only_rows_in_sight(smoke, yard):
+def test_the_list_holds_all_routes_sorted_makes_only_rows_in_sight_and_knows_keys(smoke, yard):
     routes = open_release(smoke).routes(scene=YARD).to_pylist()
     length = {row["nav_id"]: round(row["length_m"], 3) for row in routes}
     # What is drawn may be a sample: the list is whole.
@@ -143,35 +102,25 @@ def test_the_list_holds_all_routes_sorted_and_makes_only_rows_in_sight(smoke, ya
     assert 5 < yard.execute_script(made) < 40 < len(routes)
     ordered = sorted(length.values())
     assert [length[nav] for nav in shown_in_list(yard)] == ordered[: len(shown_in_list(yard))]
-    seen = set()
-    height = yard.execute_script("return document.getElementById('route-rows').clientHeight")
-    for top in range(0, 46 * len(routes), height):
-        yard.execute_script("const r = document.getElementById('route-rows'); r.scrollTop = arguments[0]", top)
+    seen, box = set(), yard.find_element("css selector", "#route-rows")
+    for top in range(0, 46 * len(routes), box.get_property("clientHeight")):
+        yard.execute_script("arguments[0].scrollTop = arguments[1]", box, top)
         yard.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
         seen.update(shown_in_list(yard))
         assert yard.execute_script(made) < 40
     assert seen == set(length)
     yard.find_element("css selector", "#route-turn").click()
     assert [length[nav] for nav in shown_in_list(yard)] == ordered[::-1][: len(shown_in_list(yard))]
-    # Filters are those of the page, words narrow it further.
-    draw(yard, split="id_test")
-    assert texts(yard, "#route-count") == [f"{sum(row['split'] == 'id_test' for row in routes):,} routes"]
-    yard.find_element("css selector", "#route-turn").click()
-
-
-def test_a_route_is_picked_from_the_list_by_keys(yard):
-    yard.find_element("css selector", "#tab-list").click()
-    box = yard.find_element("css selector", "#route-rows")
     box.send_keys(Keys.HOME, Keys.END)
-    last = yard.execute_script("const l = page.list; return page.index.routes.nav_id[l.sorted.at(-1)]")
+    *_, before, last = yard.execute_script("return page.list.sorted.map((k) => page.index.routes.nav_id[k])")
     assert last in shown_in_list(yard)
     box.send_keys(Keys.ARROW_UP, Keys.ENTER)
-    picked = yard.execute_script("const l = page.list; return page.index.routes.nav_id[l.sorted.at(-2)]")
-    until("the route", lambda: texts(yard, "#picked-route") == [picked])
+    until("the route", lambda: texts(yard, "#picked-route") == [before])
     assert yard.find_element("css selector", "#panel").is_displayed()
     yard.find_element("css selector", "#tab-list").click()
     marked = "return [...document.querySelectorAll('.route[aria-selected=true]')].map((r) => r.dataset.nav)"
-    assert yard.execute_script(marked) == [picked]
+    assert yard.execute_script(marked) == [before]
+    yard.find_element("css selector", "#route-turn").click()
 
 
 def test_the_panel_begins_at_its_top(yard):
@@ -294,21 +243,21 @@ def test_many_routes_are_one_buffer_with_a_busy_sign(smoke, yard):
     assert yard.execute_script(f"{LAYER} page.view.draw(); {JOINED}") == segments
 
 
+def picture(driver, level=0):
+    """What the view draws at a level of detail, (H, W, 3) sRGB."""
+    shown = driver.execute_script(
+        "const view = page.view; cancelAnimationFrame(view.pending); view.pending = 1; view.draw(arguments[0]);"
+        "view.pending = 0; return view.canvas.toDataURL().split(',')[1]", level,
+    )  # fmt: skip
+    return decode_rgb(base64.b64decode(shown)).astype(np.float32)
+
+
 def test_what_is_drawn_in_motion_stays_near_what_is_drawn_at_rest(yard):
     yard.execute_script("for (const name of page.view.layers.keys()) page.view.setVisible(name, false)")
-    picture = (
-        "const view = page.view; cancelAnimationFrame(view.pending); view.pending = 1; view.draw(arguments[0]);"
-        "return view.canvas.toDataURL().split(',')[1]"
-    )
-    shots = []
-    for level in (0, 1, 3, 6):
-        png = base64.b64decode(yard.execute_script(picture, level))
-        image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
-        shots.append(cv2.resize(image, (48, 48), interpolation=cv2.INTER_AREA))
-    yard.execute_script("page.view.pending = 0; page.view.draw()")
-    assert np.std(shots[0]) > 10
-    for level, most, shot in zip((1, 3, 6), (2.0, 5.0, 12.0), shots[1:], strict=True):
-        assert np.abs(shot - shots[0]).mean() < most, level
+    still, *moving = (cv2.resize(picture(yard, n), (48, 48), interpolation=cv2.INTER_AREA) for n in (0, 1, 3, 6))
+    assert np.std(still) > 10
+    for most, shot in zip((2.0, 5.0, 12.0), moving, strict=True):
+        assert np.abs(shot - still).mean() < most
 
 
 def test_what_is_picked_is_what_the_camera_sees_now(yard):
@@ -367,24 +316,15 @@ def test_where_routes_overlap_the_tightest_gives_the_colour(yard, turn):
     )  # fmt: skip
     draw(yard, colour="clearance", most="")
     assert "the tightest is on top" in texts(yard, "#legend")[0]
-    colours, pixels = yard.execute_async_script(
-        LAYER + """const [tight, wide, done] = arguments, view = page.view;
-        view.setVisible('scene', false);
-        import("/static/colours.js").then(({ clearanceColour }) => {
-          const rgb = (k) => [1, 3, 5].map((at) =>
-            parseInt(clearanceColour(page.index.routes.min_clearance_m[k]).slice(at, at + 2), 16));
-          view.draw();
-          const gl = view.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
-          const all = new Uint8Array(4 * w * h), count = [0, 0];
-          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, all);
-          const two = [rgb(tight), rgb(wide)];
-          const like = (i, colour) => colour.every((v, j) => Math.abs(all[i + j] - v) < 3);
-          for (let i = 0; i < all.length; i += 4) two.forEach((colour, j) => { count[j] += like(i, colour); });
-          view.setVisible('scene', true);
-          done([two, count]);
-        });""",
+    yard.execute_script("page.view.setVisible('scene', false)")
+    colours = yard.execute_async_script(
+        """const [tight, wide, done] = arguments, clearance = page.index.routes.min_clearance_m;
+        import("/static/colours.js").then(({ clearanceColour }) =>
+          done([tight, wide].map((k) => clearanceColour(clearance[k]))));""",
         tight, wide,
     )  # fmt: skip
-    assert np.abs(np.subtract(*colours)).sum() > 30
-    assert pixels[0] > 100
-    assert pixels[1] < 0.02 * pixels[0]
+    shown, two = picture(yard), [np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) for colour in colours]
+    above, below = ((np.abs(shown - colour).max(axis=2) < 3).sum() for colour in two)
+    assert np.abs(two[0] - two[1]).sum() > 30
+    assert above > 100
+    assert below < 0.02 * above

@@ -1,30 +1,17 @@
 """The page of `view` in a real browser: it shows the scene, and does what its controls say."""
 
-import json
 import re
-import time
 
 import cv2
 import numpy as np
 import pytest
 from selenium.webdriver import ActionChains
-from selenium.webdriver.common.keys import Keys
 from support.browser import errors, until
-from support.viewing import YARD
+from support.viewing import YARD, draw, ready, texts
 
 from aerialdojo_gen.dataset.lookup import ReleasedScene
 from aerialdojo_gen.rendering.gallery import look_at
 from aerialdojo_gen.store.schemas import ACTION_NAMES
-
-
-@pytest.fixture(scope="module")
-def page(browser, view_url):
-    """The page in a browser: (driver, address)."""
-    url = f"{view_url}scenes/{YARD}/"
-    browser.get(url)
-    ready = "return document.body?.dataset.ready"
-    assert until("the page is ready", lambda: browser.execute_script(ready)) == "yes"
-    return browser, url
 
 
 def screenshot(driver):
@@ -56,51 +43,21 @@ def view_of(driver, picture):
 
 
 @pytest.fixture
-def driver(page):
-    """The browser, and everything as it was when the page was loaded."""
-    driver, _ = page
-    driver.execute_script(
-        "page.letGo(); page.mode('orbit'); page.view.home();"
-        "for (const id of ['setting', 'split', 'modality', 'target']) document.getElementById(id).value = '';"
-        "document.getElementById('most').value = '';"
-        "for (const box of document.querySelectorAll('[data-layer]'))"
-        " { box.checked = box.dataset.layer !== 'anchors'; page.setLayer(box.dataset.layer, box.checked); }"
-    )
-    driver.execute_async_script("page.routes.draw().then(arguments[0])")
-    return driver
-
-
-@pytest.fixture
-def bare(driver):
-    """That browser, which shows the scene alone."""
+def bare(yard):
+    """The page, which shows the scene alone."""
     for layer in ("routes", "objects", "landmarks"):
-        driver.execute_script(f"page.view.setVisible('{layer}', false)")
-    return driver
+        yard.execute_script(f"page.view.setVisible('{layer}', false)")
+    return yard
 
 
-def test_the_page_asks_nobody_else_and_has_no_errors(page):
-    driver, url = page
-    assert errors(driver) == []
-    sent = [
-        json.loads(entry["message"])["message"]["params"]
-        for entry in driver.get_log("performance")
-        if '"Network.requestWillBeSent"' in entry["message"]
-    ]
-    # The browser's own empty tab, before the page was asked for, is not the page's doing.
-    asked = [event["request"]["url"] for event in sent if not event["documentURL"].startswith("chrome")]
-    root = url.partition("scenes/")[0]
-    assert {f"{url}api/scene", f"{url}api/index", f"{root}static/three/three.module.min.js"} <= set(asked)
-    assert [other for other in asked if not other.startswith((root, "data:", "blob:"))] == []
-
-
-def test_the_page_shows_the_scene_in_the_projects_colours(smoke, driver):
-    driver.execute_script(
+def test_the_page_shows_the_scene_in_the_projects_colours(smoke, yard):
+    yard.execute_script(
         "for (const name of [...page.view.layers.keys()]) page.view.setVisible(name, false);"
         "page.view.overlay.style.display = 'none'"
     )
-    shown = view_of(driver, canvas(driver))
-    driver.execute_script("page.view.overlay.style.display = ''")
-    eye, target, fov = driver.execute_script(
+    shown = view_of(yard, canvas(yard))
+    yard.execute_script("page.view.overlay.style.display = ''")
+    eye, target, fov = yard.execute_script(
         "const v = page.view; return [v.camera.position.toArray(), v.controls.orbit.target.toArray(), v.camera.fov]"
     )
     height, width = shown.shape[:2]
@@ -115,26 +72,26 @@ def test_the_page_shows_the_scene_in_the_projects_colours(smoke, driver):
     assert np.quantile(difference, 0.99) < 40.0
 
 
-def test_layers_are_switched_on_and_off(driver):
-    driver.execute_script("document.querySelector('[data-layer=routes]').click()")
-    before = view_of(driver, canvas(driver))
-    yellow = np.array([250, 204, 21])
-    places = driver.execute_script(
+def test_layers_are_switched_on_and_off(yard):
+    def switched(layer):
+        yard.execute_script("document.querySelector(`[data-layer=${arguments[0]}]`).click()", layer)
+        return view_of(yard, canvas(yard))
+
+    def marked(picture):
+        return [np.abs(picture[y, x] - [250, 204, 21]).max() < 25 for x, y in inside]
+
+    before = switched("routes")
+    places = yard.execute_script(
         "const p = [0, 0, 0];"
         "return page.index.objects.map((o) => page.view.project(o.position, 0, p) && [p[0], p[1]])"
     )
     height, width = before.shape[:2]
     inside = [(int(x), int(y)) for x, y in places if 8 < x < width - 8 and 8 < y < height - 8]
     assert len(inside) >= 5
-    marked = [np.abs(before[y, x] - yellow).max() < 25 for x, y in inside]
-    assert sum(marked) >= len(inside) - 1  # a landmark's label may lie over one
-    driver.execute_script("document.querySelector('[data-layer=objects]').click()")
-    after = view_of(driver, canvas(driver))
-    assert not any(np.abs(after[y, x] - yellow).max() < 25 for x, y in inside)
-    driver.execute_script("document.querySelector('[data-layer=objects]').click()")
-    until("the marks are back", lambda: np.array_equal(view_of(driver, canvas(driver)), before))
-    driver.execute_script("document.querySelector('[data-layer=anchors]').click()")
-    assert (view_of(driver, canvas(driver)) != before).any(axis=2).sum() > 200
+    assert sum(marked(before)) >= len(inside) - 1  # a landmark's label may lie over one
+    assert not any(marked(switched("objects")))
+    assert np.array_equal(switched("objects"), before)
+    assert (switched("anchors") != before).any(axis=2).sum() > 200
 
 
 def click(driver, x, y):
@@ -145,15 +102,15 @@ def click(driver, x, y):
     ).click().perform()
 
 
-def test_a_route_is_picked_by_a_click(driver):
+def test_a_route_is_picked_by_a_click(yard):
     # One route alone, seen freely: the click can mean nothing else.
-    nav = driver.execute_script("return page.index.routes.nav_id[page.index.routes.setting.length - 1]")
-    driver.execute_script(
+    nav = yard.execute_script("return page.index.routes.nav_id[page.index.routes.setting.length - 1]")
+    yard.execute_script(
         "const k = page.routes.row.get(arguments[0]); page.routes.wanted = () => [k];"
         "for (const name of ['objects', 'landmarks']) page.view.setVisible(name, false)", nav,
     )  # fmt: skip
-    driver.execute_async_script("page.routes.draw().then(arguments[0])")
-    x, y = driver.execute_async_script(
+    draw(yard)
+    x, y = yard.execute_async_script(
         """
         const [nav, done] = arguments, view = page.view;
         page.routes.ways.then((ways) => {
@@ -166,53 +123,48 @@ def test_a_route_is_picked_by_a_click(driver):
         });""",
         nav,
     )
-    click(driver, x, y)
-    told = "return document.getElementById('picked-route')?.textContent"
-    heading = until("the panel names the route", lambda: driver.execute_script(told))
-    driver.execute_script("delete page.routes.wanted")
-    assert heading == nav
-    assert driver.execute_script("return location.hash") == f"#route={nav}"
-    facts = driver.execute_script("return document.getElementById('panel').textContent")
-    k = driver.execute_script("return page.routes.row.get(arguments[0])", nav)
-    length = driver.execute_script("return page.index.routes.length_m[arguments[0]]", k)
+    click(yard, x, y)
+    until("the panel names the route", lambda: texts(yard, "#picked-route") == [nav])
+    assert yard.execute_script("return location.hash") == f"#route={nav}"
+    (facts,) = texts(yard, "#panel")
+    k = yard.execute_script("return page.routes.row.get(arguments[0])", nav)
+    length = yard.execute_script("return page.index.routes.length_m[arguments[0]]", k)
     assert f"{length:.2f} m" in facts
     assert f"{nav}-s" in facts
-    assert errors(driver) == []
+    assert errors(yard) == []
 
 
-def test_flying_along_looks_as_the_drone_looks(smoke, page):
-    driver, url = page
+def test_flying_along_looks_as_the_drone_looks(smoke, yard, view_url):
     row = ReleasedScene(smoke, YARD).routes.to_pylist()[4]
     # The address of a route opens it.
-    driver.get(f"{url}#route={row['nav_id']}")
-    driver.refresh()
-    until("the page is ready", lambda: driver.execute_script("return document.body?.dataset.ready"))
-    assert driver.execute_script("return document.getElementById('picked-route').textContent") == row["nav_id"]
-    driver.execute_script("document.getElementById('ride').click()")
-    for k in (0, len(row["action"]) // 2, len(row["action"]) - 1):
-        driver.execute_script(
+    yard.get(f"{view_url}scenes/{YARD}/#route={row['nav_id']}")
+    yard.refresh()
+    ready(yard)
+    assert texts(yard, "#picked-route") == [row["nav_id"]]
+    yard.execute_script("document.getElementById('ride').click()")
+    for k in (0, len(row["action"]) // 2):
+        yard.execute_script(
             "const s = document.getElementById('step'); s.value = arguments[0];"
             "s.dispatchEvent(new Event('input'))", k,
         )  # fmt: skip
-        eye, ahead, fov = driver.execute_script(
+        eye, ahead, fov = yard.execute_script(
             "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
             "return [c.position.toArray(), [-e[8], -e[9], -e[10]], c.fov]"
         )
         assert eye == pytest.approx([row["x_m"][k], row["y_m"][k], row["z_m"][k]], abs=1e-3)
         assert ahead == pytest.approx([np.cos(row["yaw_rad"][k]), np.sin(row["yaw_rad"][k]), 0.0], abs=1e-3)
         assert fov == 90
-        doing = driver.execute_script("return document.getElementById('doing').textContent")
-        assert doing.startswith(ACTION_NAMES[row["action"][k]])
-    driver.execute_script("page.letGo()")
-    assert driver.execute_script("return page.view.camera.fov") == 60
+        assert texts(yard, "#doing")[0].startswith(ACTION_NAMES[row["action"][k]])
+    yard.execute_script("page.letGo()")
+    assert yard.execute_script("return page.view.camera.fov") == 60
 
 
-def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(driver):
-    driver.execute_script("page.mode('fly'); page.view.controls.lookFrom([0, 0, 12], [0, 20, 12])")
-    canvas_of = driver.execute_script("return page.view.canvas")
-    ActionChains(driver, duration=50).move_to_element(canvas_of).click_and_hold().move_by_offset(100, 0).perform()
-    ActionChains(driver).release().perform()
-    eye, ahead = driver.execute_script(
+def test_dragging_in_fly_mode_turns_the_camera_on_the_spot(yard):
+    yard.execute_script("page.mode('fly'); page.view.controls.lookFrom([0, 0, 12], [0, 20, 12])")
+    canvas_of = yard.execute_script("return page.view.canvas")
+    ActionChains(yard, duration=50).move_to_element(canvas_of).click_and_hold().move_by_offset(100, 0).perform()
+    ActionChains(yard).release().perform()
+    eye, ahead = yard.execute_script(
         "const c = page.view.camera, e = c.matrixWorld.elements; c.updateMatrixWorld();"
         "return [c.position.toArray(), [-e[8], -e[9], -e[10]]]"
     )
@@ -234,7 +186,7 @@ def test_an_object_is_picked_by_a_click_on_its_mesh(bare):
         )
         assert spot, f"{item['name']} is not to be seen"
         click(bare, *spot)
-        panel = bare.execute_script("return document.getElementById('panel').textContent")
+        (panel,) = texts(bare, "#panel")
         assert item["name"] in panel
         assert item["description"] in panel
         assert until("the reference image", lambda: bare.execute_script(picture)) >= 300
@@ -262,7 +214,7 @@ def test_what_is_picked_keeps_its_colours(bare):
     assert not bare.execute_script("return page.view.layers.has('frame')")
 
 
-def test_filters_count_as_the_release_does(smoke, driver):
+def test_filters_count_as_the_release_does(smoke, yard):
     routes = ReleasedScene(smoke, YARD).routes.to_pylist()
     target = routes[0]["target_object_id"]
     for choice, wanted in (
@@ -272,54 +224,31 @@ def test_filters_count_as_the_release_does(smoke, driver):
          [r for r in routes if (r["target_object_id"], r["split"]) == (target, "id_train")]),
         ({"setting": "long_horizon"}, [r for r in routes if r["setting"] == "long_horizon"]),
     ):  # fmt: skip
-        driver.execute_script(
-            "for (const id of ['setting', 'split', 'modality', 'target']) {"
-            " const s = document.getElementById(id); s.value = arguments[0][id] ?? '';"
-            " s.dispatchEvent(new Event('change')); }",
-            choice,
-        )
-        driver.execute_async_script("page.routes.draw().then(arguments[0])")
-        drawn = driver.execute_script("return page.view.layers.get('routes').routes.map((r) => r.id)")
+        draw(yard, **{"setting": "", "split": "", "modality": "", "target": ""} | choice)
+        drawn = yard.execute_script("return page.view.layers.get('routes').routes.map((r) => r.id)")
         assert sorted(drawn) == sorted(r["nav_id"] for r in wanted), choice
-        assert driver.execute_script("return document.getElementById('n-routes').textContent") == f"{len(wanted):,}"
+        assert texts(yard, "#n-routes") == [f"{len(wanted):,}"]
 
 
-def test_search_and_keys(driver):
-    name = driver.execute_script("return page.index.objects[2].name")
-    ActionChains(driver).send_keys("/").send_keys(name).send_keys(Keys.ENTER).perform()
-    assert name == driver.execute_script("return document.querySelector('#panel h2').textContent")
-    click(driver, 5, 5)
-    before = driver.execute_script("return page.view.camera.position.toArray()")
+def test_keys(yard):
     place = "return page.view.camera.position.toArray()"
-    ActionChains(driver).key_down("d").perform()
-    until("a move", lambda: np.linalg.norm(np.subtract(driver.execute_script(place), before)) > 0.2)
-    ActionChains(driver).key_up("d").perform()
-    after = driver.execute_script(place)
+    click(yard, 5, 5)
+    before = yard.execute_script(place)
+    ActionChains(yard).key_down("d").perform()
+    until("a move", lambda: np.linalg.norm(np.subtract(yard.execute_script(place), before)) > 0.2)
+    ActionChains(yard).key_up("d").perform()
+    after = yard.execute_script(place)
     assert after[2] == pytest.approx(before[2])
-    ActionChains(driver).send_keys("t").perform()
-    canvas(driver)
-    heading = driver.execute_script("return document.querySelector('.scene-compass title').textContent")
-    assert re.search(r"Looking (0|360) degrees", heading)
-    ActionChains(driver).send_keys("f").perform()
-    assert driver.execute_script("return page.view.controls.mode") == "fly"
+    ActionChains(yard).send_keys("t").perform()
+    canvas(yard)
+    assert re.search(r"Looking (0|360) degrees", texts(yard, ".scene-compass title")[0])
+    ActionChains(yard).send_keys("f").perform()
+    assert yard.execute_script("return page.view.controls.mode") == "fly"
 
 
-def test_every_control_has_a_name(driver):
-    nameless = driver.execute_script(
+def test_every_control_has_a_name(yard):
+    nameless = yard.execute_script(
         "return [...document.querySelectorAll('input, select, button')].filter((e) =>"
         " !(e.labels?.length || e.textContent.trim() || e.getAttribute('aria-label'))).map((e) => e.outerHTML)"
     )
     assert nameless == []
-
-
-def test_names_from_files_stay_text(driver):
-    driver.execute_script(
-        """const object = page.index.objects[0], was = { ...object };
-        Object.assign(object, { name: "<img src=x onerror=window.hit=1>",
-          description: "<script>window.hit=1</script>" });
-        page.pickObject(object.object_id); window.told = document.getElementById('panel').textContent;
-        Object.assign(object, was);"""
-    )
-    time.sleep(0.2)
-    assert driver.execute_script("return window.hit ?? null") is None
-    assert "<img src=x onerror=window.hit=1>" in driver.execute_script("return window.told")
