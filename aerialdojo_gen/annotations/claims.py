@@ -23,6 +23,7 @@ from aerialdojo_gen.annotations.places import Places, places_of
 from aerialdojo_gen.annotations.relations import AGAINST_M, AT_M, DISTRACTOR_SLACK, SceneGeometry
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.annotations.words import TABLES
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.constants import DIRECTIONS
 from aerialdojo_gen.geometry.frames import compass_direction
 from aerialdojo_gen.scenes.model import Instance
@@ -99,9 +100,6 @@ class SceneClaims:
             self._by_noun.setdefault(f" {noun.name.lower()}", []).append(j)
         self._count = Counter(noun.name for noun in self._nouns)
         self._short = Counter(noun.short for noun in self._nouns)
-        self._known: dict[int, tuple[Claim, ...]] = {}
-        self._fitting: dict[Mention, frozenset[int]] = {}
-        self._mentions: dict[int, Mention] = {}
 
     @cached_property
     def bearings(self) -> list[Bearing | None]:
@@ -124,13 +122,9 @@ class SceneClaims:
         """Instances that claims of `i` fit as well: only other claims distinguish them from it."""
         return [j for j in self.candidates(i) if all(self.holds(claim, j, DISTRACTOR_SLACK) for claim in claims)]
 
+    @cached_method
     def of(self, i: int) -> tuple[Claim, ...]:
         """All true claims of an instance, by kind, the most natural first."""
-        if i not in self._known:
-            self._known[i] = tuple(self._find(i))
-        return self._known[i]
-
-    def _find(self, i: int) -> list[Claim]:
         instance = self.scene.instances[i]
         found = [*self._values(instance)]
         found += [Claim("part", say) for say in self.vocabulary.unrepeated_phrases(instance)]
@@ -139,7 +133,7 @@ class SceneClaims:
         bearing = self.bearings[i]
         if bearing is not None and bearing.clear:
             found.append(Claim("direction", bearing.direction, (self._mention_of(self.landmarks[bearing.landmark]),)))
-        return found
+        return tuple(found)
 
     def holds(self, claim: Claim, j: int, slack: float = 1.0) -> bool:
         """Whether a claim is true of an instance; see `relations` for `slack`."""
@@ -228,13 +222,9 @@ class SceneClaims:
         same = self._nouns[i].name == noun.name
         return salience / (1.5 + self.geometry.gap_m(i, j)) * (0.5 if same else 1.0)
 
+    @cached_method
     def _mention_of(self, j: int) -> Mention:
         """Name a thing by as few words as are unique in the scene, else by its short noun phrase."""
-        if j not in self._mentions:
-            self._mentions[j] = self._shortest(j)
-        return self._mentions[j]
-
-    def _shortest(self, j: int) -> Mention:
         node, noun = self.scene.instances[j].node, self._nouns[j]
         if j in self._landmark_names:
             return Mention(node, self._landmark_names[j], (), True)
@@ -244,12 +234,10 @@ class SceneClaims:
         full = Mention(node, noun.name, noun.adjectives, True)
         return full if len(self.fitting(full)) == 1 else Mention(node, noun.name, noun.adjectives, False)
 
+    @cached_method
     def fitting(self, mention: Mention) -> frozenset[int]:
         """Instances that a mention's words fit, with every doubt: an unknown colour may be the one that is said."""
-        if mention not in self._fitting:
-            named = self._named(mention.noun)
-            self._fitting[mention] = frozenset(j for j in named if all(self._may_be(j, a) for a in mention.said))
-        return self._fitting[mention]
+        return frozenset(j for j in self._named(mention.noun) if all(self._may_be(j, a) for a in mention.said))
 
     def _named(self, noun: str) -> list[int]:
         """Landmarks and instances of a name; a picnic bench is a bench, too."""
@@ -295,8 +283,7 @@ class SceneClaims:
         instance = self.scene.instances[j]
         if slack <= 1.0:
             return claim.key in self.vocabulary.true_phrases(instance)
-        appearances = (one for one in self.vocabulary.appearances_of(instance) if one.phrase == claim.key)
-        return any(self.vocabulary.is_valid(one, instance) for one in appearances)
+        return any(one.phrase == claim.key for one in self.vocabulary.valid_appearances(instance))
 
     def _place_holds(self, claim: Claim, j: int, slack: float) -> bool:
         place = claim.key.lower()

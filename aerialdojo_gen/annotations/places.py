@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from aerialdojo_gen.annotations.ground import GROUND, ground_triangles
 from aerialdojo_gen.annotations.relations import AT_M, BESIDE_M, NEAR_M, TOUCHING_M, SceneGeometry
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.errors import AnnotationError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.safe_parse import read_toml
@@ -128,10 +129,6 @@ class Places:
         self._geometry = geometry
         self._phrases = {phrase.lower(): conditions for phrase, conditions in phrases.items()}
         self._said = {phrase.lower(): _wordings(phrase, entry) for phrase, entry in phrases.items()}
-        self._ground: dict[str, tuple[shapely.STRtree, NDArray[np.float64]]] = {}
-        self._sets: dict[str, frozenset[int]] = {}
-        self._slabs: dict[int, NDArray[np.float64]] = {}
-        self._found: dict[tuple[int, str, float], str] = {}
 
     def __contains__(self, phrase: object) -> bool:
         """Whether a phrase, in lower case, is bound."""
@@ -145,23 +142,19 @@ class Places:
         """List the wordings that texts may use for a bound phrase, in lower case: its own or `say`, then `also`."""
         return self._said[phrase]
 
+    @cached_method
     def fault(self, i: int, phrase: str, slack: float = 1.0) -> str:
         """Return the first condition of a phrase that does not hold for instance `i`; empty if all hold."""
-        key = i, phrase, slack
-        if key not in self._found:
-            conditions = {k: v for k, v in self._phrases[phrase].items() if k not in _WORDS}.items()
-            wrong = (f"{name} = {value!r}" for name, value in conditions if not self._holds(i, name, value, slack))
-            self._found[key] = next(wrong, "")
-        return self._found[key]
+        conditions = {k: v for k, v in self._phrases[phrase].items() if k not in _WORDS}.items()
+        wrong = (f"{name} = {value!r}" for name, value in conditions if not self._holds(i, name, value, slack))
+        return next(wrong, "")
 
+    @cached_method
     def _match(self, pattern: str) -> frozenset[int]:
-        if pattern not in self._sets:
-            instances = self._geometry.scene.instances
-            self._sets[pattern] = frozenset(
-                k for k, thing in enumerate(instances)
-                if any(fnmatchcase(thing.node, one) or thing.category == one for one in pattern.split("|"))
-            )  # fmt: skip
-        return self._sets[pattern]
+        return frozenset(
+            k for k, thing in enumerate(self._geometry.scene.instances)
+            if any(fnmatchcase(thing.node, one) or thing.category == one for one in pattern.split("|"))
+        )  # fmt: skip
 
     def _holds(self, i: int, name: str, value: Any, slack: float) -> bool:
         if name in _REACH_M:
@@ -280,12 +273,14 @@ class Places:
 
     def _by(self, i: int, pattern: str, slack: float) -> bool:
         """Ground of the material is within `BESIDE_M`."""
-        if pattern not in self._ground:
-            self._ground[pattern] = ground_triangles(self._geometry.scene, pattern)
-        tree, corners = self._ground[pattern]
+        tree, corners = self._ground(pattern)
         hits = tree.query(self._geometry.outline(i), predicate="dwithin", distance=BESIDE_M * slack)
         low = float(self._geometry.boxes[i, 0, 2])
         return bool((np.abs(corners[hits, :, 2].mean(axis=1) - low) <= _RISE_M).any())
+
+    @cached_method
+    def _ground(self, pattern: str) -> tuple[shapely.STRtree, NDArray[np.float64]]:
+        return ground_triangles(self._geometry.scene, pattern)
 
     @staticmethod
     def _named(material: str, pattern: str) -> bool:
@@ -342,23 +337,21 @@ class Places:
         # The ground floor may be the ground itself.
         return number == 0 and self._inside(i, pattern, 1.0) and not self._high(i, 1.0, 1.0)
 
+    @cached_method
     def _slab_heights(self, j: int) -> NDArray[np.float64]:
         """Heights of a building's floors, ground floor first, metres."""
-        if j not in self._slabs:
-            instance = self._geometry.scene.instances[j]
-            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
-            normal = np.cross(b - a, c - a)
-            area = np.linalg.norm(normal, axis=1) / 2.0
-            level = normal[:, 2] > 1.9 * area
-            z = np.round((a[:, 2] + b[:, 2] + c[:, 2])[level] / 3.0, 1)
-            least = _SLAB_SHARE * float(shapely.area(self._geometry.outline(j)))
-            ground = self._ground_under(j)
-            slabs = [ground]
-            for height in np.unique(z):
-                if float(area[level][z == height].sum()) >= least and height - slabs[-1] >= _STOREY_M:
-                    slabs.append(float(height))
-            self._slabs[j] = np.array(slabs)
-        return self._slabs[j]
+        instance = self._geometry.scene.instances[j]
+        a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+        normal = np.cross(b - a, c - a)
+        area = np.linalg.norm(normal, axis=1) / 2.0
+        level = normal[:, 2] > 1.9 * area
+        z = np.round((a[:, 2] + b[:, 2] + c[:, 2])[level] / 3.0, 1)
+        least = _SLAB_SHARE * float(shapely.area(self._geometry.outline(j)))
+        slabs = [self._ground_under(j)]
+        for height in np.unique(z):
+            if float(area[level][z == height].sum()) >= least and height - slabs[-1] >= _STOREY_M:
+                slabs.append(float(height))
+        return np.array(slabs)
 
     def _ground_under(self, j: int) -> float:
         """Median ground height at the corners of a thing's box, metres."""

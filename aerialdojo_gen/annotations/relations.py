@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.context import context_of
@@ -50,15 +51,6 @@ class SceneGeometry:
         self.boxes: Floats = np.array([instance.bounds for instance in scene.instances]).reshape(-1, 2, 3)
         self.centres: Floats = self.boxes.mean(axis=1)
         self._heights_m: list[list[float]] = self.boxes[:, :, 2].tolist()
-        self._outlines: dict[int, shapely.Geometry] = {}
-        # One pair is asked for by several relations, and by claims of other things.
-        self._level_gaps: dict[tuple[int, int], float] = {}
-        self._bearings: dict[tuple[int, int], float | None] = {}
-        self._close: dict[tuple[int, float], list[int]] = {}
-        self._columns: dict[tuple[float, float], list[tuple[int, Floats]]] = {}
-        self._supports: dict[int, int | None] = {}
-        self._solid: dict[int, tuple[Floats, NDArray[np.intp]]] = {}
-        self._covers: dict[int, frozenset[int]] = {}
 
     @classmethod
     def of(cls, scene: Scene) -> SceneGeometry:
@@ -70,22 +62,21 @@ class SceneGeometry:
         low, high = self.boxes[:, 0], self.boxes[:, 1]
         return shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
 
+    # One thing or pair is asked for by several relations, and by claims of other things.
+
+    @cached_method
     def outline(self, i: int) -> shapely.Geometry:
         """The outline of an instance on the ground, metres."""
-        if i not in self._outlines:
-            instance = self.scene.instances[i]
-            xy = instance.vertices[:, :2]
-            if np.ptp(xy, axis=0).max() < _LARGE_M or len(instance.faces) > _MANY_FACES:
-                # A line, because GEOS makes an object of every one of several points.
-                outline = shapely.convex_hull(shapely.linestrings(xy))
-            else:
-                triangles = shapely.polygons(xy[instance.faces])
-                solid = shapely.area(triangles) > 1e-6
-                hull = shapely.convex_hull(shapely.linestrings(xy))
-                outline = shapely.union_all(triangles[solid], grid_size=_GRID_M) if solid.any() else hull
-            shapely.prepare(outline)
-            self._outlines[i] = outline
-        return self._outlines[i]
+        instance = self.scene.instances[i]
+        xy = instance.vertices[:, :2]
+        # A line, because GEOS makes an object of every one of several points.
+        outline = shapely.convex_hull(shapely.linestrings(xy))
+        if np.ptp(xy, axis=0).max() >= _LARGE_M and len(instance.faces) <= _MANY_FACES:
+            triangles = shapely.polygons(xy[instance.faces])
+            solid = shapely.area(triangles) > 1e-6
+            outline = shapely.union_all(triangles[solid], grid_size=_GRID_M) if solid.any() else outline
+        shapely.prepare(outline)
+        return outline
 
     def _within(self, i: int, j: int, reach_m: float) -> bool:
         """Whether two instances are at most `reach_m` apart; boxes decide most cases without outlines."""
@@ -97,39 +88,35 @@ class SceneGeometry:
         """Distance between two instances: horizontally between outlines, vertically between height ranges."""
         return math.hypot(self.level_gap_m(i, j), self._rise_m(i, j))
 
+    @cached_method
     def level_gap_m(self, i: int, j: int) -> float:
         """Horizontal distance between the outlines of two instances, metres."""
-        if (i, j) not in self._level_gaps:
-            self._level_gaps[i, j] = float(shapely.distance(self.outline(i), self.outline(j)))
-        return self._level_gaps[i, j]
+        return float(shapely.distance(self.outline(i), self.outline(j)))
 
     def _rise_m(self, i: int, j: int) -> float:
         (low_i, high_i), (low_j, high_j) = self._heights_m[i], self._heights_m[j]
         return max(0.0, low_j - high_i, low_i - high_j)
 
+    @cached_method
     def neighbours(self, i: int, radius_m: float) -> list[int]:
         """Other instances whose boxes are within a distance of an instance's box."""
-        key = i, radius_m
-        if key not in self._close:
-            (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
-            r = radius_m
-            hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
-            level = (self.boxes[hits, 0, 2] <= z1 + r) & (self.boxes[hits, 1, 2] >= z0 - r)
-            self._close[key] = [j for j in hits[level].tolist() if j != i]
-        return self._close[key]
+        (x0, y0, z0), (x1, y1, z1) = self.boxes[i]
+        r = radius_m
+        hits = np.sort(self._tree.query(shapely.box(x0 - r, y0 - r, x1 + r, y1 + r)))
+        level = (self.boxes[hits, 0, 2] <= z1 + r) & (self.boxes[hits, 1, 2] >= z0 - r)
+        return [j for j in hits[level].tolist() if j != i]
 
+    @cached_method
     def support(self, i: int) -> int | None:
         """The supporting instance: the highest surface close to the bottom."""
-        if i not in self._supports:
-            low = float(self.boxes[i, 0, 2])
-            best: tuple[float, int] | None = None
-            for x, y in self.probes(i):
-                for j, heights in self.columns(i, x, y):
-                    below = heights[heights <= low + _TOUCH_M]
-                    if len(below) and below.max() >= low - _TOUCH_M and (best is None or below.max() > best[0]):
-                        best = (float(below.max()), j)
-            self._supports[i] = None if best is None else best[1]
-        return self._supports[i]
+        low = float(self.boxes[i, 0, 2])
+        best: tuple[float, int] | None = None
+        for x, y in self.probes(i):
+            for j, heights in self.columns(i, x, y):
+                below = heights[heights <= low + _TOUCH_M]
+                if len(below) and below.max() >= low - _TOUCH_M and (best is None or below.max() > best[0]):
+                    best = (float(below.max()), j)
+        return None if best is None else best[1]
 
     def rests_on(self, i: int, j: int) -> bool:
         """Whether `j` supports `i` over an area and does not rise next to it: a truck is not on a tower."""
@@ -143,20 +130,19 @@ class SceneGeometry:
             held += foot <= low + _TOUCH_M and bool((np.abs(under - foot) <= _TOUCH_M).any())
         return held >= _HELD
 
+    @cached_method
     def covers(self, i: int) -> frozenset[int]:
         """Instances with a surface overhead, at most `COVER_M` above the instance's top."""
-        if i not in self._covers:
-            high = float(self.boxes[i, 1, 2])
-            x, y = self.centres[i, :2]
-            lowest: dict[int, float] = {}
-            for j, heights in self.columns(i, float(x), float(y)):
-                overhead = heights[(heights >= high - 0.05) & (heights <= high + COVER_M)]
-                if len(overhead):
-                    lowest[j] = float(overhead.min())
-            # Things on top of the ceiling do not count.
-            limit = min(lowest.values(), default=0.0) + 1.0
-            self._covers[i] = frozenset(j for j, z in lowest.items() if z <= limit)
-        return self._covers[i]
+        high = float(self.boxes[i, 1, 2])
+        x, y = self.centres[i, :2]
+        lowest: dict[int, float] = {}
+        for j, heights in self.columns(i, float(x), float(y)):
+            overhead = heights[(heights >= high - 0.05) & (heights <= high + COVER_M)]
+            if len(overhead):
+                lowest[j] = float(overhead.min())
+        # Things on top of the ceiling do not count.
+        limit = min(lowest.values(), default=0.0) + 1.0
+        return frozenset(j for j, z in lowest.items() if z <= limit)
 
     def probes(self, i: int) -> list[tuple[float, float]]:
         """Points at which to look for the support: the centre and four around it."""
@@ -165,11 +151,12 @@ class SceneGeometry:
 
     def columns(self, i: int, x: float, y: float) -> list[tuple[int, Floats]]:
         """Other instances with surfaces above or below a point, and their heights."""
-        if (x, y) not in self._columns:
-            things = np.sort(self._tree.query(shapely.Point(x, y))).tolist()
-            crossed = ((j, self._heights(j, x, y)) for j in things)
-            self._columns[x, y] = [(j, heights) for j, heights in crossed if len(heights)]
-        return [(j, heights) for j, heights in self._columns[x, y] if j != i]
+        return [(j, heights) for j, heights in self._column(x, y) if j != i]
+
+    @cached_method
+    def _column(self, x: float, y: float) -> list[tuple[int, Floats]]:
+        things = np.sort(self._tree.query(shapely.Point(x, y))).tolist()
+        return [(j, heights) for j in things if len(heights := self._heights(j, x, y))]
 
     def surfaces(self, j: int, x: float, y: float) -> list[tuple[str, Floats]]:
         """Materials of an instance above or below a point, and their heights, metres."""
@@ -186,25 +173,26 @@ class SceneGeometry:
 
     def _crossed(self, j: int, x: float, y: float) -> tuple[Floats, NDArray[np.intp]]:
         """Heights of an instance's triangles at a point, and their face indices."""
-        if j not in self._solid:
-            instance = self.scene.instances[j]
-            a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
-            det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
-            flat = np.abs(det) > 1e-12
-            # Corners of the triangles that are not vertical, and twice their signed areas from above, (n, 10).
-            self._solid[j] = np.column_stack([a[flat], b[flat], c[flat], det[flat]]), np.flatnonzero(flat)
-        triangles, faces = self._solid[j]
+        triangles, faces = self._not_vertical(j)
         z, which = _heights_at(triangles, x, y)
         return z, faces[which]
 
+    @cached_method
+    def _not_vertical(self, j: int) -> tuple[Floats, NDArray[np.intp]]:
+        """Corners of the triangles that are not vertical, and twice their signed areas from above, (n, 10); faces."""
+        instance = self.scene.instances[j]
+        a, b, c = np.moveaxis(instance.vertices[instance.faces], 1, 0)
+        det = (b[:, 1] - c[:, 1]) * (a[:, 0] - c[:, 0]) + (c[:, 0] - b[:, 0]) * (a[:, 1] - c[:, 1])
+        flat = np.abs(det) > 1e-12
+        return np.column_stack([a[flat], b[flat], c[flat], det[flat]]), np.flatnonzero(flat)
+
+    @cached_method
     def bearing_rad(self, i: int, j: int) -> float | None:
         """Direction from the nearest point of `j`'s outline to the centre of `i`; None inside the outline."""
-        if (i, j) not in self._bearings:
-            x, y = self.centres[i, :2].tolist()
-            line = shapely.get_coordinates(shapely.shortest_line(self.outline(j), shapely.points(x, y)))
-            far = len(line) > 0 and math.dist(*line) >= 0.05
-            self._bearings[i, j] = math.atan2(y - line[0, 1], x - line[0, 0]) if far else None
-        return self._bearings[i, j]
+        x, y = self.centres[i, :2].tolist()
+        line = shapely.get_coordinates(shapely.shortest_line(self.outline(j), shapely.points(x, y)))
+        far = len(line) > 0 and math.dist(*line) >= 0.05
+        return math.atan2(y - line[0, 1], x - line[0, 0]) if far else None
 
     def beside(self, i: int, j: int, slack: float = 1.0) -> bool:
         """`i` is close to `j`, not on, under or over it."""

@@ -7,9 +7,10 @@ from dataclasses import replace
 from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.phrases import CategoryWords, group_of, noun_of, spoken, words_of
+from aerialdojo_gen.base.cached import cached_method
 from aerialdojo_gen.scenes.appearances import Appearance
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import Body
+from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 
@@ -28,9 +29,6 @@ class Vocabulary:
         self.kinds = {category: catalogue[category].kind for category in catalogue}
         self._appearances = {category: catalogue[category].looks for category in catalogue}
         self._surface = Surface(scene)
-        self._bodies: dict[Instance, Body] = {}
-        self._valid: dict[tuple[Instance, str], bool] = {}
-        self._true: dict[Instance, tuple[str, ...]] = {}
         targets = frozenset(catalogue.targets)
         by_category: dict[str, CategoryWords] = {}
         for i in scene.instances:
@@ -67,21 +65,15 @@ class Vocabulary:
         """Phrases that the catalogue has for an instance's category."""
         return self._appearances.get(instance.category, ())
 
-    def is_valid(self, appearance: Appearance, instance: Instance) -> bool:
-        """Whether a phrase of the catalogue is true of an instance, visible or not; measured once."""
-        key = instance, appearance.phrase
-        if key not in self._valid:
-            if instance.anatomy is not None and instance not in self._bodies:
-                self._bodies[instance] = Body(instance, self.scene.materials)
-            self._valid[key] = instance in self._bodies and not self._bodies[instance].false_claims(appearance)
-        return self._valid[key]
+    @cached_method
+    def valid_appearances(self, instance: Instance) -> tuple[Appearance, ...]:
+        """Phrases of the catalogue that are true of an instance, visible or not."""
+        return valid_phrases(self.appearances_of(instance), instance, self.scene.materials)
 
+    @cached_method
     def true_phrases(self, instance: Instance) -> tuple[str, ...]:
-        """Phrases that are true of an instance, and visible; measured once."""
-        if instance not in self._true:
-            true = [one for one in self.appearances_of(instance) if self.is_valid(one, instance)]
-            self._true[instance] = tuple(one.phrase for one in true if self._surface.shows(one, instance))
-        return self._true[instance]
+        """Phrases that are true of an instance, and visible."""
+        return tuple(one.phrase for one in self.valid_appearances(instance) if self._surface.shows(one, instance))
 
     def unrepeated_phrases(self, instance: Instance) -> tuple[str, ...]:
         """Phrases that are true of an instance, visible, and not repeated by its attributes."""
