@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.annotation_scenes import box, street, street_vocabulary
 
@@ -29,6 +29,7 @@ _word = st.text(min_size=1, max_size=8)
 _things = st.builds(Mention, _word, _word, st.lists(_word, max_size=3).map(tuple), st.booleans())
 
 
+@settings(max_examples=25)
 @given(st.builds(Claim, st.sampled_from(KINDS), _word, st.lists(_things, max_size=2).map(tuple)))
 def test_a_claim_comes_back_from_json(claim):
     assert Claim.from_json(claim.to_json()) == claim

@@ -18,8 +18,6 @@ from aerialdojo_gen.base.errors import StoreError, UsageError
 from aerialdojo_gen.benchmark.agents import Sensors
 from aerialdojo_gen.benchmark.episodes import read_run, runs
 from aerialdojo_gen.benchmark.runner import Evaluation, evaluate
-from aerialdojo_gen.benchmark.scoring import score
-from aerialdojo_gen.benchmark.submission import write_submission
 from aerialdojo_gen.benchmark.tasks import Selection, reference_actions, select
 from aerialdojo_gen.exchange.learning_export import export_for_learning
 from aerialdojo_gen.exchange.samples import ExportOptions
@@ -101,9 +99,6 @@ def test_flights_are_logged_as_the_oracles_are_and_no_task_is_offered_twice(smok
         kept = [name for name in own.columns if name not in OWN]
         assert own[kept].equals(oracles[kept])
     assert set(read_run(tmp_path, "human-ann")["agent"].to_pylist()) == {"human:ann"}
-    write_submission(smoke, tmp_path, "human-ann", tmp_path / "ann.json.gz")
-    card = score(smoke, tmp_path / "ann.json.gz", tmp_path / "scored", selection=TWO)
-    assert (card.agent, card.rows[0].mean["sr"]) == ("human:ann", 1.0)
     assert (read_run(tmp_path, "human-ann", "timings").to_pandas().agent_s > 0).all()
 
 
@@ -142,11 +137,8 @@ def test_only_the_shown_states_own_answer_counts_and_only_from_this_page(smoke, 
         assert client.post("/api/act", json={"version": consent["version"], "action": 1}).status_code == 409
         state = post(client, "agree", consent)
         version = state["version"]
-        for what, body in (
-            ("act", {"version": version - 1, "action": 0}),
-            ("agree", {"version": consent["version"]}),
-            ("next", {"version": version}),
-        ):
+        late = {"version": version - 1, "action": 0}
+        for what, body in (("act", late), ("agree", {"version": consent["version"]}), ("next", {"version": version})):
             answer = client.post(f"/api/{what}", json=body)
             assert (answer.status_code, answer.json()["state"]) == (409, state)
         assert client.post("/api/act", json={"version": version, "action": 16}).status_code == 422

@@ -124,10 +124,6 @@ GOOD = {
 }  # fmt: skip
 # An empty name is one that somebody may be about to type anew.
 SENSIBLE = {(b"name", b'""')}
-HALF_A_PAIR = (
-    '{"format": "aerialdojo-annotations", "version": 1, "scene": "U_Courtyard_0", "landmarks": [], "objects": '
-    '[{"id": 0, "name": "van", "category": "delivery_van", "description": "\\ud800", "node": "delivery_van_000"}]}'
-)
 
 
 def refused(status, text):
@@ -170,18 +166,18 @@ def test_no_body_is_more_than_refused(desk, path):
 
 
 def test_a_file_with_half_a_surrogate_pair_is_named_and_left_alone(desk):
-    before, broken = desk.annotations.read_bytes(), HALF_A_PAIR.encode()
+    before = desk.annotations.read_bytes()
+    broken = before.replace(b'"red delivery van"', HALF)
     version = json.loads(desk.server.ask("GET", "/api/document")[1])["version"]
     headers = {"Content-Type": "application/json", "If-Match": version}
-    status, text = desk.server.ask("POST", "/api/import", json.dumps({"text": HALF_A_PAIR}), headers)
-    assert refused(status, text)
-    assert "half of a surrogate pair" in text
+    asked = [("POST", "/api/import", json.dumps({"text": broken.decode()}), headers)]
+    asked += [("GET", f"/api/{path}") for path in ("document", "export", "coco", "objects/0/anchors")]
     try:
-        desk.annotations.write_bytes(broken)
-        for path in ("/api/document", "/api/export", "/api/coco", "/api/objects/0/anchors"):
-            status, text = desk.server.ask("GET", path)
+        for request in asked:
+            status, text = desk.server.ask(*request)
             assert refused(status, text)
-            assert "objects[0].description: \\ud800 is half of a surrogate pair" in json.loads(text)["error"]
+            assert "objects[0].name: \\ud800 is half of a surrogate pair" in json.loads(text)["error"]
+            desk.annotations.write_bytes(broken)
         assert desk.annotations.read_bytes() == broken
     finally:
         desk.annotations.write_bytes(before)

@@ -8,17 +8,16 @@ import numpy as np
 from support import handmade
 
 from aerialdojo_gen.annotations.format import Annotations, Landmark, Object
+from aerialdojo_gen.annotations.phrases import spoken
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Instance, Material, Scene
 
-PAINTS = {
-    name: Material(name, rgb)
-    for name, rgb in {
-        "grey": (128, 128, 128), "red": (190, 40, 30), "blue": (40, 80, 170), "yellow": (230, 200, 40),
-        "green": (50, 130, 60),
-    }.items()
+_RGB = {
+    "grey": (128, 128, 128), "red": (190, 40, 30), "blue": (40, 80, 170), "yellow": (230, 200, 40),
+    "green": (50, 130, 60),
 }  # fmt: skip
+PAINTS = {name: Material(name, rgb) for name, rgb in _RGB.items()}
 
 
 def box(
@@ -70,7 +69,7 @@ def street_annotations(**descriptions: str) -> Annotations:
     objects = tuple(
         Object(
             id=k,
-            name=f"{scene[node].attributes['colour']} {scene[node].category.replace('_', ' ')}",
+            name=f"{scene[node].attributes['colour']} {spoken(scene[node].category)}",
             category=scene[node].category,
             description=text,
             node=node,

@@ -20,6 +20,7 @@ from fastapi import FastAPI, Header, Query, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import Field, StrictFloat, StrictStr, field_validator
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from aerialdojo_gen.annotations.format import Strict
 from aerialdojo_gen.base.errors import AerialDojoError, AnnotationError, StoreError, UsageError
@@ -27,17 +28,7 @@ from aerialdojo_gen.studio.annotate.coco import coco_zip
 from aerialdojo_gen.studio.annotate.document import ConflictError, Operation
 from aerialdojo_gen.studio.annotate.session import AnnotationSession
 from aerialdojo_gen.studio.annotate.storage import Author, StaleError
-from aerialdojo_gen.studio.web.serving import (
-    Asgi,
-    Message,
-    Receive,
-    Send,
-    local_app,
-    one_line,
-    open_socket,
-    serve,
-    url_of,
-)
+from aerialdojo_gen.studio.web.serving import local_app, one_line, open_socket, serve, url_of
 
 COOKIE = "aerialdojo-annotate"
 # Wrong tokens per address: this many at once, then one per interval.
@@ -54,12 +45,12 @@ class TokenGate:
     same router must not lock it out.
     """
 
-    def __init__(self, app: Asgi, token: str) -> None:
+    def __init__(self, app: ASGIApp, token: str) -> None:
         self._app, self._token = app, token
         self._failed_logins: OrderedDict[str, _FailedLogins] = OrderedDict()
         self._known: set[str] = set()
 
-    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer 401, 403, 429 or 303 itself, or hand the request on."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)

@@ -37,15 +37,9 @@ class ActionRequest(_Body):
 
 
 def serve_session(
-    data: Where,
-    evaluation: Evaluation,
-    *,
-    out: Where | None,
-    restart: bool,
-    port: int,
-    browser: bool,
+    data: Where, evaluation: Evaluation, *, out: Where | None, restart: bool, port: int, browser: bool,
     say: Callable[[str], None],
-) -> None:
+) -> None:  # fmt: skip
     """Serve the page until Ctrl-C, and say what is in the tables then."""
     session = Session(data, evaluation, out)
     listener = open_socket(port)

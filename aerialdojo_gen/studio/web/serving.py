@@ -14,29 +14,25 @@ import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Iterator, MutableMapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from aerialdojo_gen.base.errors import AerialDojoError, MissingPackage, UsageError, no_package
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 STATIC = Path(__file__).resolve().parent / "static"
 _LOCAL = ("127.0.0.1", "localhost")
 _IMPORT_MAP = re.compile(rb'<script type="importmap">(.*?)</script>', re.DOTALL)
 
-Message = MutableMapping[str, Any]
-Send = Callable[[Message], Awaitable[None]]
-Receive = Callable[[], Awaitable[Message]]
-Asgi = Callable[[Message, Receive, Send], Awaitable[None]]
-
 
 class _LocalOnly:
     """ASGI middleware: rejects foreign hosts, origins and large bodies, and sets security headers."""
 
-    def __init__(self, app: Asgi, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
+    def __init__(self, app: ASGIApp, policy: str, max_body_bytes: int, any_host: bool = False) -> None:
         self._app, self._max_body_bytes, self._any_host = app, max_body_bytes, any_host
         self._headers = [
             (b"content-security-policy", policy.encode()),
@@ -47,7 +43,7 @@ class _LocalOnly:
             (b"cache-control", b"no-cache"),
         ]
 
-    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -67,7 +63,7 @@ class _LocalOnly:
         )
         await send({"type": "http.response.body", "body": why.encode()})
 
-    def _refusal(self, scope: Message) -> tuple[int, str] | None:
+    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         if scope["type"] != "http":
             return 400, "plain HTTP only"
         headers: dict[bytes, list[bytes]] = {}
