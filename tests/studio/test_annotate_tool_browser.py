@@ -73,6 +73,7 @@ def test_a_foreign_mesh_is_annotated_in_the_browser_and_becomes_tasks(browser, p
     bounds = scene.scene.bounds.tolist()
     with annotating.served(project, place) as (url, _):
         page = Page(browser, url)
+        page.one("#who").send_keys("Ada")
         assert page.text("#objects .empty").startswith("none yet")
         # A landmark: pick, L, a name.
         page.click_at(roof(mark), bounds)
@@ -190,6 +191,9 @@ def select(page, number=0):
 
 def test_the_page_keeps_its_shape_its_selection_and_what_is_typed(browser, page, yard):
     annotations = yard.annotations
+    browser.delete_all_cookies()  # who somebody was in another test
+    browser.refresh()
+    page.ready()
     # No anchor is lacking: the sampler chooses it, and the page says so.
     count = len(entries(annotations))
     assert page.text("#progress-text") == f"{count} of {count} objects done · anchors chosen by the sampler"

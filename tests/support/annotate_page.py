@@ -30,7 +30,7 @@ class Page:
         until(selector, lambda: self.one(selector).click() is None)
 
     def press(self, keys):
-        self.driver.switch_to.active_element.send_keys(keys)
+        until("what has the focus", lambda: self.driver.switch_to.active_element.send_keys(keys) is None)
 
     def saved(self):
         until("saved", lambda: self.text("#saved") == "saved")

@@ -59,11 +59,15 @@ def as_new(driver: Any) -> None:
 
 def until(what: str, test: Callable[[], Any], seconds: float = 60.0) -> Any:
     """Wait until a test gives something true, and give it; what the page is just building anew counts as not yet."""
-    from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+    from selenium.common import exceptions
 
+    not_yet = (
+        exceptions.NoSuchElementException, exceptions.StaleElementReferenceException,
+        exceptions.ElementNotInteractableException,
+    )  # fmt: skip
     end = time.monotonic() + seconds
     while True:
-        with contextlib.suppress(NoSuchElementException, StaleElementReferenceException):
+        with contextlib.suppress(*not_yet):
             if found := test():
                 return found
         assert time.monotonic() < end, f"{what}: not within {seconds} s"
