@@ -15,7 +15,7 @@ def cached_method(method: Callable[Concatenate[Any, P], R]) -> Callable[Concaten
     name = f"_results_of_{method.__name__}"
 
     @wraps(method)
-    def cached(self: Any, *args: P.args, **kwargs: P.kwargs) -> R:
+    def cached(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
         results = self.__dict__.setdefault(name, {})
         if args not in results:
             results[args] = method(self, *args, **kwargs)
