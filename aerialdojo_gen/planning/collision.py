@@ -122,7 +122,9 @@ class CollisionWorld:
 
     def segment_in_collision(self, p: ArrayLike, q: ArrayLike, radius_m: float) -> bool:
         """Whether a ball moving straight from `p` to `q` touches a surface: its exact sweep, a capsule."""
-        return self._swept(*np.asarray(p, np.float64).tolist(), *np.asarray(q, np.float64).tolist(), radius_m)
+        ax, ay, az = np.asarray(p, np.float64).tolist()
+        bx, by, bz = np.asarray(q, np.float64).tolist()
+        return self._swept(ax, ay, az, bx, by, bz, radius_m)
 
     def _swept(self, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius_m: float) -> bool:
         dx, dy, dz = bx - ax, by - ay, bz - az
@@ -153,7 +155,8 @@ class CollisionWorld:
         p = np.asarray(points, np.float64)
         if len(p) == 1:
             return self.sphere_in_collision(p[0], radius_m)
-        return any(self._swept(*a, *b, radius_m) for a, b in itertools.pairwise(p.tolist()))
+        places = [(x, y, z) for x, y, z in p.tolist()]
+        return any(self._swept(*a, *b, radius_m) for a, b in itertools.pairwise(places))
 
     def _sphere(self, p: ArrayLike, radius_m: float) -> fcl.CollisionObject:
         spheres = self._shapes.spheres
