@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import handmade
 from support.annotation_scenes import box, street, street_vocabulary
 
 from aerialdojo_gen.annotations.bearings import BORDER_DEG, lies_towards, nearest_landmark
@@ -158,6 +159,16 @@ def test_boxes_reject_no_pair_that_outlines_would_not():
     found = [(g._within(i, j, r), g.gap_m(i, j) <= r) for i in some for j in some for r in (0.5, 3.0, 8.0, 20.0)]
     assert all(told == true for told, true in found)
     assert {told for told, _ in found} == {True, False}
+
+
+def test_what_stands_in_the_corner_of_a_large_thing_is_as_far_as_its_sides():
+    arms = [handmade.box((0, 0, 0), (20, 1, 3)), handmade.box((0, 0, 0), (1, 20, 3))]
+    wall, bins = handmade.instance("wall_000", *arms, category="wall"), box("bin_000", (8, 5, 0), (1, 1, 1))
+    # The convex hull of the wall holds the bin; its outline does not.
+    g = SceneGeometry(dataclasses.replace(street(), instances=(wall, bins)))
+    assert g.gap_m(1, 0) == pytest.approx(3.5, abs=2e-3)
+    assert g.near(1, 0)
+    assert not g.beside(1, 0)
 
 
 def test_heights_over_a_place_are_those_of_the_triangles_there():
