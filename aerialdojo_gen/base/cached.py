@@ -17,9 +17,10 @@ def cached_method(method: Callable[Concatenate[Any, P], R]) -> Callable[Concaten
     @wraps(method)
     def cached(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
         results = self.__dict__.setdefault(name, {})
-        if args not in results:
-            results[args] = method(self, *args, **kwargs)
-        found: R = results[args]
+        key = args, *kwargs.items()
+        if key not in results:
+            results[key] = method(self, *args, **kwargs)
+        found: R = results[key]
         return found
 
     return cached

@@ -20,6 +20,7 @@ from aerialdojo_gen.store.files import file_digest
 
 def scene_fingerprint(stage: Stage, pipeline: Pipeline, roots: ProjectPaths, scene: str) -> str:
     """Hash all that a scene's shards depend on: code, configuration, and inputs by their content."""
+    # Not by the inputs' fingerprints: where an earlier stage writes the same rows again, nothing after it is stale.
     code = stage_code(stage.name, stage.idle(pipeline.section(stage.name)))
     # The paper's figures are next to the package in a checkout, inside it in a wheel.
     figures = paper_figures.files() if "aerialdojo_gen.base.paper_figures" in code.parts else []

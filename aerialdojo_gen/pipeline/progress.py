@@ -49,6 +49,7 @@ class Rate:
 
     def per_s(self, done: int) -> float | None:
         """Return items per second after `done` items; None until the first is as long ago as it took."""
+        # Several processes finish their first items almost together, which looks like a high rate.
         now = time.monotonic()
         if self._first is None:
             self._first = done, now

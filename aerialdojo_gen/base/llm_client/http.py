@@ -41,6 +41,7 @@ class Meter:
 
 def bounded_client(base: Any, timeout: Any) -> Any:
     """Make an HTTP client that bounds what it reads, which the client packages do not, and follows no redirect."""
+    # A redirect would carry the key elsewhere.
 
     class BoundedClient(base):  # type: ignore[misc]  # a class that is known at run time alone
         async def send(self, request: Any, *, stream: bool = False, **options: Any) -> Any:
