@@ -77,9 +77,14 @@ def folder_name(source: Path) -> str:
         if (file := waiting.pop()) not in digests:
             digests[file], imported = _read(file)
             waiting += imported
-    made_by = [f"{library} {metadata.version(library)}" for library in ("numba", "llvmlite", "numpy")]
-    made_by += [digest for _, digest in sorted(digests.items())]
+    made_by = [*_libraries(), *(digest for _, digest in sorted(digests.items()))]
     return f"{source.stem}-{hashlib.sha256(' '.join(made_by).encode()).hexdigest()[:24]}"
+
+
+@cache
+def _libraries() -> tuple[str, ...]:
+    """Name the libraries that make machine code, with their versions."""
+    return tuple(f"{library} {metadata.version(library)}" for library in ("numba", "llvmlite", "numpy"))
 
 
 @cache

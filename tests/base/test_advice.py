@@ -17,18 +17,26 @@ from aerialdojo_gen.store.shards import LAYOUT
 
 PACKAGE = Path(aerialdojo_gen.__file__).parent
 COMMANDS = get_command(cli.app).commands
-SOURCES = {path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")}
+
+
+@pytest.fixture(scope="module")
+def sources() -> dict[str, list[ast.AST]]:
+    """All nodes of every file of the package."""
+    return {
+        path.relative_to(PACKAGE).as_posix(): [*ast.walk(ast.parse(path.read_text()))]
+        for path in PACKAGE.rglob("*.py")
+    }
 
 
 def options(verb: str) -> set[str]:
     return {name for param in COMMANDS[verb].params for name in param.opts if name.startswith("--")}
 
 
-def test_every_advised_command_is_one_of_ours_and_has_the_options_and_is_given_what_it_takes():
+def test_every_advised_command_is_one_of_ours_and_has_the_options_and_is_given_what_it_takes(sources):
     calls = [
         (file, node)
-        for file, tree in SOURCES.items()
-        for node in ast.walk(tree)
+        for file, nodes in sources.items()
+        for node in nodes
         if isinstance(node, ast.Call) and re.fullmatch(r"(cli_context\.)?command", ast.unparse(node.func))
     ]
     assert len(calls) > 20
@@ -44,19 +52,19 @@ def test_every_advised_command_is_one_of_ours_and_has_the_options_and_is_given_w
             assert {word for word in words if word.startswith("--")} == options(verb) & {"--pipeline", "--data"}, verb
 
 
-def test_no_message_names_a_command_but_by_the_helper():
+def test_no_message_names_a_command_but_by_the_helper(sources):
     verbs = "|".join(map(re.escape, sorted(COMMANDS)))
     docstrings = {
         id(node.body[0].value)
-        for tree in SOURCES.values()
-        for node in ast.walk(tree)
+        for nodes in sources.values()
+        for node in nodes
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
         and node.body and isinstance(node.body[0], ast.Expr)
     }  # fmt: skip
     found = [
         f"{file}: {node.value}"
-        for file, tree in SOURCES.items()
-        for node in ast.walk(tree)
+        for file, nodes in sources.items()
+        for node in nodes
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings
         and re.search(rf"aerialdojo-gen ({verbs})\b|\brun ({verbs}) (again|first)", node.value)
     ]  # fmt: skip
