@@ -11,8 +11,10 @@ from support.annotation_scenes import PAINTS, box, street, street_annotations, s
 
 from aerialdojo_gen.annotations.appearance import colour_shares, repeats, unsupported_colours
 from aerialdojo_gen.annotations.check import check_source
+from aerialdojo_gen.annotations.claims import Claim, SceneClaims
 from aerialdojo_gen.annotations.format import format_annotations, parse_annotations
 from aerialdojo_gen.annotations.ground import Surface
+from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, valid_phrases
@@ -69,6 +71,14 @@ def test_what_is_under_water_is_not_told_and_a_deck_overhead_hides_nothing(catal
     assert ROOF in flooded
     assert WHEELS not in flooded
     assert said(catalogue, stand(catalogue, "hatchback", 0.0, deck_m=5.0)) == dry
+
+
+def test_a_hidden_part_is_not_said_of_its_own_thing_and_does_not_tell_another_from_it(catalogue):
+    claims = SceneClaims(Vocabulary(stand(catalogue, "hatchback", 0.8), catalogue), [])
+    slacks = (1.0, DISTRACTOR_SLACK)
+    # Who looks for hubcaps cannot know that those under water are none: a thing with some is like one that shows them.
+    for phrase, so in ((WHEELS, [False, True]), (ROOF, [True, True]), ("a spoiler", [False, False])):
+        assert [claims.holds(Claim("part", phrase), 0, slack) for slack in slacks] == so, phrase
 
 
 @pytest.mark.parametrize("category", ["hatchback", "street_lamp", "igloo", "swing_set", "garden_shed"])
