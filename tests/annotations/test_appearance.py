@@ -76,7 +76,7 @@ def test_what_is_under_water_is_not_told_and_a_deck_overhead_hides_nothing(catal
 def test_a_hidden_part_is_not_said_of_its_own_thing_and_does_not_tell_another_from_it(catalogue):
     claims = SceneClaims(Vocabulary(stand(catalogue, "hatchback", 0.8), catalogue), [])
     slacks = (1.0, DISTRACTOR_SLACK)
-    # Who looks for hubcaps cannot know that those under water are none: a thing with some is like one that shows them.
+    # Who looks for hubcaps cannot know what is under water: such a thing is like one that shows them.
     for phrase, so in ((WHEELS, [False, True]), (ROOF, [True, True]), ("a spoiler", [False, False])):
         assert [claims.holds(Claim("part", phrase), 0, slack) for slack in slacks] == so, phrase
 

@@ -1,5 +1,6 @@
 """What anchors and reference pictures leave out, rays and pictures, changes nothing that they say."""
 
+import dataclasses
 import math
 from collections import Counter
 
@@ -87,6 +88,22 @@ def test_all_candidates_at_once_step_back_as_far_as_each_by_the_definition(found
     assert steps.tolist() == [step_by_definition(found, k, float(m)) for k, m in enumerate(most)]
     assert len(set(steps.tolist())) > 10
     assert 0.0 in steps
+
+
+def test_a_camera_that_steps_back_keeps_its_room_to_the_edge_of_the_volume(found):
+    low, high = np.array([-3.5, -3.5, -9.0]), np.array([3.5, 3.5, 9.0])
+    scene = dataclasses.replace(found.world.scene, bounds=np.stack([low, high]))
+    narrow = dataclasses.replace(found.world, scene=scene)
+    inside = ((found.positions_m >= low + RADIUS) & (found.positions_m <= high - RADIUS)).all(axis=1)
+    places, yaw_rad = found.positions_m[inside], found.yaw_rad[inside]
+    most = np.full(len(places), 15.0)
+    steps = steps_back_m(narrow, found.instance, found.points, places, yaw_rad, 90.0, most)
+    back = -np.column_stack([np.cos(yaw_rad), np.sin(yaw_rad)])
+    moved = places[:, :2] + steps[:, None] * back
+    room = (np.where(back > 0.0, high[:2] - moved, moved - low[:2]) / np.abs(back)).min(axis=1)[steps > 0.0]
+    assert room.min() >= 0.15 - 1e-9
+    # Steps are whole centimetres.
+    assert (room < 0.165).sum() > 3
 
 
 def test_candidates_that_are_moved_are_what_they_are_where_they_are_moved_to(found):
