@@ -87,8 +87,14 @@ class PyBulletRenderer(Renderer):
         self.light = light
         self._light: Lighting = light_of(self._scene, self._materials, light)
         self._backdrop = Backdrop(self._scene, self._light)
-        camera, pose, near_m, far_m = sun_view(self._scene, light=light)
-        self._shadow = ShadowMap.of(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
+        self._shadow: ShadowMap | None = None
+
+    def _shadow_map(self) -> ShadowMap:
+        """Rasterise shadows for the first picture by a light: a renderer may be lit anew before it."""
+        if self._shadow is None:
+            camera, pose, near_m, far_m = sun_view(self._scene, light=self.light)
+            self._shadow = ShadowMap.of(camera, pose, self.rasterise(camera, pose, near_m, far_m)[1])
+        return self._shadow
 
     def _add(self, surface: Surface, k: int, material: Material, textures: dict[str, int], folder: Path) -> None:
         client = self._client
@@ -120,7 +126,15 @@ class PyBulletRenderer(Renderer):
         """Take a picture; the instance id map is ray-cast."""
         albedo, depth, surface = self.rasterise(camera, world_from_camera)
         rgb = shade(
-            camera, world_from_camera, albedo, depth, surface, self._light, self._shadow, self._clouds, self._heights
+            camera,
+            world_from_camera,
+            albedo,
+            depth,
+            surface,
+            self._light,
+            self._shadow_map(),
+            self._clouds,
+            self._heights,
         )
         self._backdrop.paint(rgb, surface < 0, camera, world_from_camera)
         if not instances:

@@ -79,7 +79,7 @@ def metres(low, high):
     return st.floats(low, high).map(lambda x: round(x, 6))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @example((1.0, 0.0, 2.0), (0.0, 0.0, 2.0), 0.0, -1.0)  # Backwards onto the goal: what is left has no direction
 @example((0.0, -18.03125, 2.0), (15.210938, -10.703125, 2.0), 0.0, 0.0)  # An Approach between two directions
 @given(*[st.tuples(metres(-40, 40), metres(-40, 40), metres(2, 40))] * 2, *[st.floats(-3, 3)] * 2)

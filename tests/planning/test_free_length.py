@@ -56,7 +56,7 @@ def brute(d, yaw, longest):
     return min(float(found.min()), *map(left, best))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=8, deadline=None)
 @example((10.0, 0.0, 0.0), 0.0, 1.0)  # straight ahead
 @example((0.0, 0.0, -7.0), 0.0, 1.0)  # straight down
 @example((0.3, 0.4, 0.5), 0.0, 1.0)  # an Approach alone
@@ -68,7 +68,7 @@ def test_it_is_the_least_that_any_approach_leaves_to_fly(d, yaw, longest):
     assert least - 1e-4 <= one(d, yaw, longest) <= least + 1e-9
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(data=st.data(), yaw=yaw)
 def test_no_route_on_the_lattice_is_shorter(data, yaw):
     moves = data.draw(st.lists(st.tuples(st.integers(0, 25), st.sampled_from([1.0, 2.0, 3.0, 5.0])), max_size=12))

@@ -49,7 +49,7 @@ def buried(field: Hills, places: np.ndarray, slack_m: float = 0.0) -> np.ndarray
         return places[:, 2] < field.z(places[:, :2]) - slack_m
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 3), st.booleans(), st.booleans(), st.floats(0.5, 20.0))
 def test_what_lies_below_is_what_numpy_says(seed, holes, ragged, turned, relief_m):
     field = hills(seed, cells=14, relief_m=relief_m, holes=holes, ragged=ragged)

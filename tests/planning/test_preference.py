@@ -79,7 +79,7 @@ def flat_ground():
 plane = st.tuples(*[st.floats(-8, 8)] * 4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     plane, st.one_of(st.tuples(*[st.floats(0.26, 0.74)] * 2), st.tuples(*[st.floats(1.5, 5)] * 2)), st.floats(0.1, 10)
 )

@@ -73,7 +73,7 @@ CONFIGS = [
 
 
 @given(worlds(), st.sampled_from(CONFIGS), st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_in_any_world_what_becomes_of_a_query_is_the_same(world, config, seed):
     planner, rng = Planner(world, config, RADIUS), np.random.default_rng(seed)
     low, high = planner.grid.arrays.lower, planner.grid.arrays.upper

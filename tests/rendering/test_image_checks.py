@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.rendered import MATERIALS, block, courtyard
+from support.rendered import courtyard
 
 from aerialdojo_gen.geometry.cameras import Camera, view_pose
 from aerialdojo_gen.rendering.checks import Solid, ViewChecks, picture_flags
 from aerialdojo_gen.rendering.world import PyBulletRenderer
-from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.store.schemas import VIEWS
 
 CAMERA = Camera(160, 160, 90.0)
@@ -101,11 +100,9 @@ def test_the_sky_stands_still_until_the_camera_tilts(world, solid):
     assert "frozen" in flags_of(solid, (sky, low), (sky, tilted))
 
 
-def test_sky_taken_for_a_surface():
-    ground = block("ground", (-50, -50, -1), (50, 50, 0), "grass")
-    flat = Scene("flat", (ground,), MATERIALS, np.array([[-50.0] * 3, [50.0] * 3]))
-    with PyBulletRenderer(flat) as world:
-        picture = world.render(CAMERA, HERE)
+def test_sky_taken_for_a_surface(world, solid):
+    over = view_pose((1.0, 0.4, 7.5), 0.3, "front")
+    picture = world.render(CAMERA, over)
     depth_m = np.where(np.isinf(picture.depth_m), np.float32(40.0), picture.depth_m)
-    assert flags_of(Solid(flat), (picture, HERE)) == set()
-    assert flags_of(Solid(flat), (replace(picture, depth_m=depth_m), HERE)) == {"depth_mismatch"}
+    assert flags_of(solid, (picture, over)) == set()
+    assert flags_of(solid, (replace(picture, depth_m=depth_m), over)) == {"depth_mismatch"}

@@ -80,7 +80,7 @@ def test_depth_and_instances_are_what_ray_casts_hit(opened, rays, name, view, po
     st.tuples(*[st.floats(-20, 20)] * 3),
     st.sampled_from([(97, 41, 70.0), (64, 64, 90.0), (30, 120, 20.0)]),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_nothing_that_is_in_view_is_left_out(opened, rays, eye, target, size):
     """What is not drawn is chosen triangle by triangle: no choice may cost a pixel, whatever the camera."""
     if np.linalg.norm(np.subtract(target, eye)) < 1e-3:

@@ -196,7 +196,7 @@ def test_later_paint_covers_earlier_and_kerbs_face_outwards():
     assert area["grass"] == pytest.approx(400 - 36 - 80 + round_, abs=1e-2)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.integers(0, 50), st.floats(-12, 12), st.floats(-8, 8))
 def test_terrain_height_is_that_of_its_triangles(seed, x, y):
     terrain = rolling_terrain((25, 17), 1.3, seed, 4.0, 15.0)
@@ -262,7 +262,7 @@ def test_adding_one_thing_does_not_change_another():
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.3, 2.0), st.integers(1, 200), st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_poisson_discs_are_those_of_the_rule_taken_dart_by_dart(seed, radius, limit, even):
     area, density = disc(3.0, -40.0, 6.0), None if even else lambda x, y: abs(math.sin(x)) * abs(math.cos(y))
     rng, taken, wanted = np.random.default_rng(seed), [], []

@@ -136,8 +136,7 @@ def test_layouts_tile_without_a_seam_and_differ_as_their_storeys_do(name):
     assert all(map(is_seamless, images))
     assert min(np.abs(a - b).mean() for a, b in combinations(images, 2)) > 8.0
     # Curtains, lights and reflections differ from storey to storey though the openings are the same.
-    for layout in LAYOUTS[name]:
-        image = LIBRARY[f"{name}::{layout}"].texture.astype(float)
+    for image in images:
         assert np.abs(image - np.roll(image, len(image) // 2, axis=0)).mean() > 0.8
 
 

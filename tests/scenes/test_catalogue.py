@@ -290,7 +290,7 @@ def test_what_is_wrong_in_a_look_is_named(lamp_assets, old, new, says):
     assert says in spoil(lamp_assets / "props" / "street.toml", LAMP, old, new)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.floats(-720, 720), st.sampled_from(sorted(FRONTS)))
 def test_fronts_turn_with_the_thing(tmp_path_factory, yaw_deg, front):
     text = LAMP.replace('front = "x"', f'front = "{front}"')
@@ -318,7 +318,7 @@ def test_a_scene_file_keeps_which_faces_are_which(lamp_assets, tmp_path, variant
     assert set(again.faces_of("pole|glass")) == set(range(len(again.faces)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.data())
 def test_runs_follow_the_faces_that_are_left(data):
     counts = data.draw(st.lists(st.integers(1, 12), min_size=1, max_size=4))

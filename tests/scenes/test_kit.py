@@ -43,7 +43,7 @@ def open_edges(parts):
     return places[np.column_stack([ways // len(places), ways % len(places)])[lacking]]
 
 
-@pytest.mark.parametrize("name", drawn(sorted(USES), 5))
+@pytest.mark.parametrize("name", drawn(sorted(USES), 3))
 def test_what_a_builder_makes_is_sound_or_refused_in_a_line(name):
     built = 0
     for use, label in islice(settings_of(name, USES[name]), SETTINGS):

@@ -36,7 +36,7 @@ def assert_extent(m: Mesh, low: tuple[float, ...], high: tuple[float, ...]) -> N
     np.testing.assert_allclose(m.vertices.max(axis=0), high, atol=1e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(size, size, size, few, st.floats(0.1, 1.0), st.floats(0.1, 1.0))
 def test_solids_are_closed_and_have_their_size_and_volume(x, y, z, n, fx, fy):
     box = shapes.box(size=(x, y, z), taper=(fx, fy))
@@ -102,7 +102,7 @@ def test_polygon_with_hole_has_its_volume_whatever_its_sense(n, r, h, turned, ho
     assert body.volume_m3 == pytest.approx(area * h)
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(
     st.lists(
         st.tuples(st.floats(0.5, 3), st.floats(-60, 60), st.just(0.0) | st.floats(-1, 1)), min_size=1, max_size=6

@@ -28,7 +28,7 @@ from aerialdojo_gen.scenes.designs import of_side, parse_designs
 from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
-from aerialdojo_gen.scenes.plans.build import build_plan, build_tables
+from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
 
 SLACK = 1.05
@@ -81,11 +81,11 @@ def made(catalogue: Catalogue, category: str, variant: str, design: str) -> Inst
     return catalogue.instantiate(category, "thing", rng, variant=variant, design=design)
 
 
-@pytest.fixture(scope="module", params=["a quarter", pytest.param("all", marks=pytest.mark.nightly)])
+@pytest.fixture(scope="module", params=["an eighth", pytest.param("all", marks=pytest.mark.nightly)])
 def built(request: pytest.FixtureRequest, catalogue: Catalogue) -> list[Built]:
-    """Every shape of the day's quarter of the categories, or of all."""
+    """Every shape of the day's eighth of the categories, or of all."""
     day, out = int(os.environ["SAMPLE_SEED"]), []
-    for category in sorted(catalogue)[day % 4 :: 4] if request.param == "a quarter" else catalogue:
+    for category in sorted(catalogue)[day % 8 :: 8] if request.param == "an eighth" else catalogue:
         prop = catalogue[category]
         things = {
             (variant.name, design.name): made(catalogue, category, variant.name, design.name)
@@ -264,17 +264,19 @@ def test_vehicles_in_bays_differ_beside_their_designs_and_stand_on_round_wheels(
 
 
 def test_out_of_distribution_scenes_have_held_out_designs(catalogue):
-    shapes: dict[str, dict[str, set[str]]] = {"0": defaultdict(set), "1": defaultdict(set)}
-    for name in ("U_Alley_0", "U_Alley_1"):
-        for thing in build_plan(ASSETS / "scenes" / f"{name}.toml", catalogue).instances:
-            if thing.category in catalogue.targets:
-                designs = catalogue[thing.category].designs
-                assert thing.held_out == (name.endswith("_1") and len(designs) > 1)
-                shapes[name[-1]][thing.category].add(thing.shape)
-    several = [c for c in shapes["0"] if c in shapes["1"] and len(catalogue[c].designs) > 1]
-    assert several
-    assert not any(shapes["0"][c] & shapes["1"][c] for c in several)
-    assert any(len(found) > 1 for found in shapes["0"].values())
+    sides = {(path.stem[-1], read_toml(path).get("designs", "train")) for path in (ASSETS / "scenes").glob("*.toml")}
+    assert sides == {("0", "train"), ("1", "held_out")}
+    kinds = ("mailbox", "fire_hydrant", "litter_bin")
+    yard = {"plan": 1, "size_m": [40, 40], "ceiling_m": 12, "site": [
+        {"place": [{"what": kind, "at": [-15, 5 * k], "count": 6, "step": [5, 0]} for k, kind in enumerate(kinds)]},
+    ]}  # fmt: skip
+    shapes: dict[str, dict[str, set[str]]] = {"train": defaultdict(set), "held_out": defaultdict(set)}
+    for side, found in shapes.items():
+        for thing in build_tables("U_Yard_0", yard | {"designs": side}, catalogue).instances[1:]:
+            assert thing.held_out == (side == "held_out")
+            found[thing.category].add(thing.shape)
+    assert all(not shapes["train"][kind] & shapes["held_out"][kind] for kind in kinds)
+    assert any(len(several) > 1 for several in shapes["train"].values())
 
 
 def test_a_side_without_designs_takes_the_first(catalogue):
