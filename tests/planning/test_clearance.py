@@ -231,12 +231,11 @@ def grove(seed: int, cell_m: float = 0.5, thick_m: float = 0.04) -> Scene:
 @pytest.mark.parametrize(("radius_m", "cell_m"), [(0.2, 0.5), (0.25, 0.5), (0.1, 0.5), (0.25, 1.0), (0.25, 1.6)])
 def test_no_move_that_the_grid_lets_pass_meets_a_pole(radius_m, cell_m):
     moves = 0
-    for seed in range(2):
-        scene = grove(seed, cell_m)
-        grid, world = ClearanceGrid.build(scene, cell_m=cell_m, radius_m=radius_m), CollisionWorld(scene)
-        for cell in np.argwhere(grid.moves):
-            p = grid.arrays.origin + (cell + 0.5) * cell_m
-            for m in np.flatnonzero(grid.moves[tuple(cell)] >> np.arange(N_HALF, dtype=np.uint32) & 1):
-                moves += 1
-                assert not world.segment_in_collision(p, p + MOVES[m] * cell_m, radius_m - 1e-6)
-    assert moves > 200
+    scene = grove(0, cell_m)
+    grid, world = ClearanceGrid.build(scene, cell_m=cell_m, radius_m=radius_m), CollisionWorld(scene)
+    for cell in np.argwhere(grid.moves):
+        p = grid.arrays.origin + (cell + 0.5) * cell_m
+        for m in np.flatnonzero(grid.moves[tuple(cell)] >> np.arange(N_HALF, dtype=np.uint32) & 1):
+            moves += 1
+            assert not world.segment_in_collision(p, p + MOVES[m] * cell_m, radius_m - 1e-6)
+    assert moves > 100
