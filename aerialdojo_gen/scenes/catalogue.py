@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,8 @@ class Catalogue:
     def __init__(self, categories: Mapping[str, Category], materials: MaterialLibrary) -> None:
         self._categories = dict(categories)
         self.materials = materials
-        self._parts: dict[tuple[object, ...], _Assembly] = {}
+        self._bodies: dict[tuple[object, ...], _Body] = {}
+        self._assemblies: dict[tuple[object, ...], _Assembly] = {}
 
     def __len__(self) -> int:
         return len(self._categories)
@@ -106,14 +107,13 @@ class Catalogue:
         if prop.builder is not None:
             assembly = self._built(prop, prop.builder, sizes, surfaces, rng)
         else:
+            # Most variants of a category differ in their surfaces alone.
             signs = tuple(words.items()) if any(p["shape"] == "text" for p in prop.parts) else ()
-            drawn = (form.name, form.stretch, tuple(sizes.items()))
-            key = (category, kind.name, *drawn, tuple(surfaces.items()), signs, shape_seed)
-            if key not in self._parts:
-                if len(self._parts) >= _CACHE_SIZE:
-                    self._parts.clear()
-                self._parts[key] = self._assembled(prop, kind, form, sizes, surfaces, words, shape_seed)
-            assembly = self._parts[key]
+            seed = shape_seed if any(map(_is_drawn_crown, prop.parts)) else 0
+            shape = (category, kind.without, form.name, form.stretch, tuple(sizes.items()), signs, seed)
+            body = _kept(self._bodies, shape, lambda: self._body(prop, kind, form, sizes, words, seed))
+            key = (*shape, tuple(surfaces.items()))
+            assembly = _kept(self._assemblies, key, lambda: self._textured(prop, body, surfaces))
         scale = scale * prop.scale
         placed_parts, kept_faces = _placed(assembly.parts, position, yaw_deg, scale)
         if not placed_parts:
@@ -124,8 +124,8 @@ class Catalogue:
             fronts = tuple(float(wrap_angle_rad(yaw + math.radians(side))) for side in FRONTS[prop.front])
             identifying = tuple(dict.fromkeys((*prop.identifying_parts, *kind.identifying_parts)))
             anatomy = Anatomy(float(wrap_angle_rad(yaw)), fronts, identifying, remap_runs(assembly.runs, kept_faces))
-        shape = sha256(assembly.shape + str(round(scale, 3)).encode()).hexdigest()[:_SHAPE_DIGITS]
-        return Instance(node, category, kind.name, words, placed_parts, anatomy, shape=shape, held_out=form.held_out)
+        digest = sha256(assembly.shape + str(round(scale, 3)).encode()).hexdigest()[:_SHAPE_DIGITS]
+        return Instance(node, category, kind.name, words, placed_parts, anatomy, shape=digest, held_out=form.held_out)
 
     def _draw_variant(self, prop: Category, name: str | None, rng: np.random.Generator) -> Variant:
         weights = np.array([v.weight for v in prop.variants])
@@ -145,24 +145,23 @@ class Catalogue:
             out[name] = float(fixed[name]) if name in fixed else round(drawn, 2) if low < high else low
         return out
 
-    def _assembled(
-        self,
+    @staticmethod
+    def _body(
         prop: Category,
         kind: Variant,
         form: Design,
         sizes: Mapping[str, float],
-        surfaces: Mapping[str, str],
         words: Mapping[str, str],
-        shape_seed: int,
-    ) -> _Assembly:
+        seed: int,
+    ) -> _Body:
         meshes: list[_Piece] = []
         for k, part in enumerate(prop.parts):
             only = designs_of(part)
             if (kind.without | form.without).intersection(tags_of(part)) or (only and form.name not in only):
                 continue
             own = part
-            if part["shape"] == "crown" and "seed" not in part:
-                own = {**part, "seed": shape_seed + k * _CROWN_SHAPES}
+            if _is_drawn_crown(part):
+                own = {**part, "seed": seed + k * _CROWN_SHAPES}
             try:
                 body, copies = part_mesh(own, sizes, words, form.stretch), copies_in(own, sizes)
             except ShapeError as error:
@@ -171,7 +170,7 @@ class Catalogue:
         total = sum(len(piece.body.faces) for piece in meshes)
         if total > MAX_TRIANGLES:
             raise AssetError(f"{prop.source} has {total:,} triangles, the maximum is {MAX_TRIANGLES:,}")
-        return self._textured(prop, meshes, surfaces)
+        return _Body(meshes)
 
     def _built(
         self,
@@ -185,11 +184,11 @@ class Catalogue:
             meshes = [_Piece(role, body) for role, body in builders()[builder](rng, sizes)]
         except (ValueError, KeyError) as error:
             raise AssetError(f"{prop.source} builder {builder!r}: {error}") from error
-        return self._textured(prop, meshes, surfaces)
+        return self._textured(prop, _Body(meshes), surfaces)
 
-    def _textured(self, prop: Category, pieces: Sequence[_Piece], surfaces: Mapping[str, str]) -> _Assembly:
+    def _textured(self, prop: Category, body: _Body, surfaces: Mapping[str, str]) -> _Assembly:
         by_material: dict[str, list[_Piece]] = {}
-        for piece in pieces:
+        for piece in body.pieces:
             by_material.setdefault(surfaces.get(piece.role, piece.role), []).append(piece)
         runs: dict[str, list[Run]] = {}
         parts = []
@@ -204,7 +203,23 @@ class Catalogue:
                     runs.setdefault(name, []).extend([run] if faces else [])
                 first += faces
         named = {name: tuple(members) for name, members in sorted(runs.items())}
-        return _Assembly(tuple(parts), named, [piece.body for piece in pieces])
+        return _Assembly(tuple(parts), named, body.shape)
+
+
+T = TypeVar("T")
+
+
+def _kept(cache: dict[tuple[object, ...], T], key: tuple[object, ...], make: Callable[[], T]) -> T:
+    """Return what a cache has at a key, which is made where it has nothing."""
+    if key not in cache:
+        if len(cache) >= _CACHE_SIZE:
+            cache.clear()
+        cache[key] = make()
+    return cache[key]
+
+
+def _is_drawn_crown(part: Mapping[str, Any]) -> bool:
+    return part["shape"] == "crown" and "seed" not in part
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,22 +233,29 @@ class _Piece:
 
 
 @dataclass(frozen=True, eq=False)
+class _Body:
+    """A prop in its own frame, whatever its materials."""
+
+    pieces: Sequence[_Piece]
+
+    @cached_property
+    def shape(self) -> bytes:
+        """Digest of the geometry."""
+        digest = sha256()
+        for body in (piece.body for piece in self.pieces):
+            digest.update(
+                np.rint(body.vertices * 1000.0).astype("<i4").tobytes() + body.faces.astype("<i4").tobytes()
+            )
+        return digest.digest()
+
+
+@dataclass(frozen=True, eq=False)
 class _Assembly:
     """A prop in its own frame, with its named parts."""
 
     parts: tuple[Part, ...]
     runs: Mapping[str, tuple[Run, ...]]
-    bodies: Sequence[Mesh]
-
-    @cached_property
-    def shape(self) -> bytes:
-        """Digest of the geometry, whatever its materials."""
-        digest = sha256()
-        for body in self.bodies:
-            digest.update(
-                np.rint(body.vertices * 1000.0).astype("<i4").tobytes() + body.faces.astype("<i4").tobytes()
-            )
-        return digest.digest()
+    shape: bytes  # Digest of its geometry
 
 
 def placed(
