@@ -98,7 +98,9 @@ def test_a_lit_wall_shows_its_texture_and_holes_are_looked_through(yard, rendere
     assert np.ptp(np.nonzero(seen), axis=1) == pytest.approx([edge, edge], abs=4)
 
 
-@pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize(
+    "renderer", [GlRenderer, pytest.param(PyBulletRenderer, marks=pytest.mark.nightly), RayRenderer]
+)
 def test_a_dome_is_drawn_as_it_is_behind_everything_and_changes_nothing_else(renderer):
     nodes = [
         raw(box((-2, 8, 0), (2, 12, 3)), "Shed", (200, 40, 40)),

@@ -110,7 +110,7 @@ def test_what_stands_behind_a_wall_is_not_drawn():
 def test_pictures_of_many_bodies_are_those_of_each(kind, make, size):
     """In whatever order sizes come; instance ids are those of each, and change nothing else."""
     world, camera, views = make(), Camera(*size), ("down", "front", "right")
-    poses = anywhere(world, 24 if kind is GlRenderer else 4, size[0])
+    poses = anywhere(world, 10 if kind is GlRenderer else 4, size[0])
     instance = np.full((len(poses), 3, size[1], size[0]), -9, np.int32)
     with kind(world) as renderer, kind(world) if kind is GlRenderer else nullcontext(renderer) as plain:
         rgb, depth_m = draw_bodies(renderer, camera, poses, views, instance)

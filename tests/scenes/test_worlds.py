@@ -50,7 +50,7 @@ def draft_of(world: World) -> Draft | None:
     return draft
 
 
-@pytest.mark.parametrize("kind", TYPES)
+@pytest.mark.parametrize("kind", drawn(TYPES, 7))
 def test_a_draw_of_a_world_has_its_digest(kind: str) -> None:
     world = World(kind, 1000)
     for trial in range(MAX_DRAWS):
