@@ -83,11 +83,12 @@ def test_walls_do_not_tell_north():
 @pytest.mark.parametrize("name", ["pybullet", "gl", "rays"])
 def test_a_renderer_that_is_lit_anew_draws_as_one_of_that_light(name):
     scene, camera, pose = court(), Camera(48, 48, 90.0), view_pose((1.0, 1.0, 3.0), 0.5, "front")
-    wet = chosen_light(scene.light, "wet")
-    with opened(scene, name) as renderer, opened(replace(scene, sun=wet.sun, weather=wet.weather), name) as fresh:
+    # Another sun throws other shadows.
+    low = Light((-0.6, 0.5, 0.62))
+    with opened(scene, name) as renderer, opened(replace(scene, sun=low.sun, weather=low.weather), name) as fresh:
         own = renderer.render(camera, pose).rgb
-        renderer.relight(wet)
-        assert renderer.light == wet
+        renderer.relight(low)
+        assert renderer.light == low
         lit = renderer.render(camera, pose).rgb
         assert np.array_equal(lit, fresh.render(camera, pose).rgb)
         assert not np.array_equal(lit, own)

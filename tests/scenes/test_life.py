@@ -205,7 +205,7 @@ def test_birds_stand_on_wires(catalogue):
 
 
 def test_birds_on_several_faces_of_a_wire_keep_apart(catalogue):
-    site = site_of("I_RailCorridor_0")
+    site = site_of("U_Alley_1")
     before = len(site.instances)
     for k in range(12):
         perch_on_wires(site, "pigeon", 20, generator(k, "birds"))
