@@ -84,7 +84,7 @@ def test_walls_do_not_tell_north():
 def test_a_renderer_that_is_lit_anew_draws_as_one_of_that_light(name):
     scene, camera, pose = court(), Camera(48, 48, 90.0), view_pose((1.0, 1.0, 3.0), 0.5, "front")
     # Another sun throws other shadows.
-    low = Light((-0.6, 0.5, 0.62))
+    low = Light((-0.6, 0.5, 0.62), "dusk")
     with opened(scene, name) as renderer, opened(replace(scene, sun=low.sun, weather=low.weather), name) as fresh:
         own = renderer.render(camera, pose).rgb
         renderer.relight(low)

@@ -12,7 +12,7 @@ from support.catalogue_faults import catalogue_faults
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.anatomy import FRONTS, Run, parse_anatomy, remap_runs
-from aerialdojo_gen.scenes.catalogue import Overrides, load_catalogue
+from aerialdojo_gen.scenes.catalogue import Overrides, _is_drawn_crown, load_catalogue
 from aerialdojo_gen.scenes.claims import Body, valid_phrases
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
 from aerialdojo_gen.scenes.model import Scene
@@ -316,6 +316,13 @@ def test_a_scene_file_keeps_which_faces_are_which(lamp_assets, tmp_path, variant
     assert np.array_equal(again.vertices[again.faces[again.faces_of("glass")]], glass)
     assert len(again.copies_of("arm")) == {"double": 2, "single": 1}[variant]
     assert set(again.faces_of("pole|glass")) == set(range(len(again.faces)))
+
+
+def test_crowns_of_one_size_differ(catalogue):
+    kind = next(name for name in catalogue if any(_is_drawn_crown(part) for part in catalogue[name].parts))
+    variant, own = catalogue[kind].variants[0], Overrides({n: low for n, (low, _) in catalogue[kind].params.items()})
+    grown = [catalogue.instantiate(kind, "it", generator(0, k), variant=variant.name, own=own) for k in range(12)]
+    assert len({one.shape for one in grown}) > 1
 
 
 @settings(max_examples=80, deadline=None)
