@@ -77,7 +77,7 @@ def blocked_loss(logits: Any, blocked: Any) -> Any:
 
 
 class Learner:
-    """A network, its optimiser, and what it learns by."""
+    """A network, the moments of its gradients, and what it learns by."""
 
     def __init__(self, network: Network, recipe: Recipe, device: str) -> None:
         self.torch = torch_package()
@@ -88,32 +88,27 @@ class Learner:
         self._about: list[tuple[Pool, Any, NDArray[np.int64]]] = []
 
     def state(self) -> dict[str, Any]:
-        """Return all tensors that a training goes on from: weights, and the optimiser's moments."""
+        """Return all tensors that a training goes on from: weights, and moments of gradients."""
         named = {f"network.{name}": t for name, t in self.network.state_dict().items()}
-        for number, states in self.optimiser.state_dict()["state"].items():
-            named |= {f"optimiser.{number}.{name}": t for name, t in states.items()}
+        for number, moments in self._moments.items():
+            named |= {f"optimiser.{number}.{name}": t for name, t in moments.items()}
         return named
 
     def restore(self, tensors: Mapping[str, Any], progress: Mapping[str, Any]) -> None:
         """Go on from a checkpoint."""
         weights = {n.removeprefix("network."): t for n, t in tensors.items() if n.startswith("network.")}
         self.network.load_state_dict(weights)
-        states: dict[int, dict[str, Any]] = {}
         for name, tensor in tensors.items():
             if name.startswith("optimiser."):
                 _, number, what = name.split(".", 2)
-                states.setdefault(int(number), {})[what] = tensor
-        given = self.optimiser.state_dict()
-        self.optimiser.load_state_dict({"state": states, "param_groups": given["param_groups"]})
+                moved = tensor if what == "step" else tensor.to(self.device)
+                self._moments.setdefault(int(number), {})[what] = moved
         self.progress = Progress(**progress)
 
     def begin(self, phase: int) -> None:
-        """Begin a phase, with a new optimiser."""
-        train = self.recipe.train
+        """Begin a phase, without moments of gradients."""
         self.progress = Progress(phase)
-        self.optimiser: Any = self.torch.optim.AdamW(
-            self.network.parameters(), lr=train.learning_rate, weight_decay=train.weight_decay
-        )
+        self._moments: dict[int, dict[str, Any]] = {}
 
     def share_cores(self) -> None:
         """Use the cores that are ours: sums depend on how many, and who flew in this process before left it one."""
@@ -124,13 +119,26 @@ class Learner:
         return self.torch.autocast(self.device, self.torch.bfloat16, enabled=self.device != "cpu")
 
     def update(self, loss: Any, rate: float) -> None:
-        """Descend a loss, (), by one step of the optimiser."""
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate
-        self.optimiser.zero_grad(set_to_none=True)
+        """Descend a loss, (), by one step of AdamW."""
+        # The function: PyTorch's class imports its compiler, which takes seconds.
+        from torch.optim.adamw import adamw
+
+        torch, train = self.torch, self.recipe.train
+        self.network.zero_grad(set_to_none=True)
         loss.backward()
-        self.torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.train.gradient_norm)
-        self.optimiser.step()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), train.gradient_norm)
+        learned = {k: p for k, p in enumerate(self.network.parameters()) if p.grad is not None}
+        for k in learned.keys() - self._moments.keys():
+            first, second = (torch.zeros_like(learned[k], memory_format=torch.preserve_format) for _ in range(2))
+            self._moments[k] = {"step": torch.tensor(0.0), "exp_avg": first, "exp_avg_sq": second}
+        steps, first, second = (
+            [self._moments[k][name] for k in learned] for name in ("step", "exp_avg", "exp_avg_sq")
+        )
+        with torch.no_grad():
+            adamw(
+                [*learned.values()], [p.grad for p in learned.values()], first, second, [], steps, amsgrad=False,
+                beta1=0.9, beta2=0.999, lr=rate, weight_decay=train.weight_decay, eps=1e-8, maximize=False,
+            )  # fmt: skip
 
     def learn(
         self, pool: Pool, exploration: Pool | None, held_out: NDArray[np.bool_], epochs: int, learning_rate: float,

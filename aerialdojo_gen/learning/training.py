@@ -159,7 +159,8 @@ class _Training:
         )  # fmt: skip
         torch.manual_seed(recipe.seed)
         if device == "cpu":
-            torch.use_deterministic_algorithms(True)
+            # As use_deterministic_algorithms(True), which imports PyTorch's compiler too: seconds.
+            torch.set_deterministic_debug_mode("error")
             # Not needed, as no tensor is read before it is written, and costs a tenth of the time.
             torch.utils.deterministic.fill_uninitialized_memory = False
         network = Network(shape)
