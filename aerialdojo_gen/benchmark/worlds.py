@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -13,7 +15,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from aerialdojo_gen.base.errors import AerialDojoError, UsageError
+from aerialdojo_gen.base.errors import AerialDojoError, UsageError, first_line
 from aerialdojo_gen.base.names import as_names, choose_scenes
 from aerialdojo_gen.base.shipped import home
 from aerialdojo_gen.base.version import __version__
@@ -43,6 +45,7 @@ class WorldMaker:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="worlds")
         self._coming: dict[str, Future[Path]] = {}
         self._lock = threading.Lock()
+        self._waiting = 0  # worlds that are not there yet
         self._child: subprocess.Popen[str] | None = None
         self._closed = False
 
@@ -52,10 +55,12 @@ class WorldMaker:
         return self._coming.pop(world.name).result()
 
     def prepare(self, world: World) -> None:
-        """Begin to make a world in the background, one after the other."""
+        """Begin to make a world in the background, after those that wait already and in the same process."""
         if self._closed:
             raise RuntimeError("the worlds are closed")
         if world.name not in self._coming:
+            with self._lock:
+                self._waiting += 1
             self._coming[world.name] = self._pool.submit(self._find_or_make, world)
 
     def close(self) -> None:
@@ -69,28 +74,43 @@ class WorldMaker:
     def _find_or_make(self, world: World) -> Path:
         made_of = (__version__, world.version, world.name, sorted(world.knobs.items()), self._n_objects)
         name = hashlib.blake2b(repr(made_of).encode(), digest_size=16, person=b"world").hexdigest()
-        return self._cache.make(name, lambda folder: self._make(world, folder)) / "data"
+        try:
+            return self._cache.make(name, lambda folder: self._make(world, folder)) / "data"
+        finally:
+            with self._lock:
+                self._waiting -= 1
+                done, self._child = (None, self._child) if self._waiting else (self._child, None)
+            if done is not None:  # an idle process would keep its memory
+                done.communicate()
 
     def _make(self, world: World, folder: Path) -> None:
-        """Write a world's plan and its release into a folder, in a process of its own."""
-        given = json.dumps([asdict(world), self._n_objects, str(folder)])
+        """Let the process write a world's plan and its release into a folder; it starts where there is none."""
         with self._lock:
             if self._closed:
                 raise AerialDojoError(f"{world.name}: the worlds were closed while it was made")
-            self._child = child = subprocess.Popen(
-                [sys.executable, "-m", __name__, given],
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            child = self._child = self._child or subprocess.Popen(
+                [sys.executable, "-m", __name__],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
             )  # fmt: skip
-        _, said = child.communicate()
-        if child.returncode:
-            last = said.strip().splitlines()[-1:] or [f"it ended with {child.returncode}"]
-            raise AerialDojoError(f"{world.name} could not be made: {last[0]}")
+        assert child.stdin is not None
+        assert child.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            print(json.dumps([asdict(world), self._n_objects, str(folder)]), file=child.stdin, flush=True)
+        if said := child.stdout.readline():
+            failure = json.loads(said)
+        else:
+            child.communicate()
+            self._child, failure = None, f"its process ended with {child.returncode}"
+        if failure:
+            raise AerialDojoError(f"{world.name} could not be made: {failure}")
 
 
 def make_worlds(types: str | Sequence[str], **options: Any) -> list[Path]:
     """Return the data directories of worlds, made where they are not there; this process keeps them in the cache."""
     maker = WorldMaker(types, **options)
     try:
+        for world in maker.worlds:
+            maker.prepare(world)
         return [maker.root(world) for world in maker.worlds]
     finally:
         maker.close()
@@ -106,9 +126,22 @@ def _write_release(world: World, n_objects: int, folder: Path) -> None:
     run_pipeline(folder / "pipeline.toml", data=folder / "data", workers=1)
 
 
+def _serve() -> None:
+    """Make the worlds that lines of the standard input ask for, and answer each with what went wrong, or nothing."""
+    # What stages and libraries print is no answer.
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        made_of, n_objects, into = json.loads(line)
+        failure = ""
+        try:
+            _write_release(World(**made_of), n_objects, Path(into))
+        except AerialDojoError as error:
+            failure = str(error)
+        except Exception as error:
+            failure = f"{type(error).__name__}: {first_line(error)}"
+        print(json.dumps(failure), file=answers, flush=True)
+
+
 if __name__ == "__main__":
-    made_of, most, into = json.loads(sys.argv[1])
-    try:
-        _write_release(World(**made_of), most, Path(into))
-    except AerialDojoError as failure:
-        raise SystemExit(str(failure)) from None
+    _serve()

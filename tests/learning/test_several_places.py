@@ -71,12 +71,12 @@ def test_requests_that_make_no_sense(given, said):
 
 @pytest.mark.slow
 def test_worlds_are_made_once_and_read_as_one(worlds_cache):
-    asked = {"worlds": "N_Snowfield", "num_worlds": 2, "n_objects": 6, "worlds_cache": worlds_cache}
+    asked = {"worlds": "U_Alley", "num_worlds": 2, "n_objects": 6, "worlds_cache": worlds_cache}
     data = Trajectories(**asked, setting="base", **HOW)
-    names = ("N_Snowfield-1000", "N_Snowfield-1001")
+    names = ("U_Alley-1000", "U_Alley-1001")
     assert data.index.scenes == names
     made = {path: path.stat().st_mtime_ns for path in worlds_cache.glob("*/*/data/release/**/*.parquet")}
-    folders = make_worlds("N_Snowfield", num_worlds=2, n_objects=6, folder=worlds_cache)
+    folders = make_worlds("U_Alley", num_worlds=2, n_objects=6, folder=worlds_cache)
     assert [root.url for root in data.index.roots] == [str(folder) for folder in folders]
     assert sorted(k for numbers in data.order(8, seed=2) for k in numbers) == [*range(len(data))]
     batch = data.batch(np.linspace(0, len(data) - 1, 8).astype(int))
