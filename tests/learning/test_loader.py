@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 from itertools import pairwise
 
@@ -16,19 +15,6 @@ from aerialdojo_gen.learning import Loader, Trajectories
 from aerialdojo_gen.learning.order import Order
 
 WITHOUT = "PyTorch is not installed: it is the extra 'train'"
-
-
-# In a process of its own, which has not drawn: forks of one that has could not.
-FORKED = """
-import sys
-from aerialdojo_gen.learning import Loader, Trajectories
-data = Trajectories(sys.argv[1], split="all", scene="U_Courtyard_0", size=24, limit=2, past=1)
-forking, plain = Loader(data, 8, seed=3, workers=2, context="fork"), Loader(data, 8, seed=3)
-forked, alone = [*forking, *forking], [*plain, *plain]  # two epochs
-assert len(forked) == len(alone) > 6
-for a, b in zip(forked, alone):
-    assert all((a[name] == b[name]).all() for name in ("rgb", "depth_m", "action"))
-"""
 
 
 @st.composite
@@ -154,14 +140,9 @@ def test_torchs_own_loader_takes_the_data_set(data):
 
 
 @pytest.mark.slow
-def test_forked_workers_give_what_one_process_gives(smoke):
-    pytest.importorskip("torch", reason=WITHOUT)
-    done = subprocess.run([sys.executable, "-c", FORKED, str(smoke)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
 @pytest.mark.kill
+# PyTorch raises at the worker's end, wherever this process is: in a callback of Hypothesis Python only says so.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_spawned_worker_gives_what_this_process_gives_and_a_killed_one_ends_the_loader_with_its_cause(data):
     torch = pytest.importorskip("torch", reason=WITHOUT)
     from aerialdojo_gen.learning.loader import WorkerDied

@@ -305,14 +305,36 @@ def test_rounds_of_dagger_add_flights_whose_labels_are_the_teachers(smoke, cache
             assert np.abs(np.sin(pose[:, 3] - pose[0, 3] - moved[:, 3])).max() < 1e-4
 
 
-def test_weights_are_read_without_torchs_compiler(learned):
-    """Whose import takes some seconds, in every process that flies."""
-    said = (
-        "import sys; from aerialdojo_gen.learning.policy import Policy; "
-        f"Policy({str(learned.policy)!r}); print('torch._dynamo' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
+# In a process of its own, which has not drawn: forks of one that has could not.
+FRESH = """
+import sys
+from aerialdojo_gen.learning import Loader, Trajectories
+from aerialdojo_gen.learning.policy import Policy
+from aerialdojo_gen.learning.recipe import load_recipe
+from aerialdojo_gen.learning.training import train
+smoke, weights, recipe, out, cache = sys.argv[1:]
+Policy(weights)
+data = Trajectories(smoke, split="all", scene="U_Courtyard_0", size=24, limit=2, past=1)
+forking, plain = Loader(data, 8, seed=3, workers=2, context="fork"), Loader(data, 8, seed=3)
+forked, alone = [*forking, *forking], [*plain, *plain]  # two epochs
+assert len(forked) == len(alone) > 6
+for a, b in zip(forked, alone):
+    assert all((a[name] == b[name]).all() for name in ("rgb", "depth_m", "action"))
+train(smoke, load_recipe(recipe), out=out, cache=cache, device="cpu", workers=1)
+assert "torch._dynamo" not in sys.modules
+"""
+
+
+@pytest.mark.slow
+def test_a_new_process_trains_without_torchs_compiler_and_its_forks_draw_what_it_draws(
+    smoke, cache, learned, tmp_path
+):
+    """The compiler's import takes some seconds, in every process that trains or flies."""
+    file = tmp_path / "recipe.toml"
+    file.write_text(TEXT.replace("epochs = 6", "epochs = 1"))
+    command = [sys.executable, "-c", FRESH, smoke, learned.policy, file, tmp_path / "out", cache]
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_without_torch_there_is_one_line(smoke, tmp_path):
