@@ -1,6 +1,7 @@
 """Agents and renderers that do what they may not: named at the first one, or logged and flown on."""
 
 import sys
+from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,9 @@ def test_a_faulty_agent_is_named_at_the_first_fault(smoke, tmp_path, how):
     with pytest.raises(AgentError, match=rf"agent {HERE}:Faulty failed at task U_\S+: {SAID[how]}") as told:
         evaluate(smoke, job(how, every=1 + before), out=tmp_path)
     assert "\n" not in str(told.value)
+    sent = ForkingPickler.loads(ForkingPickler.dumps(told.value))
+    assert (type(sent), str(sent), sent.traceback) == (AgentError, str(told.value), told.value.traceback)
+    assert bool(sent.traceback) == (how in ("reset", "exit", "act")), "of what the agent raised"
     # What was flown before it stays.
     assert not before or read_run(tmp_path, "r").num_rows == before
 
@@ -170,16 +174,19 @@ class Agent:
 """
 
 
-# Over a process's border, too.
-@pytest.mark.parametrize(("how", "line", "workers"), [("act", 17, 2), ("act", 17, 1), ("init", 8, 1)])
+# Over a process's border, too: by night, as two workers import everything; by day errors are sent and come back.
+@pytest.mark.parametrize(
+    ("how", "line", "workers", "asked"),
+    [pytest.param("act", 17, 2, True, marks=pytest.mark.nightly), ("act", 17, 1, True), ("act", 17, 1, False),
+     ("init", 8, 1, True)],
+)  # fmt: skip
 def test_an_agents_own_file_is_named_and_its_traceback_shown_on_demand(
-    smoke, tmp_path, monkeypatch, how, line, workers
+    smoke, tmp_path, monkeypatch, how, line, workers, asked
 ):
     (tmp_path / "own_agent.py").write_text(OWN_CODE)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "own_agent", raising=False)
     agent = ("--agent", "own_agent:Agent", "--option", f"how={how}", "--limit", "2", "--workers", workers)
-    asked = how == "init" or workers == 2
     done = called("evaluate", "--data", smoke, "--out", tmp_path, *agent, *["--traceback"] * asked)
     assert done.returncode == (1 if how == "act" else 2)
     # The library's line helps nobody: the place is in the agent's file.
