@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.annotations.appearance import SHADES
@@ -29,6 +28,8 @@ def is_unnamed(node: str, category: str) -> bool:
 
 def form_of(vertices: NDArray[np.float64]) -> str:
     """Name the form of a thing: one of the list `forms`."""
+    from scipy.spatial import ConvexHull, QhullError  # half a second, and `annotate` asks for no form
+
     low, height = float(vertices[:, 2].min()), float(np.ptp(vertices[:, 2]))
     outline = _outline(vertices)
     try:

@@ -1,4 +1,4 @@
-"""The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; servers that die."""
+"""The annotation page in a real browser: a foreign mesh up to tasks; two tabs at odds; a server that dies."""
 
 import contextlib
 import http.client
@@ -252,13 +252,35 @@ def conflict_open(driver):
     return driver.execute_script("return document.getElementById('conflict').open")
 
 
-def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, page, yard):
+def answer_nonsense(port, still):
+    """Be a server of another kind on the port: what it says is no reason to forget a change."""
+    answers = [
+        b"HTTP/1.1 500 No\r\nConnection: close\r\n\r\nInternal", b"HTTP/1.1 200 OK\r\n\r\n{}", b"",
+        b"HTTP/1.1 401 No\r\nConnection: close\r\n\r\nopen the address", b"HTTP/1.1 200 OK\r\n\r\n<html>",
+    ]  # fmt: skip
+    heard, end = 0, time.monotonic() + 120
+    with socket.create_server(("127.0.0.1", port)) as other:
+        other.settimeout(0.2)
+        while heard < len(answers):
+            assert time.monotonic() < end
+            with contextlib.suppress(TimeoutError):
+                client, _ = other.accept()
+                with client, contextlib.suppress(OSError):
+                    client.recv(65536)
+                    client.sendall(answers[heard])
+                    heard += 1
+            assert still()
+
+
+def test_two_tabs_at_odds_while_a_server_is_killed_in_the_middle_of_a_save_and_another_one_answers(
+    browser, page, yard
+):
     annotations, first, one = yard.annotations, page, browser.current_window_handle
     browser.switch_to.new_window("tab")
     second, two = Page(browser, yard.url), browser.current_window_handle
 
-    def begin(page):
-        select(page)
+    def begin(page, number=0):
+        select(page, number)
         page.one("#field-name").click()
 
     # Both have the field open; the first saves.
@@ -292,9 +314,16 @@ def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, p
     second.saved()
     until("both", lambda: entries(annotations)[0]["description"] == merged)
     assert entries(annotations)[0]["name"] == "ruby van"
-    # The server is killed; what is typed meanwhile is kept, and saved when there is a server again.
+    # The first hears of a name that it is about to write itself, and the server is killed.
     second.leave()
     begin(second)
+    browser.switch_to.window(one)
+    begin(first, 2)
+    document = json.loads(annotations.read_text())  # as an editor changes it
+    document["objects"][2]["name"] = "vermilion thing"
+    annotations.write_text(json.dumps(document, indent=2) + "\n")
+    until("their name", lambda: "vermilion thing" in first.text("#objects"))
+    browser.execute_script(WATCH)
     answered = []
     saving = threading.Thread(target=rename_on_and_on, args=(yard.url, answered))
     saving.start()
@@ -303,6 +332,11 @@ def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, p
     saving.join()
     on_disk = entries(annotations)[1]["name"]
     assert on_disk in (f"thing {len(answered) - 1}", f"thing {len(answered)}")
+    first.write("name", "scarlet thing")
+    first.press("\ue004")
+    until("the conflict", lambda: conflict_open(browser))
+    # What is typed meanwhile is kept, and saved when there is a server again.
+    browser.switch_to.window(two)
     second.write("name", "van of the night")
     second.press("\ue004")
     until("said that it is not saved", lambda: "not saved" in second.text("#saved"))
@@ -310,67 +344,28 @@ def test_two_tabs_at_odds_and_a_server_killed_in_the_middle_of_a_save(browser, p
     until("lost", lambda: "does not answer" in second.text("#saved"))
     for selector in ("#panel", "#saved", "#show-help", "#remove", "#field-description"):
         assert browser.execute_script(INSIDE, selector), selector
+    answer_nonsense(yard.port, lambda: second.text("#saved") != "saved")
     assert entries(annotations)[0]["name"] == "ruby van"
     yard.start()
     second.saved()
     assert entries(annotations)[0]["name"] == "van of the night"
+    # Twice the first comes to where it would ask the server, which is there again.
     browser.switch_to.window(one)
-    until("the other tab sees it", lambda: "van of the night" in first.text("#objects"))
+    browser.execute_script(TICKS)
+    until("two ticks", lambda: browser.execute_script("return window.ticks") >= 2)
+    assert first.text("#saved") != "saved"
+    assert conflict_open(browser)
+    assert entries(annotations)[2]["name"] == "vermilion thing"
+    first.one("#use-mine").click()
+    first.saved()
+    assert entries(annotations)[2]["name"] == "scarlet thing"
+    said = browser.execute_script("return window.said")
+    assert [text for text, unsaved in said if text == "saved" and unsaved] == []
+    assert not conflict_open(browser)
+    assert "van of the night" in first.text("#objects")
     lines = [json.loads(line) for line in annotations.with_suffix(".history.jsonl").read_text().splitlines()]
-    assert lines[-1]["what"] == "name of object 0 (van of the night)"
+    assert lines[-2]["what"] == "name of object 0 (van of the night)"
     assert all(a["after"] == b["before"] for a, b in itertools.pairwise(lines))
     browser.switch_to.window(two)
     browser.close()
     browser.switch_to.window(one)
-
-
-def answer_nonsense(port, still):
-    """Be a server of another kind on the port: what it says is no reason to forget a change."""
-    answers = [
-        b"HTTP/1.1 500 No\r\nConnection: close\r\n\r\nInternal", b"HTTP/1.1 200 OK\r\n\r\n{}", b"",
-        b"HTTP/1.1 401 No\r\nConnection: close\r\n\r\nopen the address", b"HTTP/1.1 200 OK\r\n\r\n<html>",
-    ]  # fmt: skip
-    heard, end = 0, time.monotonic() + 120
-    with socket.create_server(("127.0.0.1", port)) as other:
-        other.settimeout(0.2)
-        while heard < len(answers):
-            assert time.monotonic() < end
-            with contextlib.suppress(TimeoutError):
-                client, _ = other.accept()
-                with client, contextlib.suppress(OSError):
-                    client.recv(65536)
-                    client.sendall(answers[heard])
-                    heard += 1
-            assert still()
-
-
-def test_nothing_says_saved_while_a_conflict_is_open_servers_die_and_others_answer(browser, page, yard):
-    annotations = yard.annotations
-    select(page)
-    page.one("#field-name").click()
-    document = json.loads(annotations.read_text())  # as an editor changes it
-    document["objects"][0]["name"] = "vermilion van"
-    annotations.write_text(json.dumps(document, indent=2) + "\n")
-    until("their name", lambda: "vermilion van" in page.text("#objects"))
-    browser.execute_script(WATCH)
-    yard.kill()
-    page.write("name", "scarlet van")
-    page.press("\ue004")
-    until("the conflict", lambda: conflict_open(browser))
-    yard.start()
-    # Twice the page comes to where it would ask the server, which is there again.
-    browser.execute_script(TICKS)
-    until("two ticks", lambda: browser.execute_script("return window.ticks") >= 2)
-    assert page.text("#saved") != "saved"
-    assert entries(annotations)[0]["name"] == "vermilion van"
-    assert conflict_open(browser)
-    yard.kill()
-    page.one("#use-mine").click()
-    until("said that it is not saved", lambda: "not saved" in page.text("#saved"))
-    answer_nonsense(yard.port, lambda: page.text("#saved") != "saved")
-    yard.start()
-    page.saved()
-    assert entries(annotations)[0]["name"] == "scarlet van"
-    said = browser.execute_script("return window.said")
-    assert [text for text, unsaved in said if text == "saved" and unsaved] == []
-    assert not conflict_open(browser)

@@ -20,7 +20,7 @@ def screenshot(driver):
 
 
 def canvas(driver):
-    """What the browser shows once it stands still, (720, 1280, 3) sRGB."""
+    """What the browser shows once it stands still, (H, W, 3) sRGB."""
     # Reading a pixel waits for the graphics: without that, a slow machine shows the frame before.
     driver.execute_async_script(
         "const done = arguments[0], gl = page.view.renderer.getContext();"

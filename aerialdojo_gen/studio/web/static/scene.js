@@ -66,16 +66,17 @@ export class SceneView {
     this.meshes = payload.groups.map((group) => groupMesh(group, uniforms, anisotropy));
     this.three.add(skyMesh(payload), ...this.meshes);
     const extent = boxOf(payload, payload.nodes.map((_, k) => k));
-    castShadow(this.renderer, this.meshes, uniforms, extent.min, extent.max);
+    castShadow(this.renderer, this.meshes, uniforms, extent.min, extent.max, software ? 2048 : 4096);
     this.picker = new NodePicker(payload);
     this.culler = new NodeCuller(payload, this.meshes);
     this.pace = new Pace(this.renderer.getContext(), software ? SOFTWARE_LEVEL : 0);
     this.controls = new CameraControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.invalidate());
     this.listen();
-    new ResizeObserver(() => this.resize()).observe(element);
+    new ResizeObserver(() => { if (this.resize()) this.draw(); }).observe(element);
     this.resize();
     this.home();
+    this.aim();
   }
 
   // ---- drawing: a frame is made when something changed, and not before ----
@@ -129,14 +130,16 @@ export class SceneView {
     for (const layer of this.layers.values()) layer.thin?.(mostSegments);
   }
 
+  /** Take the element's size; whether that is another one, so that nothing is on the canvas any more. */
   resize() {
-    this.width = Math.max(1, this.element.clientWidth);
-    this.height = Math.max(1, this.element.clientHeight);
-    this.renderer.setSize(this.width, this.height);
-    this.camera.aspect = this.width / this.height;
+    const width = Math.max(1, this.element.clientWidth), height = Math.max(1, this.element.clientHeight);
+    if (width === this.width && height === this.height) return false;
+    Object.assign(this, { width, height });
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     for (const layer of this.layers.values()) this.fit(layer);
-    this.draw();
+    return true;
   }
 
   fit(layer) { layer.resize(this.width, this.height, this.renderer.getPixelRatio()); }

@@ -154,7 +154,7 @@ export function skyMesh(payload) {
 }
 
 /** Render the sun's depth map once: nothing in the scene moves. */
-export function castShadow(renderer, meshes, uniforms, low, high, size = 4096) {
+export function castShadow(renderer, meshes, uniforms, low, high, size) {
   size = Math.min(size, renderer.capabilities.maxTextureSize);
   const centre = low.clone().add(high).multiplyScalar(0.5);
   const radius = high.clone().sub(low).length() / 2 + 1;
@@ -163,8 +163,9 @@ export function castShadow(renderer, meshes, uniforms, low, high, size = 4096) {
   camera.position.copy(centre).addScaledVector(uniforms.sun.value, 2 * radius - 1);
   camera.lookAt(centre);
   camera.updateMatrixWorld(true);
+  // Of colours there are none: the fewest bytes that a target may have.
   const target = new THREE.WebGLRenderTarget(size, size, {
-    minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter,
+    format: THREE.RedFormat, minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter,
     depthTexture: new THREE.DepthTexture(size, size, THREE.FloatType),
   });
   const scene = new THREE.Scene();
