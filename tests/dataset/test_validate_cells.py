@@ -37,7 +37,7 @@ def other(value, kind):
     return value[:-3] + (b"xyz" if isinstance(value, bytes) else "x")
 
 
-@pytest.mark.parametrize("key", drawn([key for key in SHARDS if not key.endswith("/test")], 4))
+@pytest.mark.parametrize("key", drawn([key for key in SHARDS if not key.endswith("/test")], 2))
 def test_every_cell_is_held_to_something(planted, key):
     spec = store.LAYOUT[key].spec
     columns = [field for field in spec.schema if field.name not in UNTOLD]
@@ -59,7 +59,7 @@ def test_every_cell_is_held_to_something(planted, key):
         assert untold <= {name for name, by in TOLD_ELSEWHERE.items() if by in found}
 
 
-@pytest.mark.parametrize("value", drawn([None, math.nan, -1, 2**31 - 1, 1e300, ""], 2))
+@pytest.mark.parametrize("value", drawn([None, math.nan, -1, 2**31 - 1, 1e300, ""], 1))
 def test_no_value_is_too_strange_to_be_judged(planted, value):
     for key in SHARDS:
         rows = planted.rows(key)

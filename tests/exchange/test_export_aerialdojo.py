@@ -34,6 +34,16 @@ def layout(smoke, tmp_path_factory) -> Path:
     return out
 
 
+@pytest.fixture(scope="module")
+def plain(smoke, tmp_path_factory) -> tuple[Path, str]:
+    """The layout with the release's own pictures, and what is said of its size beforehand."""
+    out, said = tmp_path_factory.mktemp("plain") / "out", io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(exporting, "_MANY_FILES", 100)
+        export_release("aerialdojo", smoke, out, picture_px=0, reporter=Reporter(stream=said))
+    return out, said.getvalue()
+
+
 def task_files(layout: Path) -> list[Path]:
     return sorted(layout.glob("*OGS/*/*/*/Task.json"))
 
@@ -170,18 +180,17 @@ def test_pictures_are_as_large_as_the_authors_and_show_the_same_view(layout, smo
         assert np.abs(again - large).mean() > 0.3
 
 
-def test_the_size_is_announced_and_the_releases_own_pictures_are_exported_on_demand(smoke, tmp_path, monkeypatch):
-    monkeypatch.setattr(exporting, "_MANY_FILES", 100)
-    size, said = estimate_size("aerialdojo", open_root(smoke), release_scenes(smoke), 0), io.StringIO()
-    export_release("aerialdojo", smoke, tmp_path / "out", picture_px=0, reporter=Reporter(stream=said))
-    written = [path.stat() for path in (tmp_path / "out").rglob("*") if path.is_file()]
+def test_the_size_is_announced_and_the_releases_own_pictures_are_exported_on_demand(smoke, plain):
+    out, said = plain
+    size = estimate_size("aerialdojo", open_root(smoke), release_scenes(smoke), 0)
+    written = [path.stat() for path in out.rglob("*") if path.is_file()]
     assert size.files == len(written), "to the file"
     # Links to one file count once.
     assert size.bytes == pytest.approx(sum({file.st_ino: file.st_size for file in written}.values()), rel=0.25)
-    told = f"export: {size}; --shards writes 3 files in their place, into {tmp_path / 'out'}"
-    assert said.getvalue().startswith(told)
+    told = f"export: {size}; --shards writes 3 files in their place, into {out}"
+    assert said.startswith(told)
     objects = pd.read_parquet(smoke / "release/objects").set_index("reference_image_id")["reference_image"]
-    pictures = list((tmp_path / "out").glob("ImageOGS/**/Images/*.png"))
+    pictures = list(out.glob("ImageOGS/**/Images/*.png"))
     assert pictures
     assert all(path.read_bytes() == objects[path.stem] for path in pictures)
 
@@ -251,9 +260,9 @@ def test_trajectories_fly_as_their_words_say_in_ned(layout, smoke):
     assert sorted(lengths) == pytest.approx(sorted(routes["length_m"]), abs=1e-9)
 
 
-def test_archives_unpacked_are_the_files(layout, smoke, tmp_path):
+def test_archives_unpacked_are_the_files(plain, smoke, tmp_path):
     """Those of an export before, to the byte; the archives tell nothing of when and where they were made."""
-    counts = export_release("aerialdojo", smoke, tmp_path / "tars", shards=True)
+    counts = export_release("aerialdojo", smoke, tmp_path / "tars", shards=True, picture_px=0)
     archives = sorted((tmp_path / "tars").glob("*.tar"))
     assert [path.stem for path in archives] == release_scenes(smoke)
     assert {path.name for path in (tmp_path / "tars").iterdir()} == {*(p.name for p in archives), "export.json"}
@@ -264,7 +273,7 @@ def test_archives_unpacked_are_the_files(layout, smoke, tmp_path):
             names = [Path(name) for name in tar.getnames()]
             assert names == sorted(names)
             tar.extractall(tmp_path / "unpacked", filter="data")
-    files = files_of(layout)
+    files = files_of(plain[0])
     document = json.loads(files.pop("export.json"))
     assert document == json.loads((tmp_path / "tars" / "export.json").read_text())
     assert document["counts"] == counts
@@ -324,7 +333,7 @@ def test_an_export_is_replaced_by_force_alone_and_there_again_after_a_kill(smoke
 
 def test_the_command_says_what_it_wrote(smoke, tmp_path):
     out = tmp_path / "o"
-    done = called("export", "--format", "aerialdojo", "--data", smoke, "--picture-size", 32, "--out", out)
+    done = called("export", "--format", "aerialdojo", "--data", smoke, "--picture-size", 0, "--out", out)
     assert done.returncode == 0, done.stderr
     scenes = existing_scenes(smoke)
     n = sum(store.count_rows(smoke, table, scene) for table in ("routes/train", "routes/test") for scene in scenes)

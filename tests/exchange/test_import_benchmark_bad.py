@@ -133,7 +133,7 @@ def test_records_of_the_wrong_kind_are_named(tmp_path, format_name):
         assert line.startswith(f"  file.json: row {row}: the row: expected an object, found")
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(["uav-on", "cityavos", "aerialvln", "openfly"]), st.data())
 def test_whatever_stands_in_a_field_is_read_or_named(tmp_path, format_name, data):
     document, rows = records_of(format_name, tmp_path, 2)

@@ -81,7 +81,7 @@ def test_a_scene_name_is_a_plain_one_wherever_the_file_lies(tmp_path, name):
         import_benchmark("aerialdojo", [path], tmp_path)
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_whatever_stands_in_a_task_or_its_trajectory_is_read_or_named(tmp_path, data):
     tasks, trajectory = document()

@@ -22,7 +22,7 @@ values = st.recursive(
 )
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(st.lists(values, max_size=8), st.sampled_from([1, 2, 7, 64]), st.sampled_from([None, 0, 3]), st.booleans())
 def test_records_are_what_json_reads_whatever_the_chunks(tmp_path_factory, rows, chunk, indent, ascii_only):
     path = tmp_path_factory.mktemp("json") / "rows.json"

@@ -90,7 +90,7 @@ blocks = st.lists(st.tuples(corner, st.sampled_from(sorted(MATERIALS))), min_siz
 
 
 @given(blocks)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15)
 def test_the_payload_is_the_scene(chosen):
     items = tuple(
         block(f"b{k}", low, tuple(v + 1.0 for v in low), material) for k, (low, material) in enumerate(chosen)

@@ -62,5 +62,6 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None, "Creator": None})):
             with atomic_file(folder, name + suffix) as path:
                 figure.savefig(path, dpi=_DPI, metadata=metadata, facecolor="white")
+            figure.set_layout_engine("none")  # it is laid out: a quarter of the time
             paths.append(folder / (name + suffix))
     return paths
