@@ -204,7 +204,7 @@ def test_a_person_flies_to_the_goal_by_keys_and_report_has_the_rate(browser, smo
     (row,) = select(smoke, one).to_pylist()
     routes = reference_actions(open_root(smoke), row["scene"], (row["subset"],), "agent_action")
     command = [sys.executable, "-m", "aerialdojo_gen.cli", "fly", "--name", "pilot-1", "--out", str(tmp_path),
-               "--data", str(smoke), "--modality", "image", "--limit", "1", "--seed", "7", "--no-browser"]  # fmt: skip
+               "--data", str(smoke), "--modality", "image", "--limit=1", "--seed=7", "--no-browser"]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         url = re.search(r"http://127\.0\.0\.1:\d+/", process.stdout.readline())[0]
