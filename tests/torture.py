@@ -96,7 +96,9 @@ KINDS = {
     "render-video": Kind(_render("video"), _lose_recordings),
     "render-png": Kind(_render("png"), _lose_recordings),
     "export": Kind(
-        lambda data, _: ["export", "--format", "aerialdojo", "--data", data, "--out", data / "exports/a", "--force"],
+        # The release's own pictures: the small ones that the format asks for are drawn.
+        lambda data, _: ["export", "--format", "aerialdojo", "--picture-size", 0, "--data", data,
+                         "--out", data / "exports/a", "--force"],
         _older("exports/a", "export.json"),
     ),
     "import": Kind(
@@ -144,14 +146,20 @@ class Server:
 def serve() -> None:
     """Be a `Server`'s process."""
     for name in (
-        "pipeline.stages.work.render",
-        "pipeline.stages.work.plan",
-        "pipeline.stages.work.anchor_sample",
-        "benchmark.runner",
-        "exchange.importing",
+        "aerialdojo_gen.pipeline.stages.work.render",
+        "aerialdojo_gen.pipeline.stages.work.plan",
+        "aerialdojo_gen.pipeline.stages.work.anchor_sample",
+        "aerialdojo_gen.benchmark.runner",
+        "aerialdojo_gen.exchange.exporting",
+        "aerialdojo_gen.exchange.importing",
+        "pandas",  # PyArrow does, as soon as it is given a list
+        "pyarrow.dataset",
+        "scipy.spatial",
     ):
-        importlib.import_module(f"aerialdojo_gen.{name}")
-    # Which sources a stage imports takes seconds to find out; a child knows it from here.
+        importlib.import_module(name)
+    # What takes seconds the first time, a child has from here: Numba, all props, which sources a stage imports.
+    importlib.import_module("aerialdojo_gen.geometry.portable").exp([0.0])
+    importlib.import_module("aerialdojo_gen.scenes.catalogue").load_catalogue(ROOT / "scene_assets")
     runner = importlib.import_module("aerialdojo_gen.pipeline.runner")
     for stage in runner.STAGES:
         runner.stage_code(stage.name)
