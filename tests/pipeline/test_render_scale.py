@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from support.court import CONFIG, ROUTE, SCENE, files_of, run_whole
-from support.court import write_inputs as write_some
+from support import court
+from support.court import ROUTE, SCENE, files_of, run_whole
 
 from aerialdojo_gen.base.errors import RenderError, UsageError
 from aerialdojo_gen.cli.render import duration_s, share_of
@@ -31,14 +31,15 @@ from aerialdojo_gen.store.staging import AREA
 
 pytestmark = pytest.mark.slow
 
-ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 3})
+CONFIG = court.CONFIG.model_copy(update={"views": ("front", "left")})
+ALL = CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 2})
 FEW = CONFIG.model_copy(update={"limit": 2, "trajectories_per_part": 2})
 LOOSE = FEW.model_copy(update={"frames": "png", "views": ("front",), "instances": True})
 
 
 def write_inputs(data):
-    """Sound routes alone: a flagged view is rendered twice, and that takes its time."""
-    write_some(data, bad=ROUTE)
+    """Seven routes, sound ones alone: a flagged view is rendered twice, and that takes its time."""
+    court.write_inputs(data, bad=ROUTE, n_long=5)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def whole(tmp_path_factory):
     data = tmp_path_factory.mktemp("whole")
     write_inputs(data)
     (summary,) = run_whole(data, ALL)
-    assert (summary.rows_in, summary.rows_out, summary.computed) == (12, 12 * 8, 4)
+    assert (summary.rows_in, summary.rows_out, summary.computed) == (7, 7 * 4, 4)
     return data
 
 
@@ -71,34 +72,36 @@ def recorded(monkeypatch):
     return recorded
 
 
-# It runs `ALL`.
+# It is killed in the middle of the third trajectory's files.
 RUN = """
-import sys
+import os, signal, sys
 from pathlib import Path
-from support.court import CONFIG, run_whole
-run_whole(Path(sys.argv[1]), CONFIG.model_copy(update={"limit": 0, "trajectories_per_part": 3}))
+from support.court import run_whole
+from aerialdojo_gen.base.config.sections import RenderConfig
+from aerialdojo_gen.rendering.codecs import VideoWriter
+write, written = VideoWriter.write, []
+def killed(self, frames):
+    write(self, frames)
+    written.append(frames)
+    if len(written) == 52:
+        os.kill(os.getpid(), signal.SIGKILL)
+VideoWriter.write = killed
+run_whole(Path(sys.argv[1]), RenderConfig.model_validate_json(sys.argv[2]))
 """
 
 
 @pytest.mark.kill
-def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole):
+def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp_path, whole, recorded):
     write_inputs(tmp_path)
-    process = subprocess.Popen([sys.executable, "-c", RUN, tmp_path], cwd=Path(__file__).parents[1])
-    media = tmp_path / "media" / SCENE
-    limit = time.monotonic() + 120
-    while len(list(media.glob("nav_*/recording.json"))) < 4 and time.monotonic() < limit:
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL
-    kept = {p: p.stat().st_mtime_ns for p in media.glob("nav_*/recording.json")}
-    assert 4 <= len(kept) < 12
-    # As if it had been killed in the middle of a file, whenever it was.
-    half = tmp_path / AREA / "dead"
-    (half / "new").mkdir(parents=True)
-    (half / "new" / "front_rgb.mp4").write_bytes(b"half")
-    (half / "lease").write_text(f"media/{SCENE}/nav_05")
+    command = [sys.executable, "-c", RUN, tmp_path, ALL.model_dump_json()]
+    killed = subprocess.run(command, cwd=Path(__file__).parents[1], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "media" / SCENE).glob("nav_*/recording.json")}
+    assert len(kept) == 2
+    assert list((tmp_path / AREA).rglob("front_depth.mkv")), "it was killed in the middle of a file"
 
     run_whole(tmp_path, ALL)
+    assert len(recorded) == 5
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
     assert not (tmp_path / AREA).exists()
@@ -121,12 +124,12 @@ def test_a_spent_budget_leaves_whole_trajectories_and_the_next_run_goes_on(tmp_p
     write_inputs(tmp_path)
     began = time.time()
     monkeypatch.setattr(time, "time", lambda: began + 10.0 * len(recorded))
-    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=began + 45.0))
-    assert len(recorded) == 5
+    (summary,) = run_whole(tmp_path, ALL, limits=RunLimits(deadline=began + 25.0))
+    assert len(recorded) == 3
     assert summary.computed == 1
     assert not list((tmp_path / "media" / SCENE).glob(".*"))
     run_whole(tmp_path, ALL)
-    assert len(recorded) == len(set(recorded)) == 12
+    assert len(recorded) == len(set(recorded)) == 7
     assert files_of(tmp_path) == files_of(whole)
 
 
@@ -215,8 +218,8 @@ def test_the_estimate_is_of_the_selection_and_near_the_truth(whole):
     said = estimate(whole, [SCENE], ALL, 0, 2)
     assert "with 2 workers on idle cores" in str(said)
     assert "with 1 worker on idle cores" in str(dataclasses.replace(said, workers=1))
-    assert "12 trajectories, 72 poses, 96 videos" in str(said)
-    assert estimate(whole, [SCENE], ALL.model_copy(update={"layout": "tiled"}), 0, 2).videos == 12
+    assert "7 trajectories, 42 poses, 28 videos" in str(said)
+    assert estimate(whole, [SCENE], ALL.model_copy(update={"layout": "tiled"}), 0, 2).videos == 7
     size = sum(r["bytes"] for r in store.read_scene(whole, "recordings", SCENE).to_pylist())
     assert 0.4 * size < said.size_bytes < 2.5 * size
     assert said.wall_s == pytest.approx(said.cpu_s / 2)
@@ -271,7 +274,7 @@ def lose_the_note(folder):
 
 
 VIDEO_DAMAGE = {
-    "a video lost": lambda folder: (folder / "down_depth.mkv").unlink(),
+    "a video lost": lambda folder: (folder / "front_depth.mkv").unlink(),
     "a video cut": lambda folder: os.truncate(folder / "left_rgb.mp4", (folder / "left_rgb.mp4").stat().st_size - 7),
     "note and rows lost": lose_the_note,
 }

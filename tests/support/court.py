@@ -40,8 +40,8 @@ def route_row(nav_id, setting, lists):
     return {**row, **xyz(goal, "goal_{}_m"), **lists}
 
 
-def write_inputs(data, bad=BAD):
-    """Write the tables that recording reads; the route nav_b is `bad`."""
+def write_inputs(data, bad=BAD, n_long=10):
+    """Write the tables that recording reads; the route nav_b is `bad`, `n_long` more are of the longest setting."""
     scene = courtyard()
     write_scene(data, scene)
     anchors = (
@@ -58,7 +58,7 @@ def write_inputs(data, bad=BAD):
         ],
         "routes/train": [
             route_row("nav_a", "base", ROUTE), route_row("nav_b", "standard", bad),
-            *(route_row(f"nav_{k:02}", "long_horizon", ROUTE) for k in range(10)),
+            *(route_row(f"nav_{k:02}", "long_horizon", ROUTE) for k in range(n_long)),
         ],
         "routes/test": [],
     }  # fmt: skip
