@@ -1,4 +1,7 @@
-"""A Ray cluster of two nodes with a core each: the same bytes, whatever node or driver is lost on the way."""
+"""A Ray cluster of two nodes with a core each: the same bytes, whatever node or driver is lost on the way.
+
+By day test_executors loses a process of a cluster of its own.
+"""
 
 import contextlib
 import os
@@ -119,13 +122,10 @@ def test_a_driver_that_is_killed_and_started_again_goes_on_to_the_same_bytes(pro
 
 
 @pytest.mark.ray
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("tables", "begun"),
-    [
-        (["plans"], "plans/*/part-*.parquet"),
-        pytest.param(["recordings", "frames", "media"], f"{AREA}/*/new*", marks=pytest.mark.nightly),
-    ],
+    [(["plans"], "plans/*/part-*.parquet"), (["recordings", "frames", "media"], f"{AREA}/*/new*")],
 )
 def test_a_node_that_is_lost_in_the_middle_costs_nothing_but_time(project, smoke, nodes, tmp_path, tables, begun):
     data = shutil.copytree(smoke, tmp_path / "data")
