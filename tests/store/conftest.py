@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 import urllib.request
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from support.s3_server import CREDENTIALS, Proxy, forget_clients, s3_server
+from support.s3_server import CREDENTIALS, Proxy, forget_clients, s3_server, upload
 
 from aerialdojo_gen.store.root import DataRoot, open_root
 
@@ -61,12 +60,7 @@ def smoke_bucket(server: str, smoke: Path, tmp_path_factory: pytest.TempPathFact
     cloud = new_bucket(server)
     with pytest.MonkeyPatch.context() as patch:
         reach(server, tmp_path_factory.mktemp("cache"), patch)
-        root = open_root(cloud)
-        for folder in ("release", "meshes", "plans", "verdicts"):
-            for path in sorted((smoke / folder).rglob("*")):
-                if path.is_file():
-                    with root.commit(path.relative_to(smoke).as_posix()) as copy:
-                        shutil.copyfile(path, copy)
+        upload(open_root(cloud), smoke, ("release", "meshes", "plans", "verdicts"))
     return cloud
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.command_line import called
+from support.s3_server import upload
 
 from aerialdojo_gen.dataset.contents import existing_scenes
 from aerialdojo_gen.pipeline.registry import STAGES, upstream
@@ -19,24 +20,28 @@ from aerialdojo_gen.store.root import open_root
 BOTH = ["U_Courtyard_0", "U_Courtyard_1"]
 
 
+ANCHORED = ("meshes", "scenes", "landmarks", "objects", "chosen_anchors", "anchors", "viewpoints")
+
+
 @pytest.mark.parametrize(
-    ("command", "scenes"),
+    ("command", "scenes", "given", "begun"),
     [
-        (["anchor-sample", "--pipeline", "smoke"], BOTH[:1]),
-        pytest.param(["run", "smoke"], BOTH, marks=pytest.mark.nightly),
+        (["plan", "--pipeline", "smoke"], BOTH[:1], ANCHORED, "pairs"),
+        pytest.param(["run", "smoke"], BOTH, (), "objects", marks=pytest.mark.nightly),
     ],
-    ids=["anchors of one", "all of both"],
+    ids=["plans of one", "all of both"],
 )
 def test_a_killed_run_goes_on_and_gives_what_a_local_one_gives(
-    cloud: str, smoke: Path, project: Path, command: list[str], scenes: list[str]
+    cloud: str, smoke: Path, project: Path, command: list[str], scenes: list[str], given: tuple[str, ...], begun: str
 ) -> None:
     arguments, lease = [*command, *scenes, "--data", cloud], {"AERIALDOJO_LEASE_S": "3"}
     stages = [stage.name for stage in (STAGES if command[0] == "run" else upstream(command[0]))]
     root, local = open_root(cloud), open_root(smoke)
-    program = [sys.executable, "-m", "aerialdojo_gen.cli", *arguments, "--workers", "2"]
+    upload(root, smoke, given)
+    program = [sys.executable, "-m", "aerialdojo_gen.cli", *arguments, "--workers", str(len(scenes))]
     killed = subprocess.Popen(program, cwd=project, env=os.environ | lease, stderr=subprocess.DEVNULL)
     try:
-        while not root.list("objects", "*/*"):
+        while not root.list(begun, "*/*"):
             assert killed.poll() is None, "it ended by itself"
             root.refresh()
             time.sleep(0.1)

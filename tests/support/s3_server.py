@@ -5,17 +5,20 @@ from __future__ import annotations
 import contextlib
 import functools
 import re
+import shutil
 import socket
 import subprocess
 import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 import botocore.session
 
 from aerialdojo_gen.store import bucket, object_folders
+from aerialdojo_gen.store.root import DataRoot
 
 # The description of the service, which each client would read anew for 0.2 s, is read once.
 botocore.session.create_loader = functools.cache(botocore.session.create_loader)
@@ -49,6 +52,13 @@ def s3_server() -> Iterator[str]:
     finally:
         server.kill()
         server.wait()
+
+
+def upload(root: DataRoot, data: Path, folders: Iterable[str]) -> None:
+    """Put all files of some folders of a data directory to their places in a bucket."""
+    for path in sorted(path for folder in folders for path in (data / folder).rglob("*") if path.is_file()):
+        with root.commit(path.relative_to(data).as_posix()) as copy:
+            shutil.copyfile(path, copy)
 
 
 class Proxy:
