@@ -61,39 +61,40 @@ STALE = {
     "base/config/sections.py": set(),
     "base/rng.py": ALL,
 }
-# It prints the digests of the package as it is now, and again after each edit that a line of the input names. A
-# comment changes no imports: their graph is built once.
+# It prints the digests of the package as it is now, then with a comment at the end of each file that the input names,
+# and which parts of each are others. A comment changes no imports: their graph is built once.
 SCRIPT = """
 import json, sys
 from pathlib import Path
 from aerialdojo_gen.pipeline import code_digest as code
 from aerialdojo_gen.pipeline.registry import STAGES
-def digests():
+def codes():
     code.code_of.cache_clear()
     code._source_digest.cache_clear()
-    return {stage.name: code.stage_code(stage.name).digest for stage in STAGES}
-before, folder = digests(), Path(code.__file__).parents[1]
-found = {"": before}
+    return {stage.name: code.stage_code(stage.name) for stage in STAGES}
+before, folder = codes(), Path(code.__file__).parents[1]
 for line in sys.stdin:
-    path = folder / line.strip()
-    text = path.read_text()
-    path.write_text(text + "\\n# A comment.\\n")
-    after = digests()
-    path.write_text(text)
-    found[line.strip()] = [name for name in before if before[name] != after[name]]
-print(json.dumps(found))
+    with (folder / line.strip()).open("a") as file:
+        file.write("\\n# A comment.\\n")
+after = codes()
+changed = {name: [*dict(after[name].parts.items() - before[name].parts.items())] for name in before}
+print(json.dumps([*({name: code.digest for name, code in all.items()} for all in (before, after)), changed]))
 """
 
 
 def test_a_source_makes_stale_what_imports_it_and_nothing_else(tmp_path):
     copy = tmp_path / "aerialdojo_gen"
-    shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("kernels"))
     env = {**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
     run = subprocess.run([sys.executable, "-c", SCRIPT], input="\n".join(STALE), cwd=tmp_path, env=env, text=True,
                          capture_output=True, check=True)  # fmt: skip
-    found = json.loads(run.stdout)
-    assert found.pop("") == {name: stage_code(name).digest for name in NAMES}, "a copy elsewhere has other digests"
-    assert {path: set(stale) for path, stale in found.items()} == STALE
+    before, after, changed = json.loads(run.stdout)
+    assert before == {name: stage_code(name).digest for name in NAMES}, "a copy elsewhere has other digests"
+    parts = {
+        path: f"aerialdojo_gen.{path[:-3].replace('/', '.')}" if path.endswith(".py") else path for path in STALE
+    }
+    assert {path: {name for name in NAMES if parts[path] in changed[name]} for path in STALE} == STALE
+    assert all(before[name] != after[name] for name in NAMES)
 
 
 def test_what_is_imported_by_a_name_is_listed():
