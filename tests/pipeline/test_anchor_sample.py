@@ -120,7 +120,7 @@ def test_anchors_among_clutter_agree_with_trimesh(seed, tmp_path):
     size = rng.uniform(0.03, 0.5, (30, 3))
     clutter = [instance(f"twig_{k}", box(low[k] - size[k] / 2, low[k] + size[k] / 2)) for k in range(30)]
     place = scene(target, *clutter)
-    config = AnchorSampleConfig(shortlist=16, min_visible_fraction=0.2, surface_points=1500)
+    config = AnchorSampleConfig(shortlist=8, min_visible_fraction=0.2, surface_points=1500)
     rows, rejected = find(place, "target", tmp_path, config)
     assert len(rows) >= 3
     assert rejected["in_collision"] > 0

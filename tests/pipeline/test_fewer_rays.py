@@ -127,7 +127,7 @@ def test_no_picture_scores_more_than_its_bound_and_the_best_are_those_of_all_pic
     turn = np.arctan2(away[:, 1], away[:, 0])[looked.which]
     front, apart = found.before_front[looked.which], math.radians(CONFIG.separation_deg)
     lazily = 0
-    windows = range(0, len(looked.which) - 6, 9)
+    windows = range(0, len(looked.which) - 6, 18)
     for first in windows:
         few = np.arange(first, first + 6)
         views = looked.pictures(few, CONFIG.picture_px, CONFIG.fov_deg)
