@@ -72,7 +72,7 @@ def recorded(monkeypatch):
     return recorded
 
 
-# It is killed in the middle of the third trajectory's files.
+# It is killed in the middle of the files of the fourth trajectory, the second of its shard.
 RUN = """
 import os, signal, sys
 from pathlib import Path
@@ -83,7 +83,7 @@ write, written = VideoWriter.write, []
 def killed(self, frames):
     write(self, frames)
     written.append(frames)
-    if len(written) == 52:
+    if len(written) == 76:
         os.kill(os.getpid(), signal.SIGKILL)
 VideoWriter.write = killed
 run_whole(Path(sys.argv[1]), RenderConfig.model_validate_json(sys.argv[2]))
@@ -97,11 +97,11 @@ def test_a_killed_run_goes_on_at_the_trajectory_and_ends_with_the_same_bytes(tmp
     killed = subprocess.run(command, cwd=Path(__file__).parents[1], check=False)
     assert killed.returncode == -signal.SIGKILL
     kept = {p: p.stat().st_mtime_ns for p in (tmp_path / "media" / SCENE).glob("nav_*/recording.json")}
-    assert len(kept) == 2
+    assert len(kept) == 3
     assert list((tmp_path / AREA).rglob("front_depth.mkv")), "it was killed in the middle of a file"
 
     run_whole(tmp_path, ALL)
-    assert len(recorded) == 5
+    assert len(recorded) == 4
     assert {p: p.stat().st_mtime_ns for p in kept} == kept
     assert files_of(tmp_path) == files_of(whole)
     assert not (tmp_path / AREA).exists()
