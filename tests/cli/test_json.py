@@ -55,8 +55,11 @@ def test_show_has_the_rows_and_draws_nothing(smoke, tmp_path, capsys, monkeypatc
     assert list(tmp_path.iterdir()) == []
 
 
-def test_estimate_is_of_the_selection(smoke, project, capsys):
-    options = ("--pipeline", project / "pipelines/smoke.toml", "--scene", "U_Courtyard_0", "--limit", "1")
+def test_estimate_is_of_the_selection(smoke, project, tmp_path, capsys):
+    text = (project / "pipelines/smoke.toml").read_text().replace('"../', f'"{project}/')
+    # Its last section is that of recordings.
+    (tmp_path / "small.toml").write_text(f"{text}width = 64\nheight = 64\n")
+    options = ("--pipeline", tmp_path / "small.toml", "--scene", "U_Courtyard_0", "--limit", "1")
     told = document(capsys, "render", "--estimate", "--data", smoke, "--workers", "3", *options)
     assert told["trajectories"] * 8 == told["videos"] > 0
     assert told["poses"] >= told["measured"] > 0

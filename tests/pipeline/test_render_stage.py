@@ -12,7 +12,7 @@ import av
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.court import CONFIG, ROUTE, SCENE, run_all, run_whole, write_inputs
 from support.doc_blocks import blocks
@@ -214,6 +214,7 @@ def test_a_subset_without_routes_gives_empty_tables(data):
     assert [t.num_rows for t in output.tables.values()] == [0, 0]
 
 
+@settings(max_examples=40)
 @given(st.lists(st.sampled_from(schemas.SETTINGS), max_size=40), st.integers(1, 10), st.integers(0, 3))
 def test_a_larger_limit_only_adds(settings, limit, seed):
     rows = [{"nav_id": f"n{k}", "setting": s} for k, s in enumerate(settings)]
@@ -228,6 +229,7 @@ poses = st.lists(
 )
 
 
+@settings(max_examples=40)
 @given(poses)
 def test_frames_by_time_follow_the_path_at_no_more_than_cruise_speed(rows):
     table = np.array(rows)

@@ -31,8 +31,10 @@ def test_scenes_wait_for_one_another_before_the_release_and_before_recordings():
     assert group_stages(own, alone=True) == [own[:-1], own[-1:]]
 
 
+# The fixture's run by as many processes as there are cores has the bytes of one process's too: test_resume.
 @pytest.mark.pipeline
-def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path, workers):
     data, notes = shutil.copytree(smoke, tmp_path / "data"), tmp_path / "notes"
     notes.mkdir()
     # Between them plans stay fresh.
@@ -45,14 +47,14 @@ def test_a_process_takes_a_scene_through_the_stages(project, smoke, tmp_path):
     quiet = Reporter(quiet=True)
     finder = ShardFinder(config, roots, SCENES, quiet)
     scheduler = SceneScheduler(stages, SCENES, finder, roots.data, quiet, known)
-    with make_executor("local", 2) as pool:
+    with make_executor("local", workers) as pool:
         outcomes = list(pool.run(chores.compute_and_sign, scheduler))
     assert not scheduler.errors
     pids = {path.name: path.read_text() for path in notes.iterdir()}
     done = {name: len([p for p in pids if f" {name} " in p]) for name in TABLES}
     assert len(pids) == len(outcomes) == sum(done.values())
     assert done == {"pair-objects": 2, "plan": 0, "filter": 2}
-    assert len(set(pids.values())) == 2
+    assert len(set(pids.values())) == workers
     for scene in SCENES:
         assert pids[f"{scene} pair-objects 0"] == pids[f"{scene} filter 0"]
     assert {one.stage: (one.shards, one.computed) for one in scheduler.summaries()} == {
