@@ -88,7 +88,7 @@ def learned(smoke, cache, tmp_path_factory):
 def test_a_short_training_fits_better_at_its_end(learned):
     rows = history(learned.policy.parent)
     assert [row["epoch"] for row in rows] == list(range(6))
-    assert rows[-1]["loss"] < 0.8 * rows[0]["loss"]
+    assert rows[-1]["loss"] < 0.9 * rows[0]["loss"]
 
 
 @pytest.mark.nightly
