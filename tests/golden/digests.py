@@ -21,7 +21,10 @@ from aerialdojo_gen.store.shards import read_info, shards
 # Logs of agents, and tables that hold wall times, are no part of a release.
 LEFT_OUT = ("episodes", "steps", "timings", "failures", "recordings", "frames")
 # Columns that count rays, and pictures that rays draw.
-BY_RAYS = ("score", "part_", "visible_fraction", "thumbnail", "target_visible_at_start")
+BY_RAYS = (
+    "score", "part_", "parts_", "tells_", "visible_fraction", "thumbnail", "target_visible_at_start", "box_",
+    "image_fraction",
+)  # fmt: skip
 
 
 def digests(data: Path, scenes: Sequence[str] = ()) -> Iterator[tuple[str, str]]:
