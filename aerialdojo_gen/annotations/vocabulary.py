@@ -25,9 +25,7 @@ class Vocabulary:
 
     def __init__(self, scene: Scene, catalogue: Catalogue) -> None:
         self.scene = scene
-        self.names = {category: catalogue[category].name for category in catalogue}
-        self.kinds = {category: catalogue[category].kind for category in catalogue}
-        self._appearances = {category: catalogue[category].looks for category in catalogue}
+        self.names, self.kinds, self._catalogue = catalogue.names, catalogue.kinds, catalogue
         self._surface = Surface(scene)
         targets = frozenset(catalogue.targets)
         by_category: dict[str, CategoryWords] = {}
@@ -63,7 +61,7 @@ class Vocabulary:
 
     def appearances_of(self, instance: Instance) -> tuple[Appearance, ...]:
         """Phrases that the catalogue has for an instance's category."""
-        return self._appearances.get(instance.category, ())
+        return self._catalogue[instance.category].looks if instance.category in self._catalogue else ()
 
     @cached_method
     def valid_appearances(self, instance: Instance) -> tuple[Appearance, ...]:

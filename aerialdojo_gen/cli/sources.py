@@ -253,7 +253,7 @@ def gallery(
         sheet = scene_sheet(build_scene(roots.recipes / f"{name}.toml", catalogue))
         print(write_picture(sheet, out, f"{name}.{suffix}", width))
     if props:
-        landmarks = [name for name in catalogue if catalogue[name].kind == "landmark"]
+        landmarks = [name for name, kind in catalogue.kinds.items() if kind == "landmark"]
         for title, names in (("props", catalogue.targets), ("landmarks", landmarks)):
             size = 120 if small else 200
             print(write_picture(props_sheet(catalogue, names, size), out, f"{title}.{suffix}"))

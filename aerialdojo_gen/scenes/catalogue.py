@@ -21,12 +21,12 @@ from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
-from aerialdojo_gen.scenes.designs import Design, load_sets
+from aerialdojo_gen.scenes.designs import Design, DesignSets, load_sets
 from aerialdojo_gen.scenes.kernels import placed_vertices
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import Instance, Part
-from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
+from aerialdojo_gen.scenes.prop import Category, Entry, Variant, designs_of, parse_category, parse_entry, tags_of
 from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
 
 _MATERIALS = "materials.toml"
@@ -49,32 +49,45 @@ _NONE = Overrides()
 
 
 class Catalogue:
-    """All categories by name."""
+    """All categories by name. What is wrong with the parts of one is found when it is first looked up."""
 
-    def __init__(self, categories: Mapping[str, Category], materials: MaterialLibrary) -> None:
-        self._categories = dict(categories)
+    def __init__(self, entries: Mapping[str, Entry], materials: MaterialLibrary, sets: DesignSets) -> None:
+        self._entries, self._sets = dict(entries), sets
+        self._categories: dict[str, Category] = {}
         self.materials = materials
         self._bodies: dict[tuple[object, ...], _Body] = {}
         self._assemblies: dict[tuple[object, ...], _Assembly] = {}
 
     def __len__(self) -> int:
-        return len(self._categories)
+        return len(self._entries)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._categories)
+        return iter(self._entries)
 
     def __contains__(self, category: object) -> bool:
-        return category in self._categories
+        return category in self._entries
 
     @property
     def targets(self) -> tuple[str, ...]:
         """Categories that tasks may ask for: the semantic categories of the dataset."""
-        return tuple(name for name, category in self._categories.items() if category.target)
+        return tuple(name for name, entry in self._entries.items() if entry.target)
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Common noun of every category."""
+        return {category: entry.name for category, entry in self._entries.items()}
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Kind of every category."""
+        return {category: entry.kind for category, entry in self._entries.items()}
 
     def __getitem__(self, category: str) -> Category:
-        """Look a category up; an `AssetError` names the nearest one."""
+        """Look a category up and check its table; an `AssetError` names the nearest one, or the fault."""
         if category not in self._categories:
-            raise AssetError(f"unknown category {category!r}{nearest(category, self._categories)}")
+            if category not in self._entries:
+                raise AssetError(f"unknown category {category!r}{nearest(category, self._entries)}")
+            self._categories[category] = parse_category(self._entries[category], self.materials, self._sets)
         return self._categories[category]
 
     def instantiate(
@@ -307,14 +320,14 @@ def _file_state(path: Path) -> tuple[str, int, int, int]:
 def _load(folder: Path, files: tuple[tuple[str, int, int, int], ...]) -> Catalogue:
     materials = load_materials(folder / _MATERIALS)
     sets = load_sets(folder / _DESIGNS)
-    categories: dict[str, Category] = {}
+    entries: dict[str, Entry] = {}
     with _uncollected():
         for path in catalogue_files(folder):
             for name, body in read_toml(path).items():
-                if name in categories:
-                    raise AssetError(f"{path}: [{name}] is already in {categories[name].source.partition(':')[0]}")
-                categories[name] = parse_category(path, name, body, materials, sets, path.parent.name == TARGETS)
-    return Catalogue(categories, materials)
+                if name in entries:
+                    raise AssetError(f"{path}: [{name}] is already in {entries[name].source.partition(':')[0]}")
+                entries[name] = parse_entry(path, name, body, path.parent.name == TARGETS)
+    return Catalogue(entries, materials, sets)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
@@ -76,10 +76,27 @@ class Category:
         raise AssetError(f"{self.source}: unknown variant {name!r}{nearest(name, known)}")
 
 
-def parse_category(
-    path: Path, category: str, body: Any, materials: MaterialLibrary, sets: DesignSets, target: bool = True
-) -> Category:
-    """Check one category's table."""
+class Entry(NamedTuple):
+    """A category as its file has it: what is said of it without a look at its parts."""
+
+    category: str
+    body: Mapping[str, Any]
+    source: str  # File and category, for messages
+    target: bool
+
+    @property
+    def name(self) -> str:
+        """Common noun, e.g. ``"delivery van"``."""
+        return str(self.body["name"])
+
+    @property
+    def kind(self) -> str:
+        """One of `KINDS`."""
+        return str(self.body.get("kind", "prop"))
+
+
+def parse_entry(path: Path, category: str, body: Any, target: bool = True) -> Entry:
+    """Check the head of one category's table: its keys, name and kind."""
     where = f"{path}: [{category}]"
     if not isinstance(body, dict):
         raise AssetError(f"{where} is no table")
@@ -91,6 +108,12 @@ def parse_category(
         raise AssetError(f"{where}: name is missing: what a person calls it")
     if kind not in KINDS:
         raise AssetError(f"{where}: unknown kind {kind!r}{nearest(str(kind), KINDS)} (one of {', '.join(KINDS)})")
+    return Entry(category, body, where, target)
+
+
+def parse_category(entry: Entry, materials: MaterialLibrary, sets: DesignSets) -> Category:
+    """Check the rest of one category's table."""
+    category, body, where, target = entry
     front = body.get("front", "")
     if "front" in body and (not isinstance(front, str) or front not in FRONTS):
         raise AssetError(f"{where}: front must be one of {', '.join(FRONTS)}, got {front!r}")
@@ -132,8 +155,8 @@ def parse_category(
         refuse_unknown(designs_of(part), known, f"{where} parts[{k}]", "design")
     return Category(
         category,
-        name,
-        kind,
+        entry.name,
+        entry.kind,
         looks,
         params,
         roles,

@@ -56,12 +56,19 @@ def assets(tmp_path):
     return written(tmp_path, MATERIALS, MAILBOX)
 
 
+def look_up_all(assets: Path) -> None:
+    """Look every category of a catalogue up: only then are all of them checked."""
+    catalogue = load_catalogue(assets)
+    for category in catalogue:
+        catalogue[category]
+
+
 def spoil(path: Path, text: str, old: str, new: str) -> str:
     """Say how the catalogue refuses a file in which a text stands in place of another."""
     assert old in text
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(AssetError) as caught:
-        load_catalogue(path.parents[1] if path.name == "street.toml" else path.parent)
+        look_up_all(path.parents[1] if path.name == "street.toml" else path.parent)
     message = str(caught.value)
     assert message.startswith(str(path))
     assert "\n" not in message
@@ -111,7 +118,15 @@ def test_errors_name_file_category_and_key(assets, old, new, says):
 def test_what_is_wrong_in_a_file_beside_others_is_named_with_it(assets, text, says):
     (assets / "props" / "twice.toml").write_text(text)
     with pytest.raises(AssetError, match=rf"twice\.toml: {says}"):
-        load_catalogue(assets)
+        load_catalogue(assets)["x"]
+
+
+def test_what_is_wrong_with_a_category_stops_no_scene_without_it(assets):
+    (assets / "props" / "wrong.toml").write_text(MAILBOX.replace("[mailbox", "[letterbox").replace("height", "hight"))
+    catalogue = load_catalogue(assets)
+    assert catalogue.instantiate("mailbox", "m", generator(0, "t")).category == "mailbox"
+    with pytest.raises(AssetError, match="unknown key 'hight'"):
+        catalogue.instantiate("letterbox", "l", generator(0, "t"))
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ from aerialdojo_gen.scenes.materials import read_toml
 from aerialdojo_gen.scenes.mesh import areas
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.build import build_tables
-from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, tags_of
+from aerialdojo_gen.scenes.prop import Category, Variant, designs_of, parse_category, parse_entry, tags_of
 
 SLACK = 1.05
 # Made to a standard, joined to what stands beside them, or varied by their own builder.
@@ -222,7 +222,7 @@ def test_the_scale_of_a_category_multiplies_all_extents(catalogue):
 def test_a_scale_beyond_use_is_named(catalogue, scale):
     body = {"name": "box", "scale": scale, "parts": [{"shape": "box", "size": [1, 1, 1], "role": "wood"}]}
     with pytest.raises(AssetError, match=r"\[crate\]: scale must be a number from 0.1 to 10"):
-        parse_category(Path("props.toml"), "crate", body, catalogue.materials, {})
+        parse_category(parse_entry(Path("props.toml"), "crate", body), catalogue.materials, {})
 
 
 @pytest.mark.parametrize(("category", "part", "axes"), [

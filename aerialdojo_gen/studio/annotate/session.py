@@ -41,7 +41,7 @@ class AnnotationSession:
         self.storage.load()
         self._pipeline, self._roots = pipeline, roots
         catalogue = load_catalogue(roots.scene_assets)
-        self._names = {category: catalogue[category].name for category in catalogue}
+        self._names = catalogue.names
         self._catalogue = catalogue
         self._targets = catalogue.targets
         self._counts = paper_counts().get(name) if pipeline.annotate_import.paper_counts else None
