@@ -12,7 +12,8 @@ COPY --chown=dojo . .
 # Editable: a checkout's recipes and annotations are used where they lie, and pipelines/ can be named as README does.
 RUN sed -n '/^uv==/,/[^\\]$/p' constraints.txt > /tmp/uv.txt \
     && pip install --no-cache-dir --require-hashes -r /tmp/uv.txt \
-    && uv pip install --system --no-cache -c constraints.txt -b constraints.txt -e '.[gl,web]'
+    && uv pip install --compile-bytecode --system --no-cache -c constraints.txt -b constraints.txt -e '.[gl,web]' \
+    && python -m compileall -q aerialdojo_gen
 USER dojo
 # The planner's kernels, compiled once: beside the sources, from where another user's first run copies them.
 RUN aerialdojo-gen plan --pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data /tmp/smoke --workers 1 && rm -r /tmp/smoke

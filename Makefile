@@ -19,11 +19,12 @@ env: .venv/.installed  ## make the environment in .venv/
 dev: .venv/.dev  ## the same with what tests and linters need
 
 # uv installs in seconds what takes pip minutes; both refuse a file whose hash is not in constraints.txt. Where uv cannot
-# (a mirror that only pip is told of), pip installs all of constraints.txt: it takes hashes for no less.
+# (a mirror that only pip is told of), pip installs all of constraints.txt: it takes hashes for no less. Where
+# PYTHONDONTWRITEBYTECODE is set, as in many containers, each process would compile 2 s of modules that are not compiled here.
 PIP := .venv/bin/python -m pip install --disable-pip-version-check
 # $(call install,EXTRA,EXTRA)
 install = { $(PIP) --quiet --require-hashes -r <(sed -n '/^uv==/,/[^\\]$$/p' constraints.txt) \
-    && .venv/bin/uv pip install --python .venv/bin/python -c constraints.txt -b constraints.txt -e '.[$(1),$(2)]'; } \
+    && .venv/bin/uv pip install --compile-bytecode --python .venv/bin/python -c constraints.txt -b constraints.txt -e '.[$(1),$(2)]'; } \
   || { echo "uv could not install them: trying pip" >&2; $(PIP) --require-hashes -r constraints.txt \
     && $(PIP) --no-deps --no-build-isolation -e .; }
 
@@ -38,6 +39,7 @@ install = { $(PIP) --quiet --require-hashes -r <(sed -n '/^uv==/,/[^\\]$$/p' con
 	  echo "error: a package could not be installed, see above. For every one there are wheels for Python 3.11, 3.12 and 3.13:" \
 	       "with one of them, make PYTHON=/path/to/python3" >&2; exit 1; }
 	@rm -f .venv.unfinished
+	@.venv/bin/python -m compileall -q aerialdojo_gen
 	@echo "compiling the kernels, once (a minute; three on a busy machine)"
 	@dir=$$(mktemp -d) && trap 'rm -rf "$$dir"' EXIT && \
 	  small="--pipeline pipelines/smoke.toml --scene U_Courtyard_0 --data $$dir --workers 1" && $(RUN) filter $$small && \
