@@ -16,6 +16,7 @@ from support.layout_checks import ASSETS, catalogue, drawn
 
 import aerialdojo_gen.scenes.worlds
 from aerialdojo_gen.annotations.appearance import SHADES
+from aerialdojo_gen.annotations.phrases import phrases_of_value
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.checks import faults
@@ -157,6 +158,8 @@ def test_paints_are_the_colours_that_they_are_called() -> None:
     for word, shades in PAINTS.items():
         for shade in shades:
             assert colour_name(parse_colour(shade)) in SHADES[word], (word, shade)
+        # A "mailbox with a navy" is none.
+        assert all(wording.startswith("+") for wording in phrases_of_value("colour", word, "mailbox")), word
     assert paintable(catalogue(), "sedan") == ("body", ("red", "silver", "blue", "black", "white"))
 
 
