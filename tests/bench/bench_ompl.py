@@ -1,12 +1,13 @@
 """The planner beside OMPL's, in one run: the same FCL world, the same pairs, one core.
 
-    python tests/bench/bench_ompl.py [--targets 2] [--starts 170] [--singles 40] [--some 40] [--slow 8] [--seconds 3]
+    python tests/bench/bench_ompl.py [--targets 2] [--starts 170] [--singles 40] [--rounds 3] [--some 40] [--slow 8]
 
 The worlds are a made-up one of boxes and trees with random pairs, and scenes of the dataset with their own
 candidates (`--data data`; these need the tables up to `pairs`). Two regimes: single queries, with one start a goal,
 where every query pays for its own goal; and as many starts a goal as the dataset has, which share what is known of
 it. Times are CPU seconds of this process over the candidates searched, for every planner: those that are near
-straight count for none. What is made once a scene has a line of its own: the FCL world, which all planners ask, and
+straight count for none. Single queries come in rounds with goals of their own, each with mean, median and 95th
+percentile. What is made once a scene has a line of its own: the FCL world, which all planners ask, and
 the clearance grid, which ours has besides.
 
 (a) is this planner, its cost-to-go and certificates included; what it does not solve has no path within
@@ -23,9 +24,11 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from ompl import base, geometric, util
@@ -45,6 +48,7 @@ from aerialdojo_gen.scenes.model import Scene
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("U_Mall_0", "N_Forest_0", "U_ConstructionSite_0")
 SAMPLED_M = 0.1
+T = TypeVar("T")
 
 
 @dataclass
@@ -55,35 +59,36 @@ class Case:
     scene: Scene
     planner: Planner
     groups: list[tuple[np.ndarray, np.ndarray]]
-    singles: list[tuple[np.ndarray, np.ndarray]]
+    singles: list[list[tuple[np.ndarray, np.ndarray]]]  # By round
 
 
-def made_up(targets: int, starts: int, singles: int) -> Case:
+def made_up(targets: int, starts: int, singles: int, rounds: int) -> Case:
     scene, rng = world(), np.random.default_rng(1)
     planner, groups = Planner(scene, PlanConfig(), RADIUS), []
-    for k in range(targets + singles):
+    for k in range(targets + rounds * singles):
         goal = free_pose(planner, rng)
         # Not farther than a released task reaches.
         some = range(starts if k < targets else 1)
         groups.append((goal, np.array([free_pose(planner, rng, goal, 70.0) for _ in some])))
     alone = [(goal, start) for goal, (start,) in groups[targets:]]
-    return Case("made up", scene, planner, groups[:targets], alone)
+    by_round = [alone[first : first + singles] for first in range(0, rounds * singles, singles)]
+    return Case("made up", scene, planner, groups[:targets], by_round)
 
 
-def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: int) -> Case:
+def of_dataset(scene_name: str, data: Path, targets: int, starts: int, singles: int, rounds: int) -> Case:
     pipeline = load_pipeline(ROOT / "pipelines/aerialdojo-200k.toml")
     job = Job("plan", scene_name, 0, 1, pipeline.seed, pipeline.embodiment, ProjectPaths(data, data, data, data))
     scene, pairs = job.scene_model(), job.read("pairs").sort_by("pair_id")
     goals, begins = plan._ends(job, pairs)
     which, rng = pairs["target_object_id"].to_numpy(), np.random.default_rng(1)
-    every, groups, alone = np.unique(which), [], []
+    every, groups, by_round = np.unique(which), [], []
     for target in every[:: max(1, len(every) // targets)][:targets]:
         rows = np.flatnonzero(which == target)
         groups.append((goals[rows[0]], begins[rows[:: max(1, len(rows) // starts)][:starts]]))
-    for target in rng.permutation(every)[:singles]:
-        row = rng.choice(np.flatnonzero(which == target))
-        alone.append((goals[row], begins[row]))
-    return Case(scene_name, scene, Planner(scene, pipeline.plan, RADIUS), groups, alone)
+    for _ in range(rounds):
+        rows = [rng.choice(np.flatnonzero(which == target)) for target in rng.permutation(every)[:singles]]
+        by_round.append([(goals[row], begins[row]) for row in rows])
+    return Case(scene_name, scene, Planner(scene, pipeline.plan, RADIUS), groups, by_round)
 
 
 class Swept(base.MotionValidator):
@@ -146,28 +151,35 @@ def solve(case: Case, make, start, goal, seconds: float, simplify: bool, swept: 
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum() + np.abs(steps[:, 2]).sum())
 
 
-def line(name: str, each_s: float, lengths: np.ndarray, ours: np.ndarray, ours_each_s: float) -> None:
+def line(name: str, seconds: np.ndarray, lengths: np.ndarray, ours: np.ndarray, ours_s: float) -> None:
+    """Print a planner's row; `seconds` are of each query, or one mean of queries that share what they need."""
     both = np.isfinite(lengths) & np.isfinite(ours)
-    ratio = (ours[both] / lengths[both]).mean()
+    ratio, mean = (ours[both] / lengths[both]).mean(), seconds.mean()
+    spread = [f"{1e3 * q:.1f}" for q in np.quantile(seconds, (0.5, 0.95))] if len(seconds) > 1 else ["", ""]
     print(
-        f"  {name:<44}{1 / each_s:>10.1f}{1e3 * each_s:>9.1f}{np.isfinite(lengths).mean():>9.1%}{ratio:>12.3f}"
-        f"{each_s / ours_each_s:>9.1f}"
+        f"  {name:<44}{1 / mean:>10.1f}{1e3 * mean:>9.1f}{spread[0]:>8}{spread[1]:>8}"
+        f"{np.isfinite(lengths).mean():>9.1%}{ratio:>12.3f}{mean / ours_s:>9.1f}"
     )
 
 
 def head(regime: str) -> None:
     print(regime)
-    print(f"  {'':<44}{'searched/s':>10}{'ms each':>9}{'solved':>9}{'our L / its':>12}{'x ours':>9}")
+    words = f"{'searched/s':>10}{'ms each':>9}{'median':>8}{'p95':>8}{'solved':>9}{'our L / its':>12}{'x ours':>9}"
+    print(f"  {'':<44}{words}")
 
 
 def lengths_of(routes: list[Route]) -> np.ndarray:
     return np.array([route.length_m if route.outcome == "SOLVED" else np.inf for route in routes])
 
 
-def timed(call: Callable[[], list[Route]]) -> tuple[float, list[Route]]:
-    t = time.process_time()
-    routes = call()
-    return time.process_time() - t, routes
+def timed(call: Callable[..., T], queries: Iterable[tuple[Any, ...]]) -> tuple[np.ndarray, list[T]]:
+    """CPU seconds of each query, and the results."""
+    took, found = [], []
+    for query in queries:
+        t = time.process_time()
+        found.append(call(*query))
+        took.append(time.process_time() - t)
+    return np.array(took), found
 
 
 def others(
@@ -175,10 +187,10 @@ def others(
 ) -> None:
     """RRTConnect for some of the searched pairs, (goal, start), against our lengths and time."""
     few = np.linspace(0, len(pairs) - 1, min(some, len(pairs))).astype(int)
+    ends = [pairs[k][::-1] for k in few]
     for name, swept in (("swept", True), (f"a ball every {SAMPLED_M:g} m", False)):
-        t = time.process_time()
-        found = np.array([solve(case, geometric.RRTConnect, *pairs[k][::-1], 3.0, True, swept) for k in few])
-        line(f"(b) RRTConnect, {name}", (time.process_time() - t) / len(few), found, ours[few], each_s)
+        took, found = timed(partial(solve, case, geometric.RRTConnect, seconds=3.0, simplify=True, swept=swept), ends)
+        line(f"(b) RRTConnect, {name}", took, np.array(found), ours[few], each_s)
 
 
 def scene_line(case: Case) -> None:
@@ -198,32 +210,34 @@ def scene_line(case: Case) -> None:
 def compare(case: Case, some: int, slow: int, seconds: float) -> None:
     planner = case.planner
     scene_line(case)
-    goal, start = case.singles[0]
+    goal, start = case.singles[0][0]
     for _ in range(2):  # kernels compiled, memory there
         planner.plan_one(goal, start)
         planner.plan_target(goal, start)
 
-    # What is not searched because it is near straight says nothing of paths.
-    pairs = [p for p in case.singles if planner.plan_one(*p).outcome != "NEAR_STRAIGHT"]
-    t_one, routes = timed(lambda: [planner.plan_one(goal, start) for goal, start in pairs])
-    t_whole, again = timed(lambda: [planner.plan_target(goal, start)[0] for goal, start in pairs])
-    lengths, each_s = lengths_of(routes), t_one / len(pairs)
-    head(f"single queries, one start a goal: {len(pairs)} searched")
-    line("(a) aerialdojo-gen, plan_one", each_s, lengths, lengths, each_s)
-    line("(a) aerialdojo-gen, the whole cost-to-go", t_whole / len(pairs), lengths_of(again), lengths, each_s)
-    others(case, pairs, lengths, each_s, some)
+    for k, singles in enumerate(case.singles):
+        # What is not searched because it is near straight says nothing of paths.
+        pairs = [p for p in singles if planner.plan_one(*p).outcome != "NEAR_STRAIGHT"]
+        took, routes = timed(planner.plan_one, pairs)
+        whole, again = timed(lambda goal, start: planner.plan_target(goal, start)[0], pairs)
+        lengths = lengths_of(routes)
+        head(f"single queries, one start a goal, round {k + 1}: {len(pairs)} searched")
+        line("(a) aerialdojo-gen, plan_one", took, lengths, lengths, took.mean())
+        line("(a) aerialdojo-gen, the whole cost-to-go", whole, lengths_of(again), lengths, took.mean())
+        others(case, pairs, lengths, took.mean(), some)
 
-    t_all, routes = timed(lambda: [r for group in case.groups for r in planner.plan_target(*group)])
+    took, by_goal = timed(planner.plan_target, case.groups)
+    routes = [route for found in by_goal for route in found]
     ends = [(goal, start) for goal, starts in case.groups for start in starts]
     asked = [k for k, route in enumerate(routes) if route.outcome != "NEAR_STRAIGHT"]
-    pairs, lengths, each_s = [ends[k] for k in asked], lengths_of(routes)[asked], t_all / len(asked)
+    pairs, lengths, each_s = [ends[k] for k in asked], lengths_of(routes)[asked], took.sum() / len(asked)
     head(f"many starts a goal: {len(case.groups)} goals, {len(ends)} candidates, {len(asked)} searched")
-    line("(a) aerialdojo-gen", each_s, lengths, lengths, each_s)
+    line("(a) aerialdojo-gen", np.array([each_s]), lengths, lengths, each_s)
     others(case, pairs, lengths, each_s, some)
     few = np.linspace(0, len(pairs) - 1, min(slow, len(pairs))).astype(int)
     t = time.monotonic()
     found = np.array([solve(case, geometric.RRTstar, *pairs[k][::-1], seconds, False) for k in few])
-    line(f"(c) RRT*, {seconds:g} s", (time.monotonic() - t) / len(few), found, lengths[few], each_s)
+    line(f"(c) RRT*, {seconds:g} s", np.array([(time.monotonic() - t) / len(few)]), found, lengths[few], each_s)
 
 
 def main() -> None:
@@ -231,6 +245,7 @@ def main() -> None:
     parser.add_argument("--targets", type=int, default=2)
     parser.add_argument("--starts", type=int, default=170, help="starts a target; the dataset has 174")
     parser.add_argument("--singles", type=int, default=40, help="goals with a single start")
+    parser.add_argument("--rounds", type=int, default=3, help="of single queries")
     parser.add_argument("--some", type=int, default=40, help="pairs that each (b) gets in a regime")
     parser.add_argument("--slow", type=int, default=8, help="pairs that (c) gets")
     parser.add_argument("--seconds", type=float, default=3.0, help="time limit of (c), wall time")
@@ -238,10 +253,11 @@ def main() -> None:
     options = parser.parse_args()
     util.setLogLevel(util.LOG_ERROR)
     util.RNG.setSeed(1)
-    compare(made_up(options.targets, options.starts, options.singles), options.some, options.slow, options.seconds)
+    size = (options.targets, options.starts, options.singles, options.rounds)
+    compare(made_up(*size), options.some, options.slow, options.seconds)
     for name in SCENES:
         if (options.data / "pairs" / name).is_dir():
-            case = of_dataset(name, options.data, options.targets, options.starts, options.singles)
+            case = of_dataset(name, options.data, *size)
             compare(case, options.some, options.slow, options.seconds)
         else:
             print(f"{name}: {options.data} has no pairs of it")
