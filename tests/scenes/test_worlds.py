@@ -19,6 +19,7 @@ from aerialdojo_gen.annotations.appearance import SHADES
 from aerialdojo_gen.annotations.phrases import phrases_of_value
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.dataset.validate.contact import _Air
 from aerialdojo_gen.scenes.checks import faults
 from aerialdojo_gen.scenes.colours import colour_name
 from aerialdojo_gen.scenes.light import sun_at
@@ -152,6 +153,13 @@ def test_a_name_says_what_a_world_is_made_from(kind: str, seed: int, held_out: b
     world = World(kind, seed, held_out=held_out)
     assert world_of(world.name) == world
     assert world.side == ("test" if seed < 200 else "validation" if seed < 1000 else "train")
+
+
+def test_a_footbridge_rests_on_both_banks_though_one_is_lower() -> None:
+    scene = make_world(World("N_Forest", 1000), ASSETS, catalogue()).scene
+    (k,) = [k for k, thing in enumerate(scene.instances) if thing.category == "footbridge"]
+    assert _Air(scene).under(k, scene.instances[k]) == 0.0
+    assert "plinth_footbridge_000" in {thing.node for thing in scene.instances}
 
 
 def test_paints_are_the_colours_that_they_are_called() -> None:

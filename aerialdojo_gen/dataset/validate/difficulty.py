@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -29,6 +29,8 @@ _SAVED_BY_APPROACH = math.hypot(1.0, 1.0 / math.cos(math.pi / 24)) - 1.0
 _WHOLE = 1e-6
 # Rays to points of the object that meet its own edges: so many at least, and one in so many.
 _EITHER_WAY, _ONE_IN = 2, 128
+# So far before a point rays end (`aerialdojo_gen.geometry.rays`), give or take.
+_RAYS_END_M, _GIVE_M = 5e-3, 5e-4
 # Sine of the angle between a ray and a face, below which it is met centimetres before or behind.
 _EDGE_ON = 2e-3
 _UNSEEN = "nothing is seen, and no view is named"
@@ -148,7 +150,8 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
         points, normals = surface_points(data.scene, ids[target], item, n)
         starts = np.repeat(paths.starts[routes], n, axis=0)
         aims = np.tile(points, (len(routes), 1))
-        facing = instance_caster(item).unobstructed(starts[:, :3], aims)
+        alone = instance_caster(item)
+        facing = alone.unobstructed(starts[:, :3], aims)
         free = np.flatnonzero(facing)
         free = free[data.rays.visible(starts[free, :3], aims[free])]
         inside = _in_pictures(starts[free], aims[free])
@@ -159,9 +162,11 @@ def start_view(data: SceneData, rows: Rows) -> Iterator[Finding]:
             share, best = float(some) / whole, {VIEWS[view] for view in np.flatnonzero(seen == seen.max())}
             # A ray along an edge may go either way, the object's own edge too; points are whole all the same.
             either_way = max(_EITHER_WAY, n // _ONE_IN)
-            if not _is_share(stored[row], share, whole, either_way) and not _is_share(
-                stored[row], share, whole, either_way + _edge_on(paths.starts[row, :3], points, normals)
-            ):
+            if not _is_share(stored[row], share, whole, either_way):
+                start = paths.starts[row, :3]
+                either_way += _edge_on(start, points, normals)
+                either_way += _at_the_end(start, points, (alone.unobstructed, data.rays.visible))
+            if not _is_share(stored[row], share, whole, either_way):
                 yield Finding(row, f"target_visible_at_start = {stored[row]:.3f}", f"{share:.3f}")
             elif (views[row] is None) != (stored[row] == 0.0) or (share and stored[row] and views[row] not in best):
                 expected = " or ".join(sorted(best)) if share else _UNSEEN
@@ -180,6 +185,15 @@ def _edge_on(start: Floats, points: Floats, normals: Floats) -> int:
     """Count the points (m, 3) whose face is seen edge-on: rays in single precision meet it anywhere along itself."""
     rays = points - start
     return int((np.abs((normals * rays).sum(axis=1)) < _EDGE_ON * np.linalg.norm(rays, axis=1)).sum())
+
+
+def _at_the_end(start: Floats, points: Floats, casts: Sequence[Callable[..., Mask]]) -> int:
+    """Count the points (m, 3) with a surface just where rays to them end: parts often lie 5 mm apart."""
+    starts, count = np.broadcast_to(start, points.shape), 0
+    for cast in casts:
+        near, far = (cast(starts, points, tolerance_m=_RAYS_END_M + give) for give in (-_GIVE_M, _GIVE_M))
+        count += int((near != far).sum())
+    return count
 
 
 def _in_pictures(starts: Floats, points: Floats) -> Mask:

@@ -24,6 +24,7 @@ from aerialdojo_gen.scenes.shapes import sweep, upright
 from aerialdojo_gen.scenes.site import Site
 
 FOOTWAY_M = 0.12
+_BEAM_M = 0.05  # The beams of a footbridge reach so far below its origin
 
 
 @part_builder
@@ -152,11 +153,16 @@ def footbridge(
     site: Site, *, at: At, yaw_deg: Number, span_m: Annotated[Number, Field(gt=0, le=60)], place: str,
     sunk_m: Number = 0.28, margin_m: Number = 1.6,
 ) -> None:  # fmt: skip
-    """Lay a footbridge of the catalogue over a gap, a little lower than the higher bank."""
+    """Lay a footbridge of the catalogue over a gap, a little below the higher bank; stone bears its other end."""
     frame = Frame(*at, yaw_deg)
-    z = max(site.ground_z(*frame.at(side * span_m / 2, 0.0)) for side in (-1.0, 1.0)) - sunk_m
+    banks = {u: site.ground_z(*frame.at(u, 0.0)) for u in (-span_m / 2, span_m / 2)}
+    z = max(banks.values()) - sunk_m
     bridge = Placement("footbridge", *at, yaw_deg, DRAWN, z, place, params={"span": span_m}, margin_m=margin_m)
-    site.place(bridge)
+    node = site.place(bridge).node
+    for u, ground in banks.items():
+        if z - _BEAM_M > ground:
+            stone = block(u - 0.5, -0.95, u + 0.5, 0.95, ground - 0.4, z - _BEAM_M + 0.02)
+            site.add(f"plinth_{node}", "plinth", frame.parts([(site.material("plinth", "concrete"), stone)]))
 
 
 _SIDES = (-2.4, 2.4)
