@@ -40,7 +40,7 @@ STAGES: tuple[Stage, ...] = (
     Stage(
         "plan", "Plan a collision-free reference trajectory for every candidate.",
         reads=("scenes", "objects", "anchors", "pairs"), writes=("plans",),
-        parts=hooks.plan_parts, memory_mb=1500, seconds=(1.0, 0.4),
+        parts=hooks.plan_parts, memory_mb=1700, seconds=(1.0, 0.4),
     ),
     Stage(
         "filter", "Keep the candidates that make tasks, with a reason for every rejection.",

@@ -23,7 +23,7 @@ from aerialdojo_gen.pipeline.progress import Reporter
 from aerialdojo_gen.store.root import Where
 
 # Assumed memory per process, megabytes.
-MEMORY_MB = 1500
+MEMORY_MB = 1700
 # Every module of this folder registers its checks.
 for _module in pkgutil.iter_modules([str(Path(__file__).parent)]):
     importlib.import_module(f"{__package__}.{_module.name}")
