@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import hypothesis
 import pytest
 
-from aerialdojo_gen.base import cli_context, garbage
+from aerialdojo_gen.base import cli_context, memory
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome as WebDriver
@@ -69,7 +69,7 @@ hypothesis.settings.load_profile("untimed")
 def pytest_configure(config: pytest.Config) -> None:
     # xdist would begin with the files that have the most tests; `DEAREST` keeps no process at work alone at the end.
     config.option.loadscopereorder = False
-    garbage.collect_rarely()
+    memory.set_up()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

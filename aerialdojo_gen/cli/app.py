@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from aerialdojo_gen.base import cli_context, environment_errors, garbage, terminal
+from aerialdojo_gen.base import cli_context, environment_errors, memory, terminal
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.cli import (
     config,
@@ -116,7 +116,7 @@ _BadOption: Any = typer.BadParameter.__bases__[0]
 
 def main() -> None:
     """Run the command line; an expected error becomes one line and an exit code."""
-    garbage.collect_rarely()
+    memory.set_up()
     environment_errors.use_utf8()
     with terminal.standard_streams():
         try:

@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-from aerialdojo_gen.base import garbage
+from aerialdojo_gen.base import memory
 from aerialdojo_gen.base.errors import AerialDojoError
 from aerialdojo_gen.pipeline.executors.base import Executor, R, T, TaskQueue, guarded
 from aerialdojo_gen.pipeline.executors.channels import end
@@ -195,7 +195,7 @@ class _PipeChannel:
 
 def _serve(parent: int, pipe: Connection[Any, Any]) -> None:
     """Run tasks until the parent closes the pipe or is gone."""
-    garbage.collect_rarely()
+    memory.set_up()
     # Ctrl-C goes to the whole process group: the parent alone handles it, and ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A worker must not outlive a parent that was killed with SIGKILL.

@@ -12,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from aerialdojo_gen.base import memory
 from aerialdojo_gen.pipeline.executors.base import guarded
 from aerialdojo_gen.pipeline.executors.bundled import Unpacked
 from aerialdojo_gen.pipeline.executors.channels import RateLimiter, end
@@ -56,6 +57,7 @@ class Worker:
     """Runs tasks, one at a time; a Ray actor in its own process."""
 
     def __init__(self, board: Any) -> None:
+        memory.set_up()
         self._channel = BoardChannel(board)
         self._unpacked = Unpacked(Path(__file__).resolve().parents[3])
 
