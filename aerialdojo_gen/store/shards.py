@@ -30,15 +30,9 @@ from aerialdojo_gen.store.layout import (
     shard_folder,
     shard_name,
 )
-from aerialdojo_gen.store.root import DataRoot, LocalRoot, Where, open_root
+from aerialdojo_gen.store.root import DataRoot, Where, open_root
 
 META = b"aerialdojo"
-
-
-def shard_path(data: LocalRoot | Path | str, table: str, scene: str, part: int = 0, run: str = "default") -> Path:
-    """Return the path of a shard in a data directory; `shard_name` says where it lies in any data root."""
-    folder = data.path if isinstance(data, LocalRoot) else Path(data)
-    return folder / shard_name(table, scene, part, run)
 
 
 def shards(data: Where, table: str, scene: str, run: str = "default") -> list[str]:

@@ -229,7 +229,7 @@ def test_radii_gains_reversals_and_what_lies_between_poses(runs):
 
 def test_a_log_without_steps_has_no_distances_along_the_way(log, tmp_path):
     write(tmp_path, "alpha", "package:Alpha", LOG["alpha"])
-    store.shard_path(tmp_path, "steps", "U_Mall_1", run="alpha").unlink()
+    (tmp_path / store.shard_name("steps", "U_Mall_1", run="alpha")).unlink()
     (run,) = load_runs(tmp_path)
     assert run.path_clearance_to_goal_m is None
     assert not any("along the way" in group for group, _ in made("radius", [run]).groups)

@@ -7,7 +7,7 @@ import shutil
 import pytest
 from support.command_line import said
 
-from aerialdojo_gen.store.shards import shard_path
+from aerialdojo_gen.store.shards import shard_name
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_recordings_without_a_trajectory_are_named_and_removed(capsys, data, smo
 
 @pytest.mark.parametrize("damage", ["lost part", "damaged part", "no release"])
 def test_nothing_is_removed_where_the_release_cannot_tell(capsys, data, damage):
-    path = shard_path(data, "routes/test", "U_Courtyard_0")
+    path = data / shard_name("routes/test", "U_Courtyard_0")
     if damage == "lost part":
         path.unlink()
     elif damage == "damaged part":

@@ -183,7 +183,7 @@ SCENE = "U_Courtyard_0"
 
 
 def part(data, table):
-    return store.shard_path(data, table, SCENE)
+    return data / store.shard_name(table, SCENE)
 
 
 def truncate(data):

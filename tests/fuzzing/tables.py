@@ -44,13 +44,13 @@ _TABLES = ("scenes", "objects", "anchors", "routes/train")
 
 def _shards() -> list[Case]:
     whole = made(court.write_inputs)
-    paths = {str(store.shard_path(Path(), table, court.SCENE)) for table in _TABLES}
+    paths = {store.shard_name(table, court.SCENE) for table in _TABLES}
     return [{path: raw} for path, raw in whole.items() if path in paths]
 
 
 def _read_shard(folder: Path) -> None:
     path = next(p for p in folder.rglob("*.parquet"))
-    table = next(t for t in _TABLES if store.shard_path(folder, t, court.SCENE) == path)
+    table = next(t for t in _TABLES if folder / store.shard_name(t, court.SCENE) == path)
     json.dumps(vars(store.read_info(path.parent, path.name)))
     store.read_scene(folder, table, court.SCENE).to_pylist()
 

@@ -137,7 +137,7 @@ def test_a_damaged_part_is_named(tmp_path, damage, read):
     for part in range(3):
         store.write_shard(*where, part, from_rows(schemas.PAIRS, [pair(50 * part + i) for i in range(40)]), parts=3)
     assert store.count_rows(*where) == 120
-    path = store.shard_path(*where, 1)
+    path = where[0] / store.shard_name(*where[1:], 1)
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(DamagedFile, match=rf"{path} is damaged \(.*\): delete it and run"):
         read(*where)
@@ -185,7 +185,7 @@ def test_no_room_is_one_line_and_nothing_half_written(tmp_path):
 @pytest.mark.parametrize("scene", ["../outside", "/etc", "a/b", "", ".hidden", "x" * 65, "a\n"])
 def test_scene_names_cannot_leave_the_folder(tmp_path, scene):
     with pytest.raises(StoreError, match="not a scene name"):
-        store.shard_path(tmp_path, "pairs", scene)
+        store.shard_name("pairs", scene)
 
 
 @pytest.mark.parametrize("relative", ["../x", "/tmp/x", "a/../../x", "link/x"])
@@ -212,7 +212,7 @@ def test_digest_sees_every_change_and_no_metadata_chunks_or_what_lies_under_a_nu
 
 @pytest.mark.parametrize("table", sorted(store.LAYOUT))
 def test_pruning_one_scene_leaves_the_others(tmp_path, table):
-    mine, other = (store.shard_path(tmp_path, table, scene) for scene in ("U_A_0", "U_B_0"))
+    mine, other = (tmp_path / store.shard_name(table, scene) for scene in ("U_A_0", "U_B_0"))
     extra = mine.with_name("part-00001.parquet")
     for path in (mine, other, extra):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,8 +20,8 @@ def copy_release(data: Path, to: Path, scenes: list[str]) -> Path:
     for scene in scenes:
         for table, place in store.LAYOUT.items():
             if place.template.startswith("release/"):
-                source = store.shard_path(data, table, scene)
-                target = store.shard_path(to, table, scene)
+                source = data / store.shard_name(table, scene)
+                target = to / store.shard_name(table, scene)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(source, target)
     return to
