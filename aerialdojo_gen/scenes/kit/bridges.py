@@ -159,10 +159,12 @@ def footbridge(
     z = max(banks.values()) - sunk_m
     bridge = Placement("footbridge", *at, yaw_deg, DRAWN, z, place, params={"span": span_m}, margin_m=margin_m)
     node = site.place(bridge).node
-    for u, ground in banks.items():
-        if z - _BEAM_M > ground:
-            stone = block(u - 0.5, -0.95, u + 0.5, 0.95, ground - 0.4, z - _BEAM_M + 0.02)
-            site.add(f"plinth_{node}", "plinth", frame.parts([(site.material("plinth", "concrete"), stone)]))
+    stones = [
+        block(u - 0.5, -0.95, u + 0.5, 0.95, ground - 0.4, z - _BEAM_M + 0.02)
+        for u, ground in banks.items() if z - _BEAM_M > ground
+    ]  # fmt: skip
+    if stones:
+        site.add(f"plinth_{node}", "plinth", frame.parts([(site.material("plinth", "concrete"), merge(stones))]))
 
 
 _SIDES = (-2.4, 2.4)
