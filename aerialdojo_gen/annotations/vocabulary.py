@@ -8,9 +8,8 @@ from aerialdojo_gen.annotations.appearance import repeats, unsupported_colours
 from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.phrases import CategoryWords, group_of, noun_of, spoken, words_of
 from aerialdojo_gen.base.cached import cached_method
-from aerialdojo_gen.scenes.appearances import Appearance
+from aerialdojo_gen.scenes.appearances import Appearance, valid_phrases
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.context import context_of
 from aerialdojo_gen.scenes.model import Instance, Scene
 

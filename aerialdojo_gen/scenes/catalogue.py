@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
-from aerialdojo_gen.scenes.anatomy import FRONTS, Anatomy, Run, remap_runs
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
 from aerialdojo_gen.scenes.designs import Design, DesignSets, load_sets
 from aerialdojo_gen.scenes.kernels import placed_vertices
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
-from aerialdojo_gen.scenes.model import Instance, Part
+from aerialdojo_gen.scenes.model import FRONTS, Anatomy, Instance, Part, Run, remap_runs
 from aerialdojo_gen.scenes.prop import Category, Entry, Variant, designs_of, parse_category, parse_entry, tags_of
 from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
 

@@ -13,8 +13,6 @@ from aerialdojo_gen.scenes.materials import read_toml, refuse_unknown
 
 Side = Literal["train", "held_out", "plain"]
 _KEYS = ("name", "stretch", "params", "without", "held_out")
-# Shapes that turn about their own z axis.
-ROUND = frozenset({"cylinder", "cone", "lathe", "torus", "capsule"})
 _LEAST, _MOST = 0.5, 2.0
 
 

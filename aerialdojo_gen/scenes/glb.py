@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.cli_context import command
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.safe_parse import loads_json
-from aerialdojo_gen.scenes.anatomy import parse_anatomy
 from aerialdojo_gen.scenes.glb_materials import linear_colours, material_entry, read_material, srgb_colours
 from aerialdojo_gen.scenes.light import WEATHERS
-from aerialdojo_gen.scenes.model import BACKDROPS, SURFACES, Instance, Material, Part, Scene
+from aerialdojo_gen.scenes.model import BACKDROPS, SURFACES, Instance, Material, Part, Scene, parse_anatomy
 
 _MAGIC, _JSON, _BIN = b"glTF", 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125

@@ -1,4 +1,4 @@
-"""Grammar of layouts: points and poses along lines, in rows, strewn over areas; frames on the ground; slabs."""
+"""Grammar of layouts: poses along lines, in rows, over areas; natural outlines; frames on the ground; slabs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.affinity import rotate, translate
-from shapely.geometry import LineString
+from shapely.geometry import LinearRing, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.kernels import njit
+from aerialdojo_gen.base.simplex import OpenSimplex
+from aerialdojo_gen.geometry.portable import Floats, unit
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, rotated, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -79,6 +81,32 @@ def along(
         x, y = p.x - offset_m * np.sin(yaw), p.y + offset_m * np.cos(yaw)
         poses.append(Pose(float(x), float(y), float(np.degrees(yaw)) + turn_deg))
     return poses
+
+
+def noise_around(seed: int, angles: Floats, bends: float) -> Floats:
+    """Noise from -1 to 1 at angles (n,), radians, that closes around a circle: the more bends, the rougher."""
+    noise = OpenSimplex(seed=seed)
+    return np.array([noise.noise2(bends * float(np.cos(a)), bends * float(np.sin(a))) for a in angles])
+
+
+def blob(x: float, y: float, radius_m: float, seed: int, ragged: float = 0.25, corners: int = 28) -> Polygon:
+    """Make a round area with a wavy outline (a clearing, a pond, a patch of moss), metres, world frame."""
+    angles = np.arange(corners) * 2 * np.pi / corners
+    r = radius_m * (1.0 + ragged * noise_around(seed, angles, 1.3) / 0.6)
+    return Polygon(np.column_stack([x + r * np.cos(angles), y + r * np.sin(angles)]))
+
+
+def ragged_outline(ring: LinearRing, seed: int, amplitude_m: float, step_m: float) -> Polygon:
+    """Make a natural outline from a coarse one: resampled every `step_m` and pushed in and out by noise, metres."""
+    count = int(ring.length / step_m)
+    at = shapely.get_coordinates([ring.interpolate(k / count, normalized=True) for k in range(count)])
+    before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
+    along = unit(after - before)
+    wave = noise_around(seed, np.arange(count) / count * 2 * np.pi, ring.length / (2 * np.pi * 14.0))
+    out = at + amplitude_m * 1.5 * wave[:, None] * np.column_stack([along[:, 1], -along[:, 0]])
+    outline = Polygon(out).buffer(0)
+    smooth = outline.buffer(1.5, quad_segs=3).buffer(-3.0, quad_segs=3).buffer(1.5, quad_segs=3)
+    return smooth if isinstance(smooth, Polygon) else max(smooth.geoms, key=lambda g: g.area)
 
 
 def stretches(path: Polyline, spacing_m: float) -> list[Pose]:

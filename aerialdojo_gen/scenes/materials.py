@@ -18,7 +18,7 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.model import Material
-from aerialdojo_gen.scenes.noise import balanced
+from aerialdojo_gen.scenes.noise import balanced, texture_rng
 from aerialdojo_gen.scenes.textures_built import BUILT
 from aerialdojo_gen.scenes.textures_facade import Layout, draw_facade
 from aerialdojo_gen.scenes.textures_natural import NATURAL
@@ -176,7 +176,7 @@ TEXTURES = {**NATURAL, **BUILT}
 def make_texture(name: str, colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     """Draw one of `TEXTURES` in a base colour: (H, W, 3) uint8 sRGB, 64 to 256 pixels a side, seamless, read-only."""
     base = np.array(colour, dtype=np.float64)
-    image = TEXTURES[name](base)
+    image = TEXTURES[name](base, texture_rng(name))
     if name in NATURAL:
         image = balanced(image, base)
     return _bytes(image)

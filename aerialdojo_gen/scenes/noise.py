@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from aerialdojo_gen.base.rng import generator
 
 Floats = NDArray[np.float64]
+Texture = Callable[[Floats, np.random.Generator], Floats]
+"""Draws a texture in a colour; its pattern depends on the generator alone."""
 
 
 def value_noise(size: int, cells: int, rng: np.random.Generator, cells_y: int | None = None) -> Floats:

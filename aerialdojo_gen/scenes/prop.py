@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
-from aerialdojo_gen.scenes.anatomy import FRONTS
 from aerialdojo_gen.scenes.appearances import Appearance, parse_appearances
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, parse_designs
 from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
+from aerialdojo_gen.scenes.model import FRONTS
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark", "life")

@@ -49,7 +49,7 @@ _ICOSAHEDRON_FACES = np.array([
 
 def box(*, size: Numbers, taper: Numbers = (1.0, 1.0)) -> Mesh:
     """Make a box on its bottom face; `taper` is the top's size along x and y as a fraction of the bottom's."""
-    x, y, z = _positive("size", size, 3)
+    x, y, z = positive("size", size, 3)
     fx, fy = _numbers("taper", taper, 2)
     u, v = 0.5 * x, 0.5 * y
     bottom = [(-u, -v, 0.0), (u, -v, 0.0), (u, v, 0.0), (-u, v, 0.0)]
@@ -58,20 +58,20 @@ def box(*, size: Numbers, taper: Numbers = (1.0, 1.0)) -> Mesh:
 
 def sheet(*, size: Numbers) -> Mesh:
     """Make a horizontal rectangle, 2 cm thick, so that it shows and collides from both sides."""
-    x, y = _positive("size", size, 2)
+    x, y = positive("size", size, 2)
     return box(size=(x, y, 0.02))
 
 
 def cylinder(*, radius: float, height: float, radius_top: float | None = None, segments: float = 12) -> Mesh:
     """Make an upright cylinder, or a frustum where `radius_top` differs from `radius`."""
-    _positive("radius, height", (radius, height), 2)
+    positive("radius, height", (radius, height), 2)
     top = radius if radius_top is None else radius_top
     return lathe(points=((radius, 0.0), (top, height)), segments=segments)
 
 
 def cone(*, radius: float, height: float, segments: float = 12) -> Mesh:
     """Make an upright cone."""
-    _positive("radius, height", (radius, height), 2)
+    positive("radius, height", (radius, height), 2)
     return lathe(points=((radius, 0.0), (0.0, height)), segments=segments)
 
 
@@ -91,7 +91,7 @@ def sphere(
 
 def capsule(*, radius: float, height: float, segments: float = 8) -> Mesh:
     """Make an upright capsule; the straight part runs from z = 0 to `height`."""
-    _positive("radius", (radius,), 1)
+    positive("radius", (radius,), 1)
     number("height", height)
     angles = np.linspace(0.0, np.pi / 2, 3)
     lower = [(radius * float(np.sin(a)), -radius * float(np.cos(a))) for a in angles]
@@ -101,7 +101,7 @@ def capsule(*, radius: float, height: float, segments: float = 8) -> Mesh:
 
 def torus(*, radius: float, tube: float, segments: float = 16, sides: float = 6) -> Mesh:
     """Make a ring about the z axis; `radius` is that of the tube's middle line, `tube` that of the tube."""
-    _positive("radius, tube", (radius, tube), 2)
+    positive("radius, tube", (radius, tube), 2)
     n = whole("sides", sides, 3, MAX_SIDES)
     angles = np.arange(n) * 2 * np.pi / n
     ring = [(radius + tube * float(np.cos(a)), tube * float(np.sin(a))) for a in angles]
@@ -200,7 +200,7 @@ def _icosphere(subdivisions: int) -> tuple[Floats, Ints]:
 def _radii(radius: float | None, radii: Numbers | None) -> tuple[float, ...]:
     if (radius is None) == (radii is None):
         raise ShapeError("give radius or radii, one of them")
-    return _positive("radii", (radius,) * 3 if radius is not None else radii or (), 3)
+    return positive("radii", (radius,) * 3 if radius is not None else radii or (), 3)
 
 
 def _numbers(key: str, values: Numbers, count: int) -> tuple[float, ...]:
@@ -234,7 +234,8 @@ def rows_of(key: str, rows: Any, width: int, least: int = 2) -> list[tuple[float
     return [_numbers(key, row, width) for row in rows]
 
 
-def _positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
+def positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
+    """Check numbers of a shape that must be above 0."""
     numbers = _numbers(key, values, count)
     if min(numbers) <= 0.0:
         raise ShapeError(f"{key} must be positive, got {', '.join(f'{n:g}' for n in numbers)}")
@@ -243,7 +244,7 @@ def _positive(key: str, values: Numbers, count: int) -> tuple[float, ...]:
 
 def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
     """Make a prism along x with a gable, wedge or trapezoid section; size in metres."""
-    x, y, z = _positive("size", size, 3)
+    x, y, z = positive("size", size, 3)
     top = number("top", top)
     w = y / 2
     outlines = {
@@ -259,7 +260,7 @@ def prism(*, size: Numbers, section: str = "gable", top: float = 0.5) -> Mesh:
 
 def polygon(*, points: Sequence[Numbers], height: float, holes: Sequence[Sequence[Numbers]] = ()) -> Mesh:
     """Extrude a plan upwards from z = 0; `points` are (x, y), metres, in either sense of rotation."""
-    _positive("height", (height,), 1)
+    positive("height", (height,), 1)
     outline = rows_of("points", points, 2, 0)
     if isinstance(holes, str | dict) or not hasattr(holes, "__len__") or len(holes) > 100:
         raise ShapeError("holes must be 0 to 100 lists of points")
@@ -269,7 +270,7 @@ def polygon(*, points: Sequence[Numbers], height: float, holes: Sequence[Sequenc
 
 def profile(*, points: Sequence[Numbers], width: float) -> Mesh:
     """Extrude a side view along y, centred on y = 0; `points` are (x, z), metres."""
-    _positive("width", (width,), 1)
+    positive("width", (width,), 1)
     outline = rows_of("points", points, 2, 0)
     return upright([_checked(Polygon(outline) if len(outline) > 2 else None)], width)
 
@@ -309,10 +310,10 @@ def sweep(
     if (radius is None) == (section is None):
         raise ShapeError("give radius or section, one of them")
     if section is not None:
-        w, h = _positive("section", section, 2)
+        w, h = positive("section", section, 2)
         ring = np.array([(-w, -h), (w, -h), (w, h), (-w, h)]) / 2
     else:
-        (thick,) = _positive("radius", (0.0 if radius is None else radius,), 1)
+        (thick,) = positive("radius", (0.0 if radius is None else radius,), 1)
         n = whole("sides", sides, 3, MAX_SIDES)
         ring = np.stack(circle(n), axis=1) * thick
     rings = swept_rings(line, ring, closed)

@@ -19,17 +19,25 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
-from aerialdojo_gen.scenes.contact import CONTACT_M, rest_on_ground
 from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
 from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
-from aerialdojo_gen.scenes.model import Instance, Part, Scene
-from aerialdojo_gen.scenes.placement import DRAWN, Fit, Footprints, Placement, disc, footprint, hull
+from aerialdojo_gen.scenes.model import Instance, Part, Scene, turned
+from aerialdojo_gen.scenes.placement import (
+    CONTACT_M,
+    DRAWN,
+    Fit,
+    Footprints,
+    Placement,
+    disc,
+    footprint,
+    hull,
+    rest_on_ground,
+)
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
-from aerialdojo_gen.scenes.turn import turned
 
 # The largest scene of the dataset has 479.
 MAX_NODES = 5_000

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from aerialdojo_gen.scenes.noise import Floats, cells, fractal, leaves, shade, texture_rng, value_noise
-
-Generator = Callable[[Floats], Floats]
+from aerialdojo_gen.scenes.noise import Floats, Texture, cells, fractal, leaves, shade, value_noise
 
 
-def grass(colour: Floats) -> Floats:
+def grass(colour: Floats, rng: np.random.Generator) -> Floats:
     """Lawn: short blades in clumps, drawn for 4 m."""
-    rng = texture_rng("grass")
     clumps = fractal(256, 12, 3, rng, 0.7)
     blades = value_noise(256, 128, rng, 64) + value_noise(256, 64, rng, 128)
     image = shade(colour, 1.0 + 0.045 * clumps + 0.17 * blades)
@@ -21,9 +16,8 @@ def grass(colour: Floats) -> Floats:
     return image
 
 
-def meadow(colour: Floats) -> Floats:
+def meadow(colour: Floats, rng: np.random.Generator) -> Floats:
     """Rough grass with dry tufts and small flowers, drawn for 4 m."""
-    rng = texture_rng("meadow")
     image = shade(colour, 1.0 + 0.12 * fractal(256, 8, 4, rng, 0.8))
     dry = np.clip(fractal(256, 5, 3, rng) - 0.6, 0, 1)[..., None]
     image = image * (1 - 0.5 * dry) + np.array([168.0, 154.0, 90.0]) * 0.5 * dry
@@ -34,16 +28,14 @@ def meadow(colour: Floats) -> Floats:
     return image
 
 
-def dirt(colour: Floats) -> Floats:
+def dirt(colour: Floats, rng: np.random.Generator) -> Floats:
     """Trodden earth with small stones, drawn for 4 m."""
-    rng = texture_rng("dirt")
     image = shade(colour, 1.0 + 0.09 * fractal(256, 5, 5, rng, 0.65))
     return _pebbles(image, rng, 260, 0.012, 0.25)
 
 
-def gravel(colour: Floats) -> Floats:
+def gravel(colour: Floats, rng: np.random.Generator) -> Floats:
     """Loose stones, drawn for 2 m."""
-    rng = texture_rng("gravel")
     first, second, owner = cells(256, 2600, rng)
     tone = rng.uniform(0.84, 1.14, size=2600)[owner]
     joint = np.clip((second - first) / 0.006, 0.66, 1.0)
@@ -54,9 +46,8 @@ def gravel(colour: Floats) -> Floats:
     return image
 
 
-def sand(colour: Floats) -> Floats:
+def sand(colour: Floats, rng: np.random.Generator) -> Floats:
     """Sand with wind ripples, drawn for 3 m."""
-    rng = texture_rng("sand")
     warp = value_noise(256, 4, rng) * 0.35 + value_noise(256, 8, rng) * 0.15
     y = np.arange(256)[:, None] / 256
     ripples = np.sin(2 * np.pi * (8 * y + warp))
@@ -64,18 +55,16 @@ def sand(colour: Floats) -> Floats:
     return shade(colour, 1.0 + 0.05 * ripples + 0.035 * grain + 0.03 * fractal(256, 4, 3, rng))
 
 
-def snow(colour: Floats) -> Floats:
+def snow(colour: Floats, rng: np.random.Generator) -> Floats:
     """Snow with soft drifts and a little glitter, drawn for 5 m."""
-    rng = texture_rng("snow")
     drift = fractal(256, 4, 4, rng, 0.45)
     image = shade(colour, 0.97 + 0.028 * drift + 0.01 * rng.uniform(-1, 1, size=(256, 256)))
     image[..., 2] += 3.0 * np.clip(-drift, 0, 2)
     return image
 
 
-def rock(colour: Floats) -> Floats:
+def rock(colour: Floats, rng: np.random.Generator) -> Floats:
     """Weathered rock with lichen and fine cracks, drawn for 2 m."""
-    rng = texture_rng("rock")
     base = fractal(256, 5, 6, rng, 0.7)
     bands = value_noise(256, 3, rng, 18)
     ridge = np.abs(fractal(256, 7, 4, rng, 0.6))
@@ -85,9 +74,8 @@ def rock(colour: Floats) -> Floats:
     return image * (1 - lichen) + (colour * 0.6 + np.array([78.0, 80.0, 60.0])) * lichen
 
 
-def bark(colour: Floats) -> Floats:
+def bark(colour: Floats, rng: np.random.Generator) -> Floats:
     """Upright ridges of bark, drawn for 1 m."""
-    rng = texture_rng("bark")
     warp = value_noise(128, 4, rng) * 0.8 + value_noise(128, 8, rng) * 0.3
     x = np.arange(128)[None, :] / 128
     ridges = np.sin(2 * np.pi * (10 * x + warp)) + 0.6 * value_noise(128, 16, rng, 6)
@@ -95,9 +83,8 @@ def bark(colour: Floats) -> Floats:
     return shade(colour, 1.0 + 0.2 * ridges + 0.1 * breaks)
 
 
-def birch_bark(colour: Floats) -> Floats:
+def birch_bark(colour: Floats, rng: np.random.Generator) -> Floats:
     """White bark with dark level scars, drawn for 1 m."""
-    rng = texture_rng("birch_bark")
     image = shade(colour, 1.0 + 0.05 * value_noise(128, 8, rng, 32))
     for _ in range(34):
         y, x, w = int(rng.integers(128)), int(rng.integers(128)), int(rng.integers(6, 30))
@@ -107,25 +94,22 @@ def birch_bark(colour: Floats) -> Floats:
     return image
 
 
-def foliage(colour: Floats) -> Floats:
+def foliage(colour: Floats, rng: np.random.Generator) -> Floats:
     """Leaves, lit above and dark between, drawn for 2 m."""
-    rng = texture_rng("foliage")
     depth = np.clip(0.55 + 0.12 * fractal(256, 8, 3, rng), 0.35, 0.8)
     tints = np.array([[1.0, 1.0, 1.0], [1.15, 1.1, 0.85], [0.82, 0.9, 0.9], [0.7, 0.82, 0.75], [1.25, 1.18, 0.8]])
     return leaves(shade(colour, depth), "foliage leaves", 900, (9.0, 17.0), colour * tints)
 
 
-def needles(colour: Floats) -> Floats:
+def needles(colour: Floats, rng: np.random.Generator) -> Floats:
     """Conifer twigs: fine hanging strokes, drawn for 1.5 m."""
-    rng = texture_rng("needles")
     strokes = value_noise(256, 128, rng, 20) + 0.7 * value_noise(256, 64, rng, 40)
     tiers = np.sin(2 * np.pi * (5 * np.arange(256)[:, None] / 256 + 0.2 * value_noise(256, 6, rng)))
     return shade(colour, np.clip(1.0 + 0.26 * strokes + 0.16 * tiers, 0.4, 1.6))
 
 
-def leaf_litter(colour: Floats) -> Floats:
+def leaf_litter(colour: Floats, rng: np.random.Generator) -> Floats:
     """Forest floor: fallen leaves, twigs and moss on earth, drawn for 3 m."""
-    rng = texture_rng("leaf_litter")
     image = shade(colour * 0.82, 1.0 + 0.13 * fractal(256, 8, 5, rng, 0.75))
     tints = np.array([[1.2, 1.05, 0.9], [0.85, 0.84, 0.85], [1.32, 1.0, 0.7], [1.05, 1.12, 0.8], [0.7, 0.68, 0.7]])
     image = leaves(image, "fallen leaves", 1300, (5.0, 10.0), colour * tints)
@@ -133,34 +117,30 @@ def leaf_litter(colour: Floats) -> Floats:
     return image * (1 - 0.6 * green) + colour * np.array([0.72, 1.05, 0.6]) * 0.6 * green
 
 
-def moss(colour: Floats) -> Floats:
+def moss(colour: Floats, rng: np.random.Generator) -> Floats:
     """Moss cushions, drawn for 2 m."""
-    rng = texture_rng("moss")
     lumps = fractal(256, 12, 4, rng, 0.7)
     return shade(colour, np.clip(1.0 + 0.15 * lumps, 0.5, 1.5))
 
 
-def water(colour: Floats) -> Floats:
+def water(colour: Floats, rng: np.random.Generator) -> Floats:
     """Small waves with bright crests, drawn for 6 m."""
-    rng = texture_rng("water")
     wave = fractal(256, 5, 4, rng, 0.55)
     crest = np.clip(1.0 - np.abs(wave) / 0.25, 0.0, 1.0)
     foam = np.clip(fractal(256, 9, 3, rng) - 1.1, 0, 1)
     return shade(colour, 1.0 + 0.09 * wave + 0.16 * crest) + 60.0 * (foam * crest)[..., None]
 
 
-def mud(colour: Floats) -> Floats:
+def mud(colour: Floats, rng: np.random.Generator) -> Floats:
     """Wet silt with small puddles, drawn for 4 m."""
-    rng = texture_rng("mud")
     base = fractal(256, 8, 6, rng, 0.8)
     puddle = np.clip((fractal(256, 7, 4, rng, 0.45) - 1.1) * 3, 0, 1)[..., None]
     image = shade(colour, 1.0 + 0.1 * base + 0.03 * rng.uniform(-1, 1, size=(256, 256)))
     return image * (1 - 0.55 * puddle) + (colour * 0.4 + np.array([78.0, 84.0, 90.0])) * 0.55 * puddle
 
 
-def rubble(colour: Floats) -> Floats:
+def rubble(colour: Floats, rng: np.random.Generator) -> Floats:
     """Broken masonry in dust, drawn for 3 m."""
-    rng = texture_rng("rubble")
     first, second, owner = cells(256, 420, rng)
     # Every lump is lit from one side, as if it lay tilted.
     tilt = np.gradient(first)
@@ -175,9 +155,8 @@ def rubble(colour: Floats) -> Floats:
     return image * (1 - 0.6 * dust) + colour * 0.6 * dust * (1 + 0.06 * fractal(256, 32, 3, rng))[..., None]
 
 
-def thatch(colour: Floats) -> Floats:
+def thatch(colour: Floats, rng: np.random.Generator) -> Floats:
     """Straw or reed laid in courses, drawn for 1.5 m."""
-    rng = texture_rng("thatch")
     straw = value_noise(128, 64, rng, 8) + value_noise(128, 32, rng, 16)
     course = (np.arange(128)[:, None] * 4 / 128) % 1.0
     return shade(colour, np.clip(0.78 + 0.3 * course + 0.14 * straw, 0.4, 1.5))
@@ -190,7 +169,7 @@ def _pebbles(image: Floats, rng: np.random.Generator, count: int, radius: float,
     return np.where((first < size)[..., None], image * tone[..., None], image)
 
 
-NATURAL: dict[str, Generator] = {
+NATURAL: dict[str, Texture] = {
     f.__name__: f
     for f in (grass, meadow, dirt, gravel, sand, snow, rock, bark, birch_bark, foliage, needles, leaf_litter, moss,
               water, mud, rubble, thatch)

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support.annotation_scenes import PAINTS, box, street, street_annotations, street_vocabulary
+from support.catalogue_faults import MIN_TRUE_PHRASES
 
 from aerialdojo_gen.annotations.appearance import colour_shares, repeats, unsupported_colours
 from aerialdojo_gen.annotations.check import check_source
@@ -17,7 +18,7 @@ from aerialdojo_gen.annotations.ground import Surface
 from aerialdojo_gen.annotations.relations import DISTRACTOR_SLACK
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, valid_phrases
+from aerialdojo_gen.scenes.appearances import valid_phrases
 from aerialdojo_gen.scenes.model import Material, Part, Scene
 
 

@@ -15,8 +15,8 @@ from aerialdojo_gen.annotations.format import Landmark, format_annotations, pars
 from aerialdojo_gen.annotations.matching import Matcher
 from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.scenes.appearances import valid_phrases
 from aerialdojo_gen.scenes.build import build_scene
-from aerialdojo_gen.scenes.claims import valid_phrases
 from aerialdojo_gen.scenes.model import Material, Scene
 
 TOWER = Landmark(id=0, name="clock tower", node="clock_tower_000")

@@ -20,11 +20,11 @@ from support.layout_checks import (
 from support.maps import ground_z
 
 from aerialdojo_gen.scenes.expressions import eased
+from aerialdojo_gen.scenes.grammar import blob, ragged_outline
 from aerialdojo_gen.scenes.kit.ground_cover import steep_area
 from aerialdojo_gen.scenes.kit.huts import MudbrickHouse, mudbrick_houses
 from aerialdojo_gen.scenes.kit.landforms import ground_by_formula, inland_m
 from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
-from aerialdojo_gen.scenes.kit.natural_ground import blob, ragged_outline
 from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
 from aerialdojo_gen.scenes.kit.snow import (
     Rock,

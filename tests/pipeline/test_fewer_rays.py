@@ -24,8 +24,7 @@ from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m, steps
 from aerialdojo_gen.pipeline.stages.work.reference_images import MIN_SHARE, instance_map, instance_mask
 from aerialdojo_gen.planning.collision import collision_world
 from aerialdojo_gen.rendering.backend import open_renderer
-from aerialdojo_gen.scenes.anatomy import Anatomy, Run
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.model import Anatomy, Instance, Run
 
 CONFIG, RADIUS = AnchorSampleConfig(), Embodiment().radius_m
 

@@ -17,8 +17,7 @@ from aerialdojo_gen.geometry.surface import Surface
 from aerialdojo_gen.pipeline.stages.work.anchor_sample import anchors_of
 from aerialdojo_gen.pipeline.stages.work.anchor_world import World
 from aerialdojo_gen.pipeline.stages.work.camera_pullback import fitting_m
-from aerialdojo_gen.scenes.anatomy import Anatomy, Run
-from aerialdojo_gen.scenes.model import Instance
+from aerialdojo_gen.scenes.model import Anatomy, Instance, Run
 
 CONFIG, RADIUS = AnchorSampleConfig(), Embodiment().radius_m
 NORTH = math.pi / 2

@@ -11,11 +11,10 @@ from support.catalogue_faults import catalogue_faults
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.anatomy import FRONTS, Run, parse_anatomy, remap_runs
+from aerialdojo_gen.scenes.appearances import Body, valid_phrases
 from aerialdojo_gen.scenes.catalogue import Overrides, _is_drawn_crown, load_catalogue
-from aerialdojo_gen.scenes.claims import Body, valid_phrases
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
-from aerialdojo_gen.scenes.model import Scene
+from aerialdojo_gen.scenes.model import FRONTS, Run, Scene, parse_anatomy, remap_runs
 
 ASSETS = Path(__file__).parents[2] / "scene_assets"
 

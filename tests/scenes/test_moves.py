@@ -15,9 +15,8 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.contact import CONTACT_M, _feet, _gaps, rest_on_ground
 from aerialdojo_gen.scenes.model import Instance, Scene
-from aerialdojo_gen.scenes.placement import DRAWN, Placement
+from aerialdojo_gen.scenes.placement import CONTACT_M, DRAWN, Placement, _feet, _gaps, rest_on_ground
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import rolling_terrain

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon
 from support.layout_checks import is_seamless
 
-from aerialdojo_gen.scenes import lettering, shapes
+from aerialdojo_gen.scenes import shapes
 from aerialdojo_gen.scenes.expressions import evaluate, evaluate_arrays, names_in
 from aerialdojo_gen.scenes.materials import TEXTURES, make_texture
 from aerialdojo_gen.scenes.mesh import Mesh, merge, mirrored, rotated, rotation, to_part, translated
 from aerialdojo_gen.scenes.textures_natural import NATURAL
-from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh
+from aerialdojo_gen.scenes.vocabulary import _STROKES, SHAPES, part_mesh, text
 
 size = st.floats(0.05, 20.0)
 few = st.integers(3, 24)
@@ -124,9 +124,9 @@ def test_sweep_is_closed_and_contains_its_path(legs, round_):
     assert body.volume_m3 == pytest.approx(length * area, rel=1e-9 if level else 0.25)
 
 
-@pytest.mark.parametrize("letter", sorted(lettering._STROKES))
+@pytest.mark.parametrize("letter", sorted(_STROKES))
 def test_letters_are_plates_of_their_height(letter):
-    body = lettering.text(text=f"{letter}H", height=0.6, depth=0.05)
+    body = text(text=f"{letter}H", height=0.6, depth=0.05)
     solid(body)
     assert body.vertices[:, 0].min() == 0
     assert body.vertices[:, 0].max() == pytest.approx(0.05)
@@ -136,7 +136,7 @@ def test_letters_are_plates_of_their_height(letter):
 
 def test_letters_read_from_the_front():
     """Seen from +x, y runs to the right: L has its foot right of its stem."""
-    body = lettering.text(text="L", height=1.0)
+    body = text(text="L", height=1.0)
     assert np.all(
         np.cross(*(body.vertices[body.faces][:, k] - body.vertices[body.faces][:, 0] for k in (1, 2)))[:, 0] > 0
     )

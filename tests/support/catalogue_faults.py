@@ -7,11 +7,13 @@ from itertools import product
 from types import MappingProxyType
 
 from aerialdojo_gen.base.rng import generator
+from aerialdojo_gen.scenes.appearances import Body
 from aerialdojo_gen.scenes.catalogue import Catalogue
-from aerialdojo_gen.scenes.claims import MIN_TRUE_PHRASES, Body
 from aerialdojo_gen.scenes.model import Instance
 
 MIN_LOOKS = 3
+# Descriptions need a choice: with fewer phrases true of an instance, all of its kind would read alike.
+MIN_TRUE_PHRASES = 2
 
 
 def catalogue_faults(

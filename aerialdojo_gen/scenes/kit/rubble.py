@@ -14,9 +14,8 @@ from shapely.geometry import LineString, Point, Polygon
 
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import atan2, norm, power
-from aerialdojo_gen.scenes.grammar import poisson_disc, slab
+from aerialdojo_gen.scenes.grammar import noise_around, poisson_disc, slab
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
-from aerialdojo_gen.scenes.kit.natural_ground import noise_around
 from aerialdojo_gen.scenes.kit.wreckage import bars, chunk, tilted_plate
 from aerialdojo_gen.scenes.mesh import Parts, translated
 from aerialdojo_gen.scenes.model import Instance

@@ -18,11 +18,11 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.scenes.grammar import Frame, slab
 from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.lettering import text
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cylinder, profile
 from aerialdojo_gen.scenes.site import Site
+from aerialdojo_gen.scenes.vocabulary import text
 
 Point = tuple[float, float]
 _Spacing = Annotated[Number, Field(ge=0.5)]

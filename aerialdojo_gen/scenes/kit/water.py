@@ -15,11 +15,10 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar import Frame, poisson_disc
+from aerialdojo_gen.scenes.grammar import Frame, blob, poisson_disc
 from aerialdojo_gen.scenes.ground import edge_strip, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.houses import HouseStyle, house, window_parts
-from aerialdojo_gen.scenes.kit.natural_ground import blob
 from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated

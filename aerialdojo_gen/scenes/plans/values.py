@@ -22,9 +22,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest, unknown
 from aerialdojo_gen.scenes.expressions import Floats, evaluate, evaluate_arrays
-from aerialdojo_gen.scenes.grammar import Frame, eased_path, smooth_path
+from aerialdojo_gen.scenes.grammar import Frame, blob, eased_path, ragged_outline, smooth_path
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, ribbon
-from aerialdojo_gen.scenes.kit.natural_ground import blob, ragged_outline
 from aerialdojo_gen.scenes.materials import MaterialLibrary
 from aerialdojo_gen.scenes.mesh import Parts
 
