@@ -23,8 +23,8 @@ from aerialdojo_gen.imports.osm import ATTRIBUTION, Feature, Map
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.relief import LARGEST_M, SMALLEST_M, HeightTable, PlacePlan
 from aerialdojo_gen.scenes.ground import polygons_of, rectangle
-from aerialdojo_gen.scenes.kit.street_decks import Bridge
 from aerialdojo_gen.scenes.kit.street_network import Street, lay_out
+from aerialdojo_gen.scenes.kit.streets import Bridge
 
 # Streets extend beyond the border, to hide their ends.
 _BEYOND_M = 15.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,8 @@ from shapely.geometry.base import BaseGeometry
 from aerialdojo_gen.base.kernels import njit
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import Floats, unit
-from aerialdojo_gen.scenes.mesh import Mesh, Parts, rotated, rotation, translated
+from aerialdojo_gen.scenes.ground import polygons_of
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, by_material, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -132,8 +133,27 @@ def wall(site: Site, path: Polyline, height_m: float, thickness_m: float, z: flo
 
 def slab(area: BaseGeometry, z0_m: float, z1_m: float) -> Mesh:
     """Extrude a polygon between two heights: a deck, a roof, a plinth."""
-    body = extrude(area, z1_m - z0_m)
-    return Mesh(body.vertices + np.array([0.0, 0.0, z0_m]), body.faces, body.corner_uv)
+    return translated(extrude(area, z1_m - z0_m), (0.0, 0.0, z0_m))
+
+
+def plates(area: BaseGeometry, z0_m: float, z1_m: float) -> Mesh:
+    """Extrude every polygon of an area between two heights."""
+    return merge([slab(piece, z0_m, z1_m) for piece in polygons_of(area)])
+
+
+def leg(a: Sequence[float], b: Sequence[float]) -> tuple[float, float]:
+    """Give the length of a leg, metres, and its direction, degrees."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    return float(np.hypot(dx, dy)), math.degrees(math.atan2(dy, dx))
+
+
+def between_gates(
+    start: float, end: float, gates: Iterable[tuple[float, float]], least_m: float
+) -> list[tuple[float, float]]:
+    """List the stretches between gates, those longer than `least_m`."""
+    stops = [*sorted(gates), (end, end)]
+    starts = accumulate((high for _, high in stops), max, initial=start)
+    return [(low, high) for low, (high, _) in zip(starts, stops, strict=False) if high - low > least_m]
 
 
 def grid(
@@ -277,7 +297,7 @@ class Frame:
     def parts(self, parts: Parts, z_m: float = 0.0) -> Parts:
         """World coordinates of meshes whose z starts at `z_m`."""
         turn = rotation(0.0, 0.0, self.yaw_deg)
-        return [(material, translated(rotated(m, turn), (self.x, self.y, z_m))) for material, m in parts]
+        return [(material, posed(body, turn, (self.x, self.y, z_m))) for material, body in by_material(parts)]
 
 
 def box_between(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:

@@ -6,8 +6,9 @@ terrain's own triangles. So a mark lies exactly in the road, nothing overlaps, a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import groupby
 
 import numpy as np
@@ -183,6 +184,11 @@ def disc(x: float, y: float, radius_m: float, corners: int = 24) -> Polygon:
     """Make a round area, metres, world frame."""
     angles = np.arange(corners) * 2 * np.pi / corners
     return Polygon(np.column_stack([x + radius_m * np.cos(angles), y + radius_m * np.sin(angles)]))
+
+
+def without(area: BaseGeometry, holes: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Cut holes out of an area, one after the other."""
+    return reduce(shapely.difference, holes, area)
 
 
 def edge_strip(plan: BaseGeometry, in_m: float, out_m: float = 0.0) -> BaseGeometry:

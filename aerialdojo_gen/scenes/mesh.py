@@ -5,7 +5,7 @@ A mesh lives in its prop's own frame (x front, y left, z up, metres) until it is
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,9 +62,11 @@ def flipped(m: Mesh) -> Mesh:
 
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:
-    """Put meshes together without welding them."""
+    """Put meshes together without welding them; of none, one without a face."""
     if len(meshes) == 1:
         return meshes[0]
+    if not meshes:
+        return Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
     offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
     uv = None
     if any(m.corner_uv is not None for m in meshes):
@@ -76,6 +78,15 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
         np.concatenate([m.faces + np.int32(o) for m, o in zip(meshes, offsets, strict=True)]),
         uv,
     )
+
+
+def by_material(parts: Iterable[tuple[str, Mesh]]) -> Parts:
+    """Put the meshes of each material together, in the order in which they first come; those without a face go."""
+    groups: dict[str, list[Mesh]] = {}
+    for material, body in parts:
+        if len(body.faces):
+            groups.setdefault(material, []).append(body)
+    return [(material, merge(bodies)) for material, bodies in groups.items()]
 
 
 def translated(m: Mesh, offset: ArrayLike) -> Mesh:

@@ -21,7 +21,7 @@ from aerialdojo_gen.base.errors import ShapeError
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.portable import distances_along, norm, product, unit
 from aerialdojo_gen.scenes.kernels import band_faces, extruded, swept_rings
-from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, merge, mesh, outward
+from aerialdojo_gen.scenes.mesh import Floats, Ints, Mesh, merge, mesh, outward, translated
 
 Numbers = Sequence[float]
 
@@ -290,8 +290,7 @@ def block(*, corners: Numbers, z: Numbers) -> Mesh:
     """Make an axis-parallel block from ``[x0, y0, x1, y1]`` between two heights, metres."""
     x0, y0, x1, y1 = _numbers("corners", corners, 4)
     z0, z1 = _numbers("z", z, 2)
-    body = extrude(Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), z1 - z0)
-    return Mesh(body.vertices + np.array([0.0, 0.0, z0]), body.faces, body.corner_uv)
+    return translated(extrude(Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), z1 - z0), (0.0, 0.0, z0))
 
 
 def sweep(

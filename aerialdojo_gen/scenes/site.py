@@ -23,7 +23,7 @@ from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
-from aerialdojo_gen.scenes.mesh import Mesh, merge, to_part
+from aerialdojo_gen.scenes.mesh import Mesh, by_material, to_part
 from aerialdojo_gen.scenes.model import Instance, Part, Scene, turned
 from aerialdojo_gen.scenes.placement import (
     CONTACT_M,
@@ -336,14 +336,9 @@ class Site:
         return Instance(self._reserve_node("ground"), "ground", "", {}, parts)
 
     def _as_parts(self, parts: Sequence[Part | tuple[str, Mesh]]) -> tuple[Part, ...]:
-        by_material: dict[str, list[Mesh]] = {}
-        done: list[Part] = []
-        for part in parts:
-            if isinstance(part, Part):
-                done.append(part)
-            else:
-                by_material.setdefault(part[0], []).append(part[1])
-        return (*done, *(self.part(merge(m), spec) for spec, m in by_material.items()))
+        done = [part for part in parts if isinstance(part, Part)]
+        bodies = by_material(part for part in parts if not isinstance(part, Part))
+        return (*done, *(self.part(body, material) for material, body in bodies))
 
     def _reserve_node(self, node: str) -> str:
         if node in self._nodes:

@@ -23,18 +23,17 @@ from aerialdojo_gen.scenes.expressions import eased
 from aerialdojo_gen.scenes.grammar import blob, ragged_outline
 from aerialdojo_gen.scenes.kit.ground_cover import steep_area
 from aerialdojo_gen.scenes.kit.huts import MudbrickHouse, mudbrick_houses
-from aerialdojo_gen.scenes.kit.landforms import ground_by_formula, inland_m
-from aerialdojo_gen.scenes.kit.mountains import Ridge, high_ground, massif, steep_ground
-from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
-from aerialdojo_gen.scenes.kit.snow import (
-    Rock,
+from aerialdojo_gen.scenes.kit.landforms import (
     banks_beside,
     dunes,
-    layered_rocks,
+    ground_by_formula,
+    inland_m,
     moguls,
     profile_slope,
     stepped_valley,
 )
+from aerialdojo_gen.scenes.kit.mountains import Ridge, Rock, high_ground, layered_rocks, massif, steep_ground
+from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
 from aerialdojo_gen.scenes.kit.structures import flights
 from aerialdojo_gen.scenes.model import Instance, Scene
 from aerialdojo_gen.scenes.terrain import flat_terrain, rolling_terrain

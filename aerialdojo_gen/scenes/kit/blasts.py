@@ -13,12 +13,12 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 from aerialdojo_gen.geometry.portable import dot, norm
-from aerialdojo_gen.scenes.grammar import Frame
+from aerialdojo_gen.scenes.grammar import Frame, leg
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.rubble import Breadth
 from aerialdojo_gen.scenes.kit.ruins import Extent
-from aerialdojo_gen.scenes.kit.structures import block, columns, leg, railing
+from aerialdojo_gen.scenes.kit.structures import block, columns, railing
 from aerialdojo_gen.scenes.kit.wreckage import Bite, bars, tilted_plate, torn_wall
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import At, Material, Number
@@ -60,11 +60,12 @@ def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: 
     for left, right in pairwise(frames):
         for k in range(len(left) - 1):
             sheets += _sheet(hall, (left[k], right[k], right[k + 1], left[k + 1]), rng)
-    parts: Parts = [(hall.steel, merge(steel))]
-    if sheets:
-        parts.append((hall.cladding, merge(sheets)))
     x, y = hall.length_m / 2, hall.depth_m / 2
-    parts.append(("concrete", block(-x, y - 0.15, x, y + 0.15, -0.8, 0.5)))
+    parts: Parts = [
+        (hall.steel, merge(steel)),
+        (hall.cladding, merge(sheets)),
+        ("concrete", block(-x, y - 0.15, x, y + 0.15, -0.8, 0.5)),
+    ]
     if hall.gallery_m:
         parts += _gallery(hall)
     site.add(node, "wrecked_hall", Frame(*at, yaw_deg).parts(parts, base))
@@ -141,13 +142,13 @@ def burst_tank(
         near = float(np.cos(mid - toward))
         top = height_m * (1.0 - max(0.0, near - 0.1) * 0.85)
         p0, p1 = ((radius_m * float(np.cos(a)), radius_m * float(np.sin(a))) for a in (a0, a1))
-        length = float(np.hypot(p1[0] - p0[0], p1[1] - p0[1]))
+        length, _ = leg(p0, p1)
         fray = rng.uniform(-0.5, 0.5, size=3) * (0.12 if near < 0.1 else 1.0)
         face = Polygon(
             [(0, 0.3), (length, 0.3), (length, top + fray[0]), (length / 2, top + fray[1]), (0, top + fray[2])]
         )
         material = shell if near < 0.6 else "rust"
-        parts += [(material, body) for body in torn_wall(p0, p1, face, (), rng, (), 0.08)]
+        parts.append((material, torn_wall(p0, p1, face, (), rng, (), 0.08)))
         if near > 0.45 and k % 2 == 0:
             plate = translated(
                 box(size=[height_m * 0.45, length * 1.3, 0.07], taper=(0.6, 1.0)), (height_m * 0.2, 0, 0)
@@ -276,16 +277,12 @@ def torn_yard_wall(
     parts: Parts = []
     for k, (a, b) in enumerate(runs):
         low = min(site.ground_z(*a), site.ground_z(*b))
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        top = max(site.ground_z(*a), site.ground_z(*b)) + height_m
-        face = Polygon([(0, low - 0.6), (length, low - 0.6), (length, top), (0, top)])
+        face = rectangle(0, low - 0.6, leg(a, b)[0], max(site.ground_z(*a), site.ground_z(*b)) + height_m)
         tear = replace(hole, z0_m=low + hole.z0_m, z1_m=low + hole.z1_m)
-        parts += [(brick, body) for body in torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)]
+        parts.append((brick, torn_wall(a, b, face, (tear,), site.rng_for("wall", k), (), 0.32)))
     site.add("yard_wall", "yard_wall", parts)
     for a, b in runs:
-        corners = [(a[0] - 0.4, a[1] - 0.4), (b[0] + 0.4, a[1] - 0.4), (b[0] + 0.4, b[1] + 0.4),
-                   (a[0] - 0.4, b[1] + 0.4)]  # fmt: skip
-        site.occupy(Polygon(corners).buffer(0.01))
+        site.occupy(rectangle(a[0] - 0.4, a[1] - 0.4, b[0] + 0.4, b[1] + 0.4).buffer(0.01))
 
 
 @site_builder
@@ -294,9 +291,9 @@ def step_walls(site: Site, *, y: Number, spans: list[tuple[Number, Number]]) -> 
     parts: Parts = []
     for x0, x1 in spans:
         low, high = site.ground_z((x0 + x1) / 2, y - 1.5), site.ground_z((x0 + x1) / 2, y + 1.5)
-        face = Polygon([(0, low - 0.5), (x1 - x0, low - 0.5), (x1 - x0, high + 0.5), (0, high + 0.5)])
+        face = rectangle(0, low - 0.5, x1 - x0, high + 0.5)
         wall = torn_wall((x0, y - 0.35), (x1, y - 0.35), face, (), site.rng_for("kerb"), (), 0.35)
-        parts += [("concrete", body) for body in wall]
+        parts.append(("concrete", wall))
         site.occupy(rectangle(x0, y - 1.0, x1, y + 0.4))
     site.add("retaining_wall", "retaining_wall", parts)
 

@@ -8,14 +8,14 @@ from typing import Annotated
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar import Frame, slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, between_gates, plates, slab
+from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle, without
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.halls import across_x
-from aerialdojo_gen.scenes.kit.steelwork import guard_rails, plates, posts, rim, trestle
+from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts, rim, trestle
 from aerialdojo_gen.scenes.kit.structures import block, columns, deck, railing, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
@@ -39,14 +39,10 @@ def bridge_deck(
     run at those y and reach `girder_m` below the road; `holes` stay open, e.g. for the legs of pylons.
     """
     h, r = half_m, road_m
-    sheet: BaseGeometry = rectangle(x0, -h, x1, h)
-    for hole in holes:
-        sheet = sheet.difference(hole)
+    sheet = without(rectangle(x0, -h, x1, h), holes)
     road = rectangle(x0, -r, x1, r)
     ways = sheet.difference(road)
-    beams = rectangle(x0, -h, x1, h).difference(rectangle(x0, -h + 0.5, x1, h - 0.5))
-    for hole in holes:
-        beams = beams.difference(hole)
+    beams = without(rectangle(x0, -h, x1, h), [rectangle(x0, -h + 0.5, x1, h - 0.5), *holes])
     below = [slab(p, -depth_m, -0.35) for p in polygons_of(beams)]
     below += [block(x0, y - 0.3, x1, y + 0.3, -girder_m, -0.35) for y in girders]
     cross = [
@@ -73,11 +69,9 @@ def bridge_parapets(
     """Make railings along both edges of a deck, open at gaps: from x, to x, side -1 or 1."""
     parts: Parts = []
     for side in (-1, 1):
-        y, x = side * (half_m - inset_m), x0
-        for a, b, _ in sorted(g for g in (*gaps, (x1, x1, side)) if g[2] == side):
-            if a > x:
-                parts += railing([(x, y), (a, y)], FOOTWAY_M, height_m=1.15, pane=pane, frame=frame)
-            x = b
+        y = side * (half_m - inset_m)
+        for a, b in between_gates(x0, x1, [gap[:2] for gap in gaps if gap[2] == side], 0.0):
+            parts += railing([(a, y), (b, y)], FOOTWAY_M, height_m=1.15, pane=pane, frame=frame)
     return parts
 
 
@@ -185,7 +179,7 @@ def stone_viaduct(
     rings = []
     for middle, radius, spring in arches:
         upper = rectangle(middle - 9, spring, middle + 9, spring + 9)
-        ring = _circle(middle, spring, radius + 0.6).difference(_circle(middle, spring, radius))
+        ring = disc(middle, spring, radius + 0.6, 32).difference(disc(middle, spring, radius, 32))
         rings.append(upright(polygons_of(ring.intersection(upper)), 5.3))
         for x in (middle - radius - 0.35, middle + radius + 0.35):
             rings.append(block(x - 0.5, -2.7, x + 0.5, 2.7, spring - 0.45, spring))
@@ -250,12 +244,6 @@ def falsework(
     parts += [("steel", block(x0, y - 0.2, x1, y + 0.2, top_m - 0.7, top_m - 0.3)) for y in beams]
     parts += [("planks:#c8a468", block(*box, top_m - 0.3, top_m)), *extra]
     site.add(None, "falsework", [*parts, *guard_rails(rim(rectangle(x0, y0, x1, y1)), top_m, toe="planks")])
-
-
-def _circle(x: float, z: float, radius: float) -> BaseGeometry:
-    return Polygon(
-        [(x + radius * float(np.cos(a)), z + radius * float(np.sin(a))) for a in np.linspace(0, 2 * np.pi, 33)[:-1]]
-    )
 
 
 def arcade(

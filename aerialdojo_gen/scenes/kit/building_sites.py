@@ -10,11 +10,11 @@ import numpy as np
 from pydantic import Field
 from shapely.geometry import LineString
 
-from aerialdojo_gen.scenes.grammar import Frame
+from aerialdojo_gen.scenes.grammar import Frame, leg, plates
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.steelwork import guard_rails, plates, posts
-from aerialdojo_gen.scenes.kit.structures import block, columns, leg, letters, stairs
+from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts
+from aerialdojo_gen.scenes.kit.structures import block, columns, letters, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box, cone, crown
@@ -163,9 +163,8 @@ def raft_foundation(
     z0, top = z
     parts: Parts = [(material, plates(area, z0, top))]
     dots = [(x + i * 0.2, y + j * 0.2) for x, y in columns for i in (-1, 1) for j in (-1, 1)]
-    if columns:
-        parts.append(("rust", posts(dots, top, top + 1.6, 0.045)))
-        parts += [("rust", posts(columns, top + low, top + low + 0.06, 0.46)) for low in (0.5, 1.1)]
+    parts.append(("rust", posts(dots, top, top + 1.6, 0.045)))
+    parts += [("rust", posts(columns, top + low, top + low + 0.06, 0.46)) for low in (0.5, 1.1)]
     for a, b in walls:
         line = LineString([a, b])
         n = max(round(line.length / 1.4), 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,14 +9,14 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
-from shapely.geometry import LineString, MultiPolygon, Polygon
+from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.geometry.portable import norm
-from aerialdojo_gen.scenes.grammar import Frame, Pose, slab
-from aerialdojo_gen.scenes.ground import edge_strip, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, Pose, leg, plates
+from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle, without
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import Point, block, deck, railing, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, posed, rotated, rotation, translated
@@ -100,9 +99,9 @@ def put_up_building(
     if roof.kind == "flat":
         # The roof's sides must not lie in the walls' plane, where both would flicker.
         lid = plan.buffer(-0.02 if roof.parapet_m > 0.0 else 0.15, join_style="mitre")
-        parts += [(roof.material, slab(p, top - 0.3, top)) for p in _pieces(lid)]
+        parts.append((roof.material, plates(lid, top - 0.3, top)))
         if roof.parapet_m > 0.0:
-            parts += [("concrete", slab(p, top, top + roof.parapet_m)) for p in _pieces(edge_strip(plan, 0.3))]
+            parts.append(("concrete", plates(edge_strip(plan, 0.3), top, top + roof.parapet_m)))
     else:
         hip, overhang_m = roof.kind == "hip", roof.overhang_m
         parts += pitched_roof(plan, top, roof.rise_m, wall, roof.material, hip=hip, overhang_m=overhang_m)
@@ -124,7 +123,7 @@ def facade(plan: Polygon, z0_m: float, z1_m: float, tile_m: float) -> Mesh:
     for ring in (outline.exterior, *outline.interiors):
         xy = [(float(x), float(y)) for x, y in ring.coords]
         for n, ((ax, ay), (bx, by)) in enumerate(pairwise(xy)):
-            length = float(np.hypot(bx - ax, by - ay))
+            length, _ = leg((ax, ay), (bx, by))
             u0 = n % 2 * half
             u1 = u0 + (max(round(length / half), 1) * half if length > 0.7 * half else length)
             k = len(vertices)
@@ -155,14 +154,8 @@ def pitched_roof(
         parts.append((roof, mesh(points, faces)))
     else:
         thick = 0.18
-        chevron = [
-            (-out, eave),
-            (0.0, height_m),
-            (out, eave),
-            (out, eave + thick),
-            (0.0, height_m + thick),
-            (-out, eave + thick),
-        ]
+        under = [(-out, eave), (0.0, height_m), (out, eave)]
+        chevron = [*under, *((x, z + thick) for x, z in under[::-1])]
         quarter = rotation(0.0, 0.0, 90.0)
         parts.append((roof, rotated(profile(points=chevron, width=length + 2 * overhang_m), quarter)))
         gable = profile(points=[(-width / 2, 0.0), (width / 2, 0.0), (0.0, height_m)], width=length)
@@ -179,32 +172,26 @@ def wall_with_openings(
     thickness_m: float = 0.3,
 ) -> Mesh:
     """Make a straight wall from `a` to `b` with openings (from, to, sill, head), metres, to look and fly through."""
-    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-    face: BaseGeometry = Polygon([(0, 0), (length, 0), (length, z1_m - z0_m), (0, z1_m - z0_m)])
-    wall = upright(_pieces(opened(face, openings)), thickness_m)
-    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    length, yaw = leg(a, b)
+    wall = upright(polygons_of(opened(rectangle(0, 0, length, z1_m - z0_m), openings)), thickness_m)
     return posed(wall, rotation(0.0, 0.0, yaw), (*a, z0_m))
 
 
 def opened(face: BaseGeometry, openings: Sequence[tuple[float, float, float, float]]) -> BaseGeometry:
     """Cut openings (from, to, sill, head) out of a wall's side view."""
-    for u0, u1, sill, head in openings:
-        face = face.difference(Polygon([(u0, sill), (u1, sill), (u1, head), (u0, head)]))
-    return face
+    return without(face, [rectangle(u0, sill, u1, head) for u0, u1, sill, head in openings])
 
 
 def before_walls(plan: Polygon, spacing_m: float, offset_m: float, inset_m: float = 1.0) -> list[Pose]:
     """List poses along a plan's walls, `offset_m` outside them and facing away from them."""
-    outline = orient(plan)
-    xy = list(outline.exterior.coords)
     poses = []
-    for p, q in pairwise(xy):
-        leg = LineString([p, q])
-        count = int((leg.length - 2 * inset_m) // spacing_m) + 1 if leg.length > 2 * inset_m else 0
-        yaw = math.degrees(math.atan2(q[1] - p[1], q[0] - p[0])) - 90.0
+    for p, q in pairwise(orient(plan).exterior.coords):
+        wall = LineString([p, q])
+        count = int((wall.length - 2 * inset_m) // spacing_m) + 1 if wall.length > 2 * inset_m else 0
+        yaw = leg(p, q)[1] - 90.0
         c, s = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
         for k in range(count):
-            at = leg.interpolate((leg.length - (count - 1) * spacing_m) / 2 + k * spacing_m)
+            at = wall.interpolate((wall.length - (count - 1) * spacing_m) / 2 + k * spacing_m)
             poses.append(Pose(float(at.x + c * offset_m), float(at.y + s * offset_m), yaw))
     return poses
 
@@ -215,14 +202,8 @@ def oriented_rectangle(plan: Polygon) -> tuple[tuple[float, float], float, float
     legs = np.diff(corners[:3], axis=0)
     lengths = norm(legs)
     long = int(lengths[1] > lengths[0])
-    yaw = math.degrees(math.atan2(legs[long, 1], legs[long, 0]))
     x, y = corners.mean(axis=0)
-    return (float(x), float(y)), float(lengths[long]), float(lengths[1 - long]), yaw
-
-
-def _pieces(area: BaseGeometry) -> list[Polygon]:
-    geoms = area.geoms if isinstance(area, MultiPolygon) else [area]
-    return [g for g in geoms if isinstance(g, Polygon) and g.area > 1e-6]
+    return (float(x), float(y)), float(lengths[long]), float(lengths[1 - long]), leg((0.0, 0.0), legs[long])[1]
 
 
 # A point of a wall's foot, and what the wall faces.
@@ -315,8 +296,7 @@ def washing_lines(
         rng = site.rng_for("washing", x0, y0, z_m)
         line = _sagging((x0, y0), (x1, y1), z_m, 0.35)
         parts: Parts = [("#d8d4c8", sweep(path=line, radius=0.02, sides=4))]
-        length = float(np.hypot(x1 - x0, y1 - y0))
-        yaw = math.degrees(math.atan2(y1 - y0, x1 - x0))
+        length, yaw = leg((x0, y0), (x1, y1))
         at = 0.5
         while at < length - 1.0:
             width, drop = float(rng.uniform(0.45, 0.95)), float(rng.uniform(0.6, 1.1))

@@ -16,12 +16,12 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar import Frame
+from aerialdojo_gen.scenes.grammar import Frame, leg, plates
 from aerialdojo_gen.scenes.ground import disc, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
-from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, plates, posts, rim
-from aerialdojo_gen.scenes.kit.structures import Point, block, leg, stairs
+from aerialdojo_gen.scenes.kit.steelwork import bars, guard_rails, posts, rim
+from aerialdojo_gen.scenes.kit.structures import Point, block, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
@@ -67,7 +67,7 @@ def concrete_frame(
         ahead = shapely.Polygon() if above is None else above.area
         ends = [p for p in feet if not shapely.contains_xy(ahead.buffer(0.4), *p)]
         rods = [(x + i * d, y + j * d) for x, y in ends for i in (-1, 1) for j in (-1, 1)]
-        parts += [("rust", posts(rods, top, top + bars_m, 0.04))] if rods else []
+        parts.append(("rust", posts(rods, top, top + bars_m, 0.04)))
         for x, y in feet:
             site.occupy(disc(x, y, column_m * 0.75, 8), low, top - 0.05)
         low = top
@@ -145,10 +145,10 @@ def infill_walls(
 ) -> None:  # fmt: skip
     """Fill bays of a frame with masonry: ends, foot, top, material and count of the open windows of each wall."""
     for a, b, z0, z1, material, windows in walls:
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        (length, _), line = leg(a, b), LineString([a, b])
         wide, head = length / max(windows, 1), z1 - z0 - 0.6
         holes = [(k * wide + wide * 0.22, k * wide + wide * 0.78, sill_m, head) for k in range(windows)]
-        line, z = LineString([a, b]), z0 + head + 0.1
+        z = z0 + head + 0.1
         parts: Parts = [(material, wall_with_openings(a, b, z0, z1, holes, 0.24))]
         for u0, u1, _, _ in holes:
             p, q = ((a[0] + (b[0] - a[0]) * u / length, a[1] + (b[1] - a[1]) * u / length, z)
@@ -167,8 +167,7 @@ def scaffold(
 
     The line is its inner side, `z` the heights of its feet and of its uppermost deck; a lift is about `lift_m` high.
     """
-    (a, b), high = line, z[1] - z[0]
-    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+    (length, yaw_deg), high = leg(*line), z[1] - z[0]
     bays, lifts = max(round(length / 2.5), 1), max(round(high / lift_m), 1)
     us, edges = [length * k / bays for k in range(bays + 1)], (0.0, depth_m)
     steel = [block(u - 0.035, v - 0.035, u + 0.035, v + 0.035, 0.0, high + 1.1) for u in us for v in edges]
@@ -190,7 +189,7 @@ def scaffold(
             braces.append(((p, depth_m, high * j / lifts), (q, depth_m, high * (j + 1) / lifts)))
     raw: Parts = [("metal", merge([*steel, bars(braces, 0.05)])), ("planks:#b08d58", merge(decks))]
     raw += [] if net is None else [(net, merge(nets))]
-    parts = Frame(*a, leg(a, b)[1]).parts(raw, z[0])
+    parts = Frame(*line[0], yaw_deg).parts(raw, z[0])
     area = LineString(line).buffer(depth_m, cap_style="flat", single_sided=True)
     site.add(None, "scaffold", parts, footprint=area)
 
@@ -202,7 +201,7 @@ def sheet_piles(
     """Line a dig with a folded steel wall between two heights, with a beam near its head."""
     folds: list[Point] = []
     for a, b in pairwise(line):
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        length, _ = leg(a, b)
         count = max(round(length / step_m), 1)
         normal = (-(b[1] - a[1]) / length, (b[0] - a[0]) / length)
         for k in range(count):

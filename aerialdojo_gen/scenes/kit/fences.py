@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -13,7 +12,7 @@ from shapely.geometry import LineString
 from shapely.ops import unary_union
 
 from aerialdojo_gen.scenes import ground
-from aerialdojo_gen.scenes.grammar import Frame, Polyline, along, box_between, slab, stretches, wall
+from aerialdojo_gen.scenes.grammar import Frame, Polyline, along, box_between, leg, slab, stretches, wall
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, railing
@@ -77,7 +76,7 @@ def garden_fences(
 
 def _pieces(line: Line, piece_m: float) -> Iterator[Line]:
     for a, b in pairwise(line):
-        count = max(int(np.hypot(b[0] - a[0], b[1] - a[1]) / piece_m), 1)
+        count = max(int(leg(a, b)[0] / piece_m), 1)
         steps = np.linspace(0.0, 1.0, count + 1)
         yield from (
             list(pair) for pair in pairwise([(a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t) for t in steps])
@@ -89,20 +88,20 @@ def bar_fences(site: Site, *, lines: list[Line], height_m: Number = 1.1, materia
     """Put up fences of three bars between posts along lines, on the ground at their points."""
     for line in lines:
         parts = [(material, wall(site, line, 0.06, 0.04, z=height_m * share)) for share in (0.2, 0.55, 0.92)]
-        leg = LineString(line)
-        count = max(round(leg.length / 2.0), 1)
-        for at in (leg.interpolate(leg.length * k / count) for k in range(count + 1)):
+        middle = LineString(line)
+        count = max(round(middle.length / 2.0), 1)
+        for at in (middle.interpolate(middle.length * k / count) for k in range(count + 1)):
             post = box(size=(0.06, 0.06, height_m))
             parts.append((material, translated(post, (at.x, at.y, site.ground_z(at.x, at.y)))))
-        site.add(None, "railing", parts, footprint=leg.buffer(0.1))
+        site.add(None, "railing", parts, footprint=middle.buffer(0.1))
 
 
 @site_builder
 def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Area) -> None:
     """Plant a hedge around a disc ``[x, y, radius]``, with an opening."""
     left = ground.disc(*disc, 12).exterior.difference(opening)
-    for leg in getattr(left, "geoms", [left]):
-        fence(site, [(float(x), float(y)) for x, y in leg.coords], "hedge")
+    for run in getattr(left, "geoms", [left]):
+        fence(site, [(float(x), float(y)) for x, y in run.coords], "hedge")
 
 
 @site_builder
@@ -225,8 +224,7 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
         for level in (0.3, 0.78) if kind == "picket" else (0.15, height - 0.05):
             parts.append((body, sweep(path=[(x, y, z + level) for x, y in path], section=(0.05, 0.08))))
         for a, b in pairwise(path):
-            length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-            yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+            length, yaw = leg(a, b)
             count = max(round(length / step), 1)
             bars = [
                 translated(box(size=(width, thickness, height), taper=(0.6, 1.0)), ((k + 0.5) * length / count, 0, 0))
@@ -241,11 +239,9 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
             lid = [(x, y, z + height + 0.03) for x, y in path]
             parts.append((cap, sweep(path=lid, section=(thickness + 0.1, 0.08))))
         if kind == "board":
-            line_m = LineString(path)
-            posts = [
-                line_m.interpolate(s) for s in np.linspace(0.0, line_m.length, max(int(line_m.length / 2.4), 1) + 1)
-            ]
-            parts.append(("wood", merge([box_between(p.x - 0.07, p.y - 0.07, p.x + 0.07, p.y + 0.07, z, z + 1.95)
-                                         for p in posts])))  # fmt: skip
+            middle = LineString(path)
+            for s in np.linspace(0.0, middle.length, max(int(middle.length / 2.4), 1) + 1):
+                x, y = middle.interpolate(s).coords[0]
+                parts.append(("wood", box_between(x - 0.07, y - 0.07, x + 0.07, y + 0.07, z, z + 1.95)))
     area = LineString(path).buffer(thickness / 2 + 0.02, cap_style="flat", join_style="mitre")
     return site.add(None, f"{kind}_fence" if kind != "hedge" else "garden_hedge", parts, footprint=area)

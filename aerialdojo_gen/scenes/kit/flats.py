@@ -14,7 +14,7 @@ from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.buildings import Roof, facade, put_up_building
 from aerialdojo_gen.scenes.kit.structures import block, canopy, columns, letters, parapet
-from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
+from aerialdojo_gen.scenes.mesh import Parts, merge
 from aerialdojo_gen.scenes.plans.values import Area, At, Box, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
@@ -49,11 +49,11 @@ def flats(
     for s in (-1, 1):
         for side in (-1, 1):
             v = side * (gap + (half - gap) / 2)
-            parts.append(("window", _leaf(s * (d - 0.05), s * (d + 0.05), v - 0.8, v + 0.8, 0.0, 2.3)))
-            parts.append((band, _leaf(s * d, s * (d + 1.5), v - 1.4, v + 1.4, 2.5, 2.65)))
+            parts.append(("window", block(s * (d - 0.05), v - 0.8, s * (d + 0.05), v + 0.8, 0.0, 2.3)))
+            parts.append((band, block(s * d, v - 1.4, s * (d + 1.5), v + 1.4, 2.5, 2.65)))
             for k in (-1, 1):
                 w = v + k * (half - gap) * 0.3
-                parts.append(("glass", _leaf(s * (d - 0.05), s * (d + 0.04), w - 0.7, w + 0.7, 1.0, 2.2)))
+                parts.append(("glass", block(s * (d - 0.05), w - 0.7, s * (d + 0.04), w + 0.7, 1.0, 2.2)))
     site.add(None, "flats_base", frame.parts(parts), {"place": name}, footprint=frame.area(low))
     sign: Parts = [("marking", letters(name.split()[-1], 1.8, (d + 0.02, half - 2.4, top - 2.6), 0.0, 0.08))]
     node = site.node("flats")
@@ -94,10 +94,6 @@ def _balconies(length_m: float, d: float, storeys: int, band: str) -> Parts:
         panels += [block(d + _DEPTH_M - 0.08, w, d + _DEPTH_M, w + 0.08, z, z + 1.0) for w in (a, b - 0.08)]
         doors.append(block(d - 0.05, v - 1.1, d + 0.05, v + 1.1, z, z + 2.2))
     return [("concrete", merge(floors)), (band, merge(panels)), ("glass", merge(doors))]
-
-
-def _leaf(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> Mesh:
-    return block(min(x0, x1), y0, max(x0, x1), y1, z0, z1)
 
 
 @site_builder

@@ -18,7 +18,7 @@ from aerialdojo_gen.scenes.grammar import blob, poisson_disc
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
-from aerialdojo_gen.scenes.plans.fields import ScalarField
+from aerialdojo_gen.scenes.plans.model import ScalarField
 from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import crown, cylinder
 from aerialdojo_gen.scenes.site import Site

@@ -10,15 +10,15 @@ import numpy as np
 from pydantic import Field
 from shapely.geometry import Polygon
 
-from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.grammar import Frame, between_gates, plates, slab
 from aerialdojo_gen.scenes.ground import edge_strip, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.buildings import pitched_roof, wall_with_openings
-from aerialdojo_gen.scenes.kit.steelwork import bars, plates, posts
+from aerialdojo_gen.scenes.kit.steelwork import bars, posts
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.plans.values import Box, Material, Number
-from aerialdojo_gen.scenes.shapes import extrude
+from aerialdojo_gen.scenes.shapes import extrude, upright
 from aerialdojo_gen.scenes.site import Site
 
 _Opening = tuple[Number, Number, Number, Number]
@@ -63,12 +63,11 @@ def hall(
         parts.append((base, wall_with_openings(a, b, 0.0, 1.2, low, 0.34)))
         parts.append((wall, wall_with_openings(a, b, 1.2, eaves_m, high, 0.3)))
         parts += _shutters(side, a, openings) + _windows(side, a, length, eaves_m, openings)
-        at = 0.0
-        for u0, u1, sill, _ in sorted(openings):
-            if sill < 0.5:
-                _take(site, a, side, at, u0)
-                at = u1
-        _take(site, a, side, at, length)
+        doors = [(u0, u1) for u0, u1, sill, _ in openings if sill < 0.5]
+        for u0, u1 in between_gates(0.0, length, doors, 0.05):
+            x, y = a
+            area = (x + u0, y - 0.2, x + u1, y + 0.2) if side in "sn" else (x - 0.2, y + u0, x + 0.2, y + u1)
+            site.occupy(rectangle(*area), -1.0, 6.0)
     if name:
         x, y, yaw = {
             "s": ((x0 + x1) / 2, y0 - 0.03, -90.0), "e": (x1 + 0.03, (y0 + y1) / 2, 0.0),
@@ -116,7 +115,7 @@ def shed_on_posts(
     across = [((x, ys[0], z), (x, ys[-1], z)) for x in (xs if x1 - x0 >= y1 - y0 else (xs[0], xs[-1]))]
     along = [((xs[0], y, z), (xs[-1], y, z)) for y in (ys if x1 - x0 < y1 - y0 else (ys[0], ys[-1]))]
     ties = across + along if x1 - x0 >= y1 - y0 else along + across
-    cover = pitched_roof(rectangle(*box), top, rise_m, roof, roof, overhang_m=0.5)[:1]
+    cover = pitched_roof(rectangle(*box), top, rise_m, "", roof, overhang_m=0.5)[:1]
     site.add(None, "shed", [*cover, (post, posts(feet, on, top, 0.24)), (post, bars(ties, 0.22))])
     site.occupy_about(feet, 0.2, on, top)
     return top
@@ -128,19 +127,6 @@ def across_x(points: Sequence[tuple[float, float]], x0: float, x1: float) -> Mes
     return Mesh(body.vertices[:, [2, 0, 1]] + np.array([x0, 0.0, 0.0]), body.faces)
 
 
-def _across_y(points: Sequence[tuple[float, float]], y0: float, y1: float) -> Mesh:
-    body = extrude(Polygon(points), y1 - y0)
-    a, b, c = body.vertices.T
-    return Mesh(np.column_stack([a, y1 - c, b]), body.faces)
-
-
-def _take(site: Site, a: tuple[float, float], side: str, u0: float, u1: float) -> None:
-    if u1 - u0 > 0.05:
-        x, y = a
-        area = (x + u0, y - 0.2, x + u1, y + 0.2) if side in "sn" else (x - 0.2, y + u0, x + 0.2, y + u1)
-        site.occupy(rectangle(*area), -1.0, 6.0)
-
-
 def _shutters(side: str, a: tuple[float, float], openings: Sequence[_Opening]) -> Parts:
     """Frame every gate, and hang a rolled-up shutter in its head."""
     frames, drums = [], []
@@ -148,7 +134,7 @@ def _shutters(side: str, a: tuple[float, float], openings: Sequence[_Opening]) -
         frames += [_along(side, a, u0 - 0.2, u0, 0.24, sill, head), _along(side, a, u1, u1 + 0.2, 0.24, sill, head),
                    _along(side, a, u0 - 0.2, u1 + 0.2, 0.24, head, head + 0.25)]  # fmt: skip
         drums.append(_along(side, a, u0, u1, 0.3, head - 0.35, head))
-    return [("marking_yellow", merge(frames)), ("sheet_metal", merge(drums))] if frames else []
+    return [("marking_yellow", merge(frames)), ("sheet_metal", merge(drums))]
 
 
 def _along(side: str, a: tuple[float, float], u0: float, u1: float, half_m: float, z0: float, z1: float) -> Mesh:
@@ -168,8 +154,7 @@ def _windows(side: str, a: tuple[float, float], length: float, eaves: float, ope
             panes.append(_along(side, a, u0, u1, 0.19, 1.7, eaves - 1.9))
         if k and all(not g0 - 0.4 < k * wide < g1 + 0.4 for g0, g1, _, _ in openings):
             piers.append(_along(side, a, k * wide - 0.2, k * wide + 0.2, 0.3, 0.0, eaves - 0.1))
-    pairs = (("glass:#6f8796", panes), ("concrete:#9d978c", piers))
-    return [(material, merge(bodies)) for material, bodies in pairs if bodies]
+    return [("glass:#6f8796", merge(panes)), ("concrete:#9d978c", merge(piers))]
 
 
 def _saw_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
@@ -201,11 +186,14 @@ def _flat_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
 
 def _gable_roof(box: Box, z: float, wall: str, roof: HallRoof) -> Parts:
     x0, y0, x1, y1 = box
-    sheet = pitched_roof(rectangle(*box), z, roof.rise_m, wall, roof.material, overhang_m=0.5)[:1]
-    across, ends = (across_x, (x0, x1)) if x1 - x0 >= y1 - y0 else (_across_y, (y0, y1))
-    low, high = (y0, y1) if across is across_x else (x0, x1)
+    sheet = pitched_roof(rectangle(*box), z, roof.rise_m, "", roof.material, overhang_m=0.5)[:1]
+    along_x = x1 - x0 >= y1 - y0
+    low, high, start, end = (y0, y1, x0, x1) if along_x else (x0, x1, y0, y1)
     gable = [(low, z), (high, z), ((low + high) / 2, z + roof.rise_m)]
-    walls = [across(gable, u - 0.12, u + 0.12) for u in (ends[0] + _T, ends[1] - _T)]
+    walls = [
+        across_x(gable, u - 0.12, u + 0.12) if along_x else upright([Polygon(gable)], 0.24, u)
+        for u in (start + _T, end - _T)
+    ]
     return [*sheet, (wall, merge(walls))]
 
 
@@ -247,8 +235,7 @@ def warehouse(
         panes = panes[:1] + panes[-1:]
         sign = letters(name, 0.9, (out + 0.02, 0.0, height_m - 1.6), 0.0, 0.08)
         local.append((lettering, sign))
-    if panes:
-        local.append(("window", merge(panes)))
+    local.append(("window", merge(panes)))
     parts += Frame(*middle, facing_deg).parts(local, on)
     site.add(None, category, parts, footprint=plan)
     return top
@@ -269,6 +256,5 @@ def roof_on_columns(site: Site, *, box: Box, height_m: Number, roof: Material, o
         (roof, block(*box, on + height_m, on + height_m + 0.25)),
     ]
     site.add(None, "open_shed", parts)
-    for x, y in posts:
-        site.occupy(rectangle(x - 0.3, y - 0.3, x + 0.3, y + 0.3))
+    site.occupy_about(posts, 0.3, -100.0, 1000.0)
     return on + height_m + 0.25

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
@@ -13,7 +12,7 @@ from pydantic import Field
 from shapely.geometry import LineString, Polygon
 
 from aerialdojo_gen.geometry.portable import power
-from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.grammar import Frame, leg, slab
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.buildings import Roof, pitched_roof, put_up_building
@@ -299,18 +298,17 @@ def crumbling_walls(site: Site, *, walls: list[CrumblingWall], material: Materia
 def _crumbling_wall(site: Site, wall: CrumblingWall, material: str, rng: np.random.Generator) -> None:
     parts: Parts = []
     for (ax, ay), (bx, by) in pairwise(wall.line):
-        length = float(np.hypot(bx - ax, by - ay))
+        length, yaw = leg((ax, ay), (bx, by))
         n = max(int(length / 1.1), 2)
         left = wall.height_m * (1.0 - wall.decay * power(rng.random(n + 1), 1.5))
-        foot = min(site.ground_z(ax + (bx - ax) * t, ay + (by - ay) * t) for t in np.linspace(0, 1, n + 1)) - 0.5
         base = [site.ground_z(ax + (bx - ax) * t, ay + (by - ay) * t) for t in np.linspace(0, 1, n + 1)]
+        foot = min(base) - 0.5
         crest: list[tuple[float, float]] = []
         for k in range(n):
             h = max(base[k], base[k + 1]) + float(left[k]) - foot
             crest += [(length * k / n, h), (length * (k + 0.96) / n, h)]
         outline = [(0.0, 0.0), (length, 0.0), (length, crest[-1][1]), *crest[::-1]]
         body = profile(points=outline, width=wall.thickness_m)
-        yaw = math.degrees(math.atan2(by - ay, bx - ax))
         parts.append((material, posed(body, rotation(0.0, 0.0, yaw), (ax, ay, foot))))
     area = LineString(wall.line).buffer(wall.thickness_m / 2 + 0.2, cap_style="flat")
     site.add(None, "ruin_wall", parts, footprint=area)

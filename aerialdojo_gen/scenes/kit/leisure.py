@@ -135,7 +135,7 @@ def festoons(site: Site, *, poles: list[At], height_m: Number = 4.6, node: str |
         for k, p in enumerate(line[1:-1]):
             bulbs[tones[k % 4]].append(translated(sphere(radius=0.12, subdivisions=0), p - (0, 0, 0.12)))
     parts: Parts = [("iron", merge([*wires, *masts]))]
-    parts += [(tone, merge(many)) for tone, many in bulbs.items() if many]
+    parts += [(tone, merge(many)) for tone, many in bulbs.items()]
     site.add(node, "light_strings", parts)
 
 
@@ -202,9 +202,8 @@ def flume(
         z = float(np.interp(d, distances_along(line[:, :2]), line[:, 2]))
         ground = site.ground_z(p.x, p.y) - 0.2
         if z - ground > 0.4:
-            legs += [block(p.x - 0.14, p.y - 0.14, p.x + 0.14, p.y + 0.14, ground, z + 0.02)]
-    if legs:
-        parts.append((leg, merge(legs)))
+            legs.append(block(p.x - 0.14, p.y - 0.14, p.x + 0.14, p.y + 0.14, ground, z + 0.02))
+    parts.append((leg, merge(legs)))
     site.add(node, "log_flume", parts, {"material": "metal"})
     site.occupy(flat.buffer(free_m))
 

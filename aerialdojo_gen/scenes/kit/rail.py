@@ -16,10 +16,10 @@ from pydantic import Field
 from shapely.geometry import LineString
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.scenes.grammar import Frame, along, slab
+from aerialdojo_gen.scenes.grammar import Frame, along, leg, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Point, block, leg
+from aerialdojo_gen.scenes.kit.structures import Point, block
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import box as cuboid
@@ -67,8 +67,7 @@ def _track(line: Sequence[Point], on: float, clear: Area | None, sleeper: str, r
     for side in (-1, 1):
         run = middle.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
         rails.append(sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)))
-    laid: Parts = [(rail, merge(rails))]
-    return [(sleeper, merge(ties)), *laid] if ties else laid
+    return [(sleeper, merge(ties)), (rail, merge(rails))]
 
 
 @site_builder

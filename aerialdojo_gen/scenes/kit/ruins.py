@@ -15,7 +15,7 @@ import shapely
 from pydantic import Field
 from shapely.geometry import LineString, Point, Polygon
 
-from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.scenes.grammar import Frame, leg, slab
 from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.buildings import wall_with_openings
@@ -92,15 +92,12 @@ def broken_arcade(
     """
     base = site.ground_z(*at)
     top = base + height_m
-    parts: Parts = []
-    roof = torn_floor(plan, top, [replace(hole, z0_m=-99.0)], 0.45)
-    if roof is not None:
-        parts.append((material, roof))
-    parts.append((material, columns(posts, base - 0.6, top - 0.4, 0.36, 10)))
-    if stubs:
-        rest = [columns([(x, y)], base - 0.6, base + h, 0.36, 10) for x, y, h in stubs]
-        parts.append((material, merge(rest)))
-    site.add(node, "arcade", parts)
+    bodies = [
+        torn_floor(plan, top, [replace(hole, z0_m=-99.0)], 0.45),
+        columns(posts, base - 0.6, top - 0.4, 0.36, 10),
+    ]
+    bodies += [columns([(x, y)], base - 0.6, base + h, 0.36, 10) for x, y, h in stubs]
+    site.add(node, "arcade", [(material, merge(bodies))])
     for x, y in [*posts, *((x, y) for x, y, _ in stubs)]:
         site.occupy(disc(x, y, 0.5, 8), -100.0, top - 0.3)
     return top
@@ -148,16 +145,14 @@ def _shell(wreck: Wreck, rng: np.random.Generator) -> Parts:
     style, parts = wreck.style, []
     top = wreck.height_m + (0.0 if wreck.ridge_m else _PARAPET_M)
     for side, (a, b) in enumerate(_edges(wreck)):
-        length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-        half = style.wall_m / 2
+        (length, _), half = leg(a, b), style.wall_m / 2
         # Front and back run over the corners; the ends stand between them, so that nothing overlaps.
         out = half if side % 2 == 0 else -half
         outline = [(-out, -_FOOT_M), (length + out, -_FOOT_M), (length + out, top), (-out, top)]
         if side % 2 and wreck.ridge_m:
             outline.insert(3, (length / 2, top + wreck.ridge_m * (1.0 - 2 * half / length)))
         openings = _openings(wreck, length, side)
-        wall = torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)
-        parts += [(style.wall, body) for body in wall]
+        parts.append((style.wall, torn_wall(a, b, Polygon(outline), wreck.bites, rng, openings, style.wall_m)))
         parts += _windows(wreck, a, b, openings, rng)
     return parts
 
@@ -185,8 +180,7 @@ def _windows(
     wreck: Wreck, a: XY, b: XY, openings: Sequence[tuple[float, float, float, float]], rng: np.random.Generator
 ) -> Parts:
     style = wreck.style
-    length = float(np.hypot(b[0] - a[0], b[1] - a[1]))
-    along = (np.array(b) - a) / length
+    along = (np.array(b) - a) / leg(a, b)[0]
     out = np.array([along[1], -along[0]])
     turn = rotation(0.0, 0.0, math.degrees(math.atan2(along[1], along[0])))
     panes, trims, plumes = [], [], []
@@ -207,8 +201,7 @@ def _windows(
             face = at + out * (style.wall_m / 2 + 0.012)
             plume = box(size=[w * 1.05, 0.02, 0.9 + w * 0.3], taper=(0.55, 1.0))
             plumes.append(posed(plume, turn, (*face, head + 0.01)))
-    found = (("window", panes), (style.band, trims), ("#2a2827", plumes))
-    return [(m, merge(bodies)) for m, bodies in found if bodies]
+    return [("window", merge(panes)), (style.band, merge(trims)), ("#2a2827", merge(plumes))]
 
 
 def _floors(wreck: Wreck, rng: np.random.Generator) -> Parts:
@@ -219,23 +212,19 @@ def _floors(wreck: Wreck, rng: np.random.Generator) -> Parts:
     for k in range(last + 1):
         z = k * style.storey_m
         body = torn_floor(inner, z, wreck.bites if k else [])
-        if body is None:
+        if not len(body.faces):
             continue
         parts.append((style.floor, body))
         cover = torn_floor(inner.buffer(-0.05), z + 0.03, wreck.bites if k else [], 0.03)
         finish = (style.roof if not wreck.ridge_m else style.floor) if k == wreck.storeys else style.inner[k % 4]
-        if cover is not None and k:
+        if k:
             parts.append((finish, cover))
         for n, (at, yaw) in enumerate(broken_edge(inner, z, wreck.bites) if k else ()):
             if style.columns or n % 2:
                 steel.append(bars(at, z - 0.12, yaw, rng))
             if n % 7 == 3:
                 plates.append(hanging_slab(at, z - 0.02, yaw + float(rng.uniform(-15, 15)), rng))
-    if steel:
-        parts.append(("rust" if style.columns else "wood", merge(steel)))
-    if plates:
-        parts.append((style.floor, merge(plates)))
-    return parts
+    return [*parts, ("rust" if style.columns else "wood", merge(steel)), (style.floor, merge(plates))]
 
 
 def _partitions(wreck: Wreck, rng: np.random.Generator) -> Parts:
@@ -248,10 +237,10 @@ def _partitions(wreck: Wreck, rng: np.random.Generator) -> Parts:
             z1 += 0.25
         for k in range(1, count):
             x = -wreck.length_m / 2 + k * wreck.length_m / count
-            face = Polygon([(0, z0), (2 * y, z0), (2 * y, z1), (0, z1)])
+            face = rectangle(0, z0, 2 * y, z1)
             u = y * (0.6 + 0.8 * ((storey + k) % 2))
             wall = torn_wall((x, -y), (x, y), face, wreck.bites, rng, [(u, u + 1.3, z0 + 0.02, z0 + 2.2)], 0.16)
-            parts += [(style.inner[(storey + k) % len(style.inner)], body) for body in wall]
+            parts.append((style.inner[(storey + k) % len(style.inner)], wall))
     return parts
 
 
@@ -267,7 +256,7 @@ def _columns(wreck: Wreck) -> Parts:
                 # A column stands while the floor that it carries does.
                 if wreck.bears(float(x), float(y), k + 1, 0.02):
                     bodies.append(block(x - 0.2, y - 0.2, x + 0.2, y + 0.2, z - 0.02, z + style.storey_m - 0.24))
-    return [(style.floor, merge(bodies))] if bodies else []
+    return [(style.floor, merge(bodies))]
 
 
 def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
@@ -292,8 +281,7 @@ def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
                 slope = rotation(math.degrees(math.atan2(rise, y)), 0.0, 0.0 if side < 0 else 180.0)
                 beam = rotated(translated(beam, (0, length / 2, 0)), slope)
                 rafters.append(translated(beam, (float(u), side * (y - 0.15), wreck.height_m - 0.1)))
-    found = ((style.roof, covers), ("wood", rafters))
-    return [(m, merge(bodies)) for m, bodies in found if bodies]
+    return [(style.roof, merge(covers)), ("wood", merge(rafters))]
 
 
 def _balconies(wreck: Wreck, rng: np.random.Generator) -> Parts:
@@ -310,7 +298,7 @@ def _balconies(wreck: Wreck, rng: np.random.Generator) -> Parts:
             floors.append(block(x - 1.5, y - 1.3, x + 1.5, y, z - 0.2, z))
             panels.append(block(x - 1.5, y - 1.3, x + 1.5, y - 1.22, z, z + 0.95))
             panels += [block(u, y - 1.22, u + 0.07, y, z, z + 0.95) for u in (x - 1.5, x + 1.43)]
-    return [("concrete", merge(floors)), (style.band, merge(panels))] if floors else []
+    return [("concrete", merge(floors)), (style.band, merge(panels))]
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,11 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from aerialdojo_gen.scenes.grammar import Frame, Pose, slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, Pose, plates
+from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.steelwork import plates
 from aerialdojo_gen.scenes.kit.structures import block, letters
-from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, translated
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Material, Number
 from aerialdojo_gen.scenes.shapes import box, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -60,10 +59,7 @@ class Tier:
 
     def band(self, row: int) -> BaseGeometry:
         """Plan of a row, without the portals that cut it."""
-        area = self.edge(row + 1).difference(self.edge(row))
-        if self.region is not None:
-            area = area.intersection(self.region)
-        return area
+        return self.within(self.edge(row + 1).difference(self.edge(row)))
 
     def is_cut(self, row: int) -> bool:
         """Whether portals cut a row."""
@@ -72,7 +68,10 @@ class Tier:
     @property
     def plan(self) -> BaseGeometry:
         """Ground under all rows."""
-        area = self.edge(self.rows).difference(self.edge(0))
+        return self.within(self.edge(self.rows).difference(self.edge(0)))
+
+    def within(self, area: BaseGeometry) -> BaseGeometry:
+        """What of an area is built: that in the region."""
         return area if self.region is None else area.intersection(self.region)
 
 
@@ -150,17 +149,15 @@ def tier_parts(
         area, top = tier.band(row), tier.level_m(row)
         if tier.is_cut(row):
             cheeks = unary_union([p.buffer(0.22, join_style="mitre") for p in tier.portals]).difference(holes)
-            bodies += [slab(p, tier.foot_m, top + 0.8) for p in polygons_of(area.intersection(cheeks))]
+            bodies.append(plates(area.intersection(cheeks), tier.foot_m, top + 0.8))
             area = area.difference(holes)
         elif row and tier.is_cut(row - 1):
             lip = tier.edge(row + 0.25).difference(tier.edge(row)).intersection(holes)
-            bodies += [slab(p, top - 0.2, top + 0.9) for p in polygons_of(lip.intersection(area))]
-        bodies += [slab(p, top - tier.riser_m - 0.22, top) for p in polygons_of(area)]
-    front = tier.edge(0.0).difference(tier.core.buffer(tier.front_m - 0.22, quad_segs=QUARTER))
-    if tier.region is not None:
-        front = front.intersection(tier.region)
-    walls = [slab(p, tier.foot_m, tier.z_m + _PARAPET_M) for p in polygons_of(front.difference(holes))]
-    parts: Parts = [(concrete, merge(bodies)), (step, merge([*walls, *_half_steps(tier, feet, holes)]))]
+            bodies.append(plates(lip.intersection(area), top - 0.2, top + 0.9))
+        bodies.append(plates(area, top - tier.riser_m - 0.22, top))
+    front = tier.within(tier.edge(0.0).difference(tier.core.buffer(tier.front_m - 0.22, quad_segs=QUARTER)))
+    walls = plates(front.difference(holes), tier.foot_m, tier.z_m + _PARAPET_M)
+    parts: Parts = [(concrete, merge(bodies)), (step, merge([walls, *_half_steps(tier, feet, holes)]))]
     return parts + _seats(tier, feet, holes, seat, Polygon() if clear is None else clear)
 
 
@@ -173,8 +170,9 @@ def _half_steps(tier: Tier, feet: Sequence[Pose], holes: BaseGeometry) -> list[M
             if tier.is_cut(row) and shapely.contains_xy(holes.buffer(AISLE_M / 2), *at):
                 continue
             tread = box(size=(tier.tread_m / 2, AISLE_M, tier.riser_m / 2))
-            out.append(frame.parts([("", translated(tread, ((row + 0.75) * tier.tread_m, 0, 0)))], tier.level_m(row)))
-    return [m for parts in out for _, m in parts]
+            step = translated(tread, ((row + 0.75) * tier.tread_m, 0, 0))
+            out.append(posed(step, rotation(0.0, 0.0, frame.yaw_deg), (frame.x, frame.y, tier.level_m(row))))
+    return out
 
 
 def _seats(
@@ -221,11 +219,8 @@ def _copies(body: Mesh, where: np.ndarray) -> Mesh:
 @part_builder
 def stand_ends(*, tier: Tier, strips: Areas, material: Material) -> Parts:
     """Close a tier's ends: stepped walls in strips across its rows, up to a handrail's height over each."""
-    bodies = []
-    for strip in strips:
-        for row in range(tier.rows):
-            area = tier.band(row).intersection(strip)
-            bodies += [slab(p, tier.foot_m, tier.level_m(row) + 0.8) for p in polygons_of(area)]
+    rows = range(tier.rows)
+    bodies = [plates(tier.band(k).intersection(s), tier.foot_m, tier.level_m(k) + 0.8) for s in strips for k in rows]
     return [(material, merge(bodies))]
 
 
@@ -240,16 +235,14 @@ def stand_back_wall(
     """
     passages = [passage(Pose(*gate), gate_m[0], 3.0) for gate in gates]
     back = tier.edge(tier.rows)
-    ring = back.buffer(thickness_m, join_style="mitre").difference(back)
-    cornice = back.buffer(thickness_m + 0.2, join_style="mitre").difference(back)
+    ring = tier.within(back.buffer(thickness_m, join_style="mitre").difference(back))
+    cornice = tier.within(back.buffer(thickness_m + 0.2, join_style="mitre").difference(back))
     openings = unary_union(passages)
-    if tier.region is not None:
-        ring, cornice = ring.intersection(tier.region), cornice.intersection(tier.region)
-    walls = [slab(p, tier.foot_m, top_m) for p in polygons_of(ring.difference(openings))]
-    walls += [slab(p, tier.foot_m + gate_m[1], top_m) for p in polygons_of(ring.intersection(openings))]
+    walls = [plates(ring.difference(openings), tier.foot_m, top_m),
+             plates(ring.intersection(openings), tier.foot_m + gate_m[1], top_m)]  # fmt: skip
     frames = unary_union([g.buffer(0.25, join_style="mitre").difference(g) for g in passages]).intersection(cornice)
-    trims = [slab(p, top_m - 0.45, top_m + 0.12) for p in polygons_of(cornice)]
-    trims += [slab(p, tier.foot_m, tier.foot_m + gate_m[1]) for p in polygons_of(frames.difference(openings))]
+    trims = [plates(cornice, top_m - 0.45, top_m + 0.12),
+             plates(frames.difference(openings), tier.foot_m, tier.foot_m + gate_m[1])]  # fmt: skip
     return [(wall, merge(walls)), (band, merge(trims))]
 
 
@@ -257,10 +250,8 @@ def stand_back_wall(
 def stand_walkway(*, tier: Tier, depth_m: Number, thickness_m: Number = 0.35, material: Material) -> Parts:
     """Lay a level walkway before a tier's front edge, at the height of its foot."""
     before = tier.core.buffer(tier.front_m - depth_m, quad_segs=QUARTER)
-    area = tier.edge(0).difference(before)
-    if tier.region is not None:
-        area = area.intersection(tier.region)
-    return [(material, slab(p, tier.foot_m - thickness_m, tier.foot_m)) for p in polygons_of(area)]
+    area = tier.within(tier.edge(0).difference(before))
+    return [(material, plates(area, tier.foot_m - thickness_m, tier.foot_m))]
 
 
 @part_builder
@@ -269,8 +260,7 @@ def stand_platforms(*, areas: Areas, z: tuple[Number, Number], floor: Material, 
     parts: Parts = []
     for area in areas:
         inner = area.buffer(-0.12, join_style="mitre")
-        rims = [slab(p, z[1], z[1] + 0.12) for p in polygons_of(area.difference(inner))]
-        parts += [(floor, plates(area, *z)), (rim, merge(rims))]
+        parts += [(floor, plates(area, *z)), (rim, plates(area.difference(inner), z[1], z[1] + 0.12))]
     return parts
 
 

@@ -11,10 +11,10 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar import Frame, slab
-from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, leg, plates
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle, without
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Point, block, leg, rail_legs, stairs
+from aerialdojo_gen.scenes.kit.structures import Point, block, rail_legs, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number, Point3
 from aerialdojo_gen.scenes.shapes import box, lathe, sweep
@@ -100,16 +100,13 @@ def guard_rails(
                 steel.append(posed(box(size=[length, 0.06, 0.06]), turn, (*middle, z_m + level)))
             boards.append(posed(box(size=[length, 0.04, 0.2]), turn, (*middle, z_m)))
             steel += [translated(box(size=[0.07, 0.07, 1.1]), (*spot, z_m)) for spot in spots]
-    parts: Parts = [(material, merge(steel))] if steel else []
-    return [*parts, (toe, merge(boards))] if toe is not None and boards else parts
+    parts: Parts = [(material, merge(steel))]
+    return parts if toe is None else [*parts, (toe, merge(boards))]
 
 
 def rim(plan: BaseGeometry, gaps: Sequence[BaseGeometry] = (), inset_m: float = 0.15) -> BaseGeometry:
     """Give the lines along a floor's edges, a little inside of them, without what lies in the gaps."""
-    lines: BaseGeometry = plan.buffer(-inset_m, join_style="mitre").boundary
-    for gap in gaps:
-        lines = lines.difference(gap)
-    return lines
+    return without(plan.buffer(-inset_m, join_style="mitre").boundary, gaps)
 
 
 def posts(points: Sequence[tuple[float, float]], z0: float, z1: float, width_m: float) -> Mesh:
@@ -134,11 +131,6 @@ def trestle(x: float, y: float, z0: float, z1: float, half_m: float, width_m: fl
             lines.append(((*a, low), (*b, high)) if k % 2 else ((*b, low), (*a, high)))
             lines.append(((*a, high - 0.1), (*b, high - 0.1)))
     return bars(lines, width_m)
-
-
-def plates(area: BaseGeometry, z0: float, z1: float) -> Mesh:
-    """Extrude every polygon of an area between two heights, metres."""
-    return merge([slab(p, z0, z1) for p in polygons_of(area)])
 
 
 # Of the pipes: to the left of the middle, above the bearing, radius

@@ -19,8 +19,7 @@ from shapely.ops import substring
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.ground import Surface, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.street_decks import Bridge, Deck, deck, put_up_bridge
-from aerialdojo_gen.scenes.kit.streets import KERB_M, MARK_M, drive
+from aerialdojo_gen.scenes.kit.streets import KERB_M, MARK_M, Bridge, Deck, deck, drive, put_up_bridge
 from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 

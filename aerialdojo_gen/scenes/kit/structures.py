@@ -5,7 +5,6 @@ Every function returns meshes in world coordinates with their materials, to be g
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated
@@ -15,8 +14,8 @@ from pydantic import Field
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from aerialdojo_gen.scenes.grammar import Frame, slab
-from aerialdojo_gen.scenes.ground import edge_strip, polygons_of, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, leg, plates, slab
+from aerialdojo_gen.scenes.ground import edge_strip, rectangle, without
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number
@@ -26,12 +25,6 @@ from aerialdojo_gen.scenes.vocabulary import text
 
 Point = tuple[float, float]
 _Spacing = Annotated[Number, Field(ge=0.5)]
-
-
-def leg(a: Point, b: Point) -> tuple[float, float]:
-    """Give the length of a leg, metres, and its direction, degrees."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    return float(np.hypot(dx, dy)), math.degrees(math.atan2(dy, dx))
 
 
 def rail_legs(path: Sequence[Point], spacing_m: float) -> Iterator[tuple[float, np.ndarray, Point, list[Point]]]:
@@ -44,8 +37,8 @@ def rail_legs(path: Sequence[Point], spacing_m: float) -> Iterator[tuple[float, 
 
 
 def block(x0: float, y0: float, x1: float, y1: float, z0: float, z1: float) -> Mesh:
-    """Make an axis-parallel block between two corners, metres."""
-    return slab(rectangle(x0, y0, x1, y1), z0, z1)
+    """Make an axis-parallel block between two corners, metres; x in either order."""
+    return slab(rectangle(min(x0, x1), y0, max(x0, x1), y1), z0, z1)
 
 
 def columns(points: Sequence[Point], z0: float, z1: float, radius_m: float = 0.25, segments: int = 8) -> Mesh:
@@ -73,8 +66,9 @@ def railing(
     posts, panes, rails = [], [], []
     for length, turn, middle, spots in rail_legs(path, 2.0):
         if pane is None:
-            bars = [posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)]
-            rails += bars
+            rails += [
+                posed(box(size=[length, 0.03, 0.03]), turn, (*middle, z_m + s * height_m)) for s in (0.33, 0.67)
+            ]
         else:
             panes.append(posed(box(size=[length, 0.04, height_m - 0.25]), turn, (*middle, z_m + 0.12)))
         rails.append(posed(box(size=[length + 0.08, 0.1, 0.08]), turn, (*middle, z_m + height_m)))
@@ -163,10 +157,7 @@ def ramp(a: Point, b: Point, z0_m: float, z1_m: float, width_m: float, *, floor:
 
 def parapet(plan: BaseGeometry, z_m: float, height_m: float = 1.0, gaps: Sequence[BaseGeometry] = ()) -> Mesh:
     """Make a low wall along a plan's edge on a floor at `z_m`, open where it meets `gaps`."""
-    band = edge_strip(plan, 0.2)
-    for gap in gaps:
-        band = band.difference(gap)
-    return merge([slab(p, z_m, z_m + height_m) for p in getattr(band, "geoms", [band]) if p.area > 1e-6])
+    return plates(without(edge_strip(plan, 0.2), gaps), z_m, z_m + height_m)
 
 
 @part_builder
@@ -208,4 +199,4 @@ def _in_rows(rows: Sequence[Sequence[Point]], spacing_m: float) -> list[Point]:
 @part_builder
 def area_slab(area: Areas, z: tuple[Number, Number], role: Material) -> Parts:
     """Extrude an area, or several, between two heights: a deck, a hull, walls around a yard, panes of a front."""
-    return [(role, slab(piece, *z)) for one in area for piece in polygons_of(one)]
+    return [(role, plates(one, *z)) for one in area]

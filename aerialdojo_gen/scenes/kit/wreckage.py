@@ -19,8 +19,8 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.rng import generator
-from aerialdojo_gen.scenes.grammar import Frame, slab
-from aerialdojo_gen.scenes.ground import polygons_of, rectangle
+from aerialdojo_gen.scenes.grammar import Frame, leg, slab
+from aerialdojo_gen.scenes.ground import polygons_of, rectangle, without
 from aerialdojo_gen.scenes.kit.buildings import opened
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.plans.values import Material, Number
@@ -95,35 +95,28 @@ def _wave(seed: int) -> Floats:
 def torn_wall(
     a: XY, b: XY, face: BaseGeometry, bites: Sequence[Bite], rng: np.random.Generator,
     openings: Sequence[tuple[float, float, float, float]] = (), thickness_m: float = 0.28,
-) -> list[Mesh]:  # fmt: skip
-    """Make what is left of an upright wall: one mesh, or none where nothing stands.
+) -> Mesh:  # fmt: skip
+    """Make what is left of an upright wall: a mesh without a face where nothing stands.
 
     `a` and `b` are the ends of its middle line, `face` is the whole wall as (along, up) in metres, openings are
     (from, to, sill, head).
     """
     top = face.bounds[3]
-    face = opened(face, openings)
-    for bite in bites:
-        face = face.difference(bite.tear(a, b, top, rng))
-    yaw = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    face = without(opened(face, openings), [bite.tear(a, b, top, rng) for bite in bites])
     # Tears and openings that all but touch leave slivers that cannot be triangulated.
     pieces = [p for p in polygons_of(shapely.set_precision(face, _GRID_M)) if p.area >= _CRUMB_M2]
-    turn = rotation(0.0, 0.0, yaw)
-    return [posed(upright(pieces, thickness_m), turn, (*a, 0.0))] if pieces else []
+    return posed(upright(pieces, thickness_m), rotation(0.0, 0.0, leg(a, b)[1]), (*a, 0.0))
 
 
-def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh | None:
-    """Make what is left of a floor whose top lies at `top_m`; None where nothing is."""
+def torn_floor(plan: Polygon, top_m: float, bites: Sequence[Bite], thickness_m: float = 0.25) -> Mesh:
+    """Make what is left of a floor whose top lies at `top_m`."""
     pieces = [p for p in polygons_of(remains(plan, top_m, bites)) if p.area > 1.0]
-    return merge([slab(p, top_m - thickness_m, top_m) for p in pieces]) if pieces else None
+    return merge([slab(p, top_m - thickness_m, top_m) for p in pieces])
 
 
 def remains(plan: Polygon, z_m: float, bites: Sequence[Bite]) -> BaseGeometry:
     """Work out what of a plan is left at a height."""
-    left: BaseGeometry = plan
-    for bite in bites:
-        left = left.difference(bite.area(z_m))
-    return left
+    return without(plan, [bite.area(z_m) for bite in bites])
 
 
 def broken_edge(plan: Polygon, z_m: float, bites: Sequence[Bite]) -> list[tuple[XY, float]]:

@@ -44,7 +44,7 @@ class PlanNames:
     heights: dict[str, float] = field(default_factory=dict)  # Metres
     lines: dict[str, list[Point]] = field(default_factory=dict)
     areas: dict[str, BaseGeometry] = field(default_factory=dict)
-    fields: Mapping[str, Any] = field(default_factory=dict)  # As given, see `plans.fields`
+    fields: Mapping[str, Any] = field(default_factory=dict)  # As given, see `plans.model`
     make_parts: Callable[[list[Any]], Parts] = list  # Set by what builds the plan
 
     def number(self, value: Any) -> float:
