@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.affinity import rotate, translate
-from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
@@ -180,14 +180,13 @@ class Site:
         return bool(self.extent.contains(area)) and self._footprints.is_free(area, low, high)
 
     def _reserve(self, thing: Placement, instance: Instance) -> None:
+        low, high = instance.bounds[:, 2]
         if thing.clear_m:
             self.occupy(disc(thing.x, thing.y, thing.clear_m))
         if thing.margin_m:
-            (x0, y0, _), (x1, y1, z1) = instance.bounds
-            corners = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-            self.occupy(corners.buffer(thing.margin_m, quad_segs=2), -_BELOW_M, float(z1) + 8.0)
+            around = rectangle(*instance.bounds[:, :2].ravel()).buffer(thing.margin_m, quad_segs=2)
+            self.occupy(around, -_BELOW_M, float(high) + 8.0)
         if thing.room_m:
-            low, high = instance.bounds[:, 2]
             variant = instance.variant or None
             outline = self.outline_of(thing.category, variant, (thing.x, thing.y), thing.yaw_deg)
             self.occupy(outline.buffer(thing.room_m, quad_segs=2), float(low) - 1.0, float(high) + 6.0)

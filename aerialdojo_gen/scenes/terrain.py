@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError, check_regular
@@ -99,10 +99,6 @@ class Terrain:
         target = np.interp(at, s, profile).reshape(self.heights_m.shape)
         return self._sloped(target, self.distance(line.buffer(width_m / 2)), blend_m)
 
-    def lowered(self, area: BaseGeometry, depth_m: float, blend_m: float) -> Terrain:
-        """Sink an area by `depth_m`, with slopes of `blend_m` inside its border: a bed of water, a crater."""
-        return self.raised(-depth_m * smooth(self.inside(area) / blend_m))
-
     def raised(self, by_m: Floats) -> Terrain:
         """Add to the heights of the corners, given in rows or as `corners` lists them."""
         return replace(self, heights_m=self.heights_m + by_m.reshape(self.heights_m.shape))
@@ -171,14 +167,9 @@ def level_terrain(size_m: tuple[float, float], cell_m: float) -> Terrain:
     return Terrain(-size_m[0] / 2, -size_m[1] / 2, cell, np.zeros((rows + 1, columns + 1)))
 
 
-def flat_terrain(size_m: tuple[float, float], z_m: float = 0.0) -> Terrain:
+def flat_terrain(size_m: tuple[float, float]) -> Terrain:
     """Make level ground about the origin, of one cell."""
-    return Terrain(-size_m[0] / 2, -size_m[1] / 2, max(size_m), np.full((2, 2), z_m))
-
-
-def mound(terrain: Terrain, centre: tuple[float, float], radius_m: float, height_m: float) -> Terrain:
-    """Raise a round hill, or sink a hollow where `height_m` is negative."""
-    return terrain.raised(height_m * smooth(1.0 - terrain.distance(Point(centre)) / radius_m))
+    return level_terrain(size_m, max(size_m))
 
 
 def smooth(t: Floats) -> Floats:

@@ -5,17 +5,14 @@ from functools import partial
 import numpy as np
 import pytest
 import shapely
-from shapely.geometry import Polygon
-from support.layout_checks import blank_site, clashes, each_scene, floating, props_of
+from support.layout_checks import blank_site, clashes, each_scene, floating
 
 from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import rectangle
-from aerialdojo_gen.scenes.kit.landforms import level_area
-from aerialdojo_gen.scenes.kit.rubble import crater, fault, heap, rises, slab_pile, strew_things
-from aerialdojo_gen.scenes.kit.ruins import Shored, broken_arcade, damaged_building, put_up, raking_shores
+from aerialdojo_gen.scenes.kit.rubble import slab_pile, strew_things
+from aerialdojo_gen.scenes.kit.ruins import put_up
 from aerialdojo_gen.scenes.kit.wreckage import Bite, Style, Wreck, broken_edge, torn_floor, torn_wall
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 blank = partial(blank_site, "D_T_0")
 BITE = Bite(0.0, -4.0, 2.0, 4.0, seed=3)
@@ -68,37 +65,6 @@ def test_a_floor_bears_nothing_where_it_is_gone():
     assert not wreck.bears(0.0, -4.0, 2)
 
 
-def test_an_arcade_stands_on_its_posts_and_shores_reach_a_leaning_front():
-    site = blank()
-    posts = [(x, y) for x in (-3.0, 3.0) for y in (-8.0, 0.0, 8.0)]
-    roof = broken_arcade(
-        site, node="arcade", plan=rectangle(-3.5, -9.0, 3.5, 9.0), at=(0.0, 0.0), height_m=4.0, hole=Bite(3, 8, 2, 3),
-        posts=posts, material="stone", stubs=[(3.0, 5.0, 1.0)],
-    )  # fmt: skip
-    base = damaged_building(
-        site, node="house", at=(15.0, 0.0), yaw_deg=90.0, size_m=(12.0, 8.0), storeys=3, style=Style(), lean_deg=6.0,
-        sunk_m=0.5,
-    )  # fmt: skip
-    raking_shores(site, node="shores", fronts=[Shored((15.0, 0.0), 8.0, [-3.0, 0.0, 3.0], 90.0, leans=True)])
-    arcade, _, shores = site.instances
-    assert roof == pytest.approx(site.ground_z(0.0, 0.0) + 4.0)
-    assert base == pytest.approx(site.ground_z(15.0, 0.0) - 0.5)
-    assert arcade.bounds[1, 2] == pytest.approx(roof)
-    assert shores.bounds[0, 0] > 15.0
-    assert shores.bounds[1, 2] == pytest.approx(site.ground_z(15.0, 0.0) + 5.4, abs=0.2)
-    assert not site.is_free(3.0, 5.0, 0.2)
-    assert not floating(site.scene())
-
-
-def test_a_terrace_is_levelled_above_a_point_of_the_old_ground():
-    site = blank()
-    ground = rises(site, rolling_terrain((60.0, 60.0), 1.0, 1, 0.0, 20.0), [(-30.0, 30.0, 6.0)], "y")
-    high = float(ground.z(0.0, 10.0)) + 0.7
-    areas = [rectangle(-10, 5, -4, 12), rectangle(4, 5, 10, 12)]
-    level = level_area(site, ground, area=areas, above=(0.0, 10.0, 0.7), blend_m=2.0)
-    assert level.z([-7.0, 7.0], [8.0, 8.0]) == pytest.approx(high)
-
-
 def test_things_are_strewn_where_there_is_room():
     site = blank()
     site.place(Placement("bench", 0.0, 0.0))
@@ -116,27 +82,6 @@ def test_the_top_of_a_pile_is_level_and_free():
     assert not floating(site.scene())
 
 
-def test_the_ground_sinks_right_of_a_fault():
-    ground = fault(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), [(-30.0, 0.0), (30.0, 0.0)], 1.5, 1.0)
-    assert float(ground.z(3.0, 5.0)) == pytest.approx(0.0)
-    assert float(ground.z(3.0, -5.0)) == pytest.approx(-1.5)
-
-
-def test_craters_have_a_bowl_and_a_rim():
-    ground = crater(blank(), rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0), (0.0, 0.0), 6.0, 3.0, 1.0)
-    assert float(ground.z(0.0, 0.0)) == pytest.approx(-3.0)
-    ring = [float(ground.z(r, 0.0)) for r in np.arange(0.0, 20.0, 0.5)]
-    assert max(ring) > 0.6
-    assert ring[-1] == pytest.approx(0.0)
-
-
-def test_heaps_rise_inside_their_area_only():
-    area = Polygon([(-5, -5), (5, -5), (5, 5), (-5, 5)])
-    ground = heap(blank(), rolling_terrain((40, 40), 1.0, 1, 0.0, 20.0), area, 2.0, 3)
-    assert float(ground.z(0.0, 0.0)) > 1.0
-    assert float(ground.z(8.0, 0.0)) == pytest.approx(0.0)
-
-
 of_each_scene = each_scene(["D_Flood_0", "D_Flood_1"])
 
 
@@ -148,15 +93,6 @@ def test_the_water_stands_up_to_the_windows(scene_of, name):
         glass = np.concatenate([p.vertices[:, 2] for p in house.parts if p.material == "window"])
         assert house.bounds[0, 2] < -1.0
         assert -0.3 < glass.min() < 0.3
-
-
-@of_each_scene
-def test_what_is_half_under_shows_more_than_half(scene_of, name):
-    for prop in props_of(scene_of(name)):
-        if prop.attributes.get("place", "").startswith("half under"):
-            low, high = prop.bounds[:, 2]
-            assert low < -0.5
-            assert low + high > 0.0
 
 
 @of_each_scene

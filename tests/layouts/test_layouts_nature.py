@@ -19,24 +19,10 @@ from support.layout_checks import (
 )
 from support.maps import ground_z
 
-from aerialdojo_gen.scenes.expressions import eased
 from aerialdojo_gen.scenes.grammar import blob, ragged_outline
-from aerialdojo_gen.scenes.kit.ground_cover import steep_area
-from aerialdojo_gen.scenes.kit.huts import MudbrickHouse, mudbrick_houses
-from aerialdojo_gen.scenes.kit.landforms import (
-    banks_beside,
-    dunes,
-    ground_by_formula,
-    inland_m,
-    moguls,
-    profile_slope,
-    stepped_valley,
-)
-from aerialdojo_gen.scenes.kit.mountains import Ridge, Rock, high_ground, layered_rocks, massif, steep_ground
-from aerialdojo_gen.scenes.kit.quays import groynes, pier, sea_wall
-from aerialdojo_gen.scenes.kit.structures import flights
+from aerialdojo_gen.scenes.kit.quays import pier
 from aerialdojo_gen.scenes.model import Instance, Scene
-from aerialdojo_gen.scenes.terrain import flat_terrain, rolling_terrain
+from aerialdojo_gen.scenes.terrain import rolling_terrain
 
 DOWN = (0.0, 0.0, -1.0)
 _ELSEWHERE = {"in the wood", "beside a path", "beside the stream"}
@@ -115,22 +101,6 @@ def test_the_summit_is_reached_on_foot_and_crowned(scene_of, name):
     assert "summit_cross" not in catalogue().targets
 
 
-def test_mountains_rise_to_their_crests_and_show_rock_where_they_are_steep():
-    site = blank_site("N_T_0", seed=3)
-    ridge = Ridge([(0.0, 10.0, 20.0)], 25.0, hollow=1.0)
-    flat = flat_terrain((60, 60))
-    plain = massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=0.0, rough_m=0.0)
-    assert float(plain.z(0.0, 10.0)) == pytest.approx(20.0, abs=1.5)
-    assert float(plain.z(-29.0, -29.0)) == pytest.approx(0.0, abs=1e-9)
-    site.set_ground(plain)
-    faces, top = steep_ground(site, slope=1.2), high_ground(site, above_m=17.0, slope=2.0)
-    assert shapely.contains_xy(top, 0.0, 10.0)
-    assert not shapely.contains_xy(top, 0.0, -10.0)
-    assert high_ground(site, above_m=50.0, slope=2.0).is_empty
-    site.set_ground(massif(site, flat, ridges=[ridge], cell_m=1.5, bench_m=4.0, rough_m=0.0))
-    assert faces.area < 0.1 * steep_ground(site, slope=1.2).area
-
-
 blank = partial(blank_site, "N_T_0", seed=3)
 FLAT = rolling_terrain((60, 60), 1.0, 1, 0.0, 20.0)
 
@@ -143,43 +113,6 @@ def test_things_keep_clear_of_rocks_and_houses(scene_of, name):
         for i, hull in hulls:
             if prop.bounds[0, 2] < i.bounds[1, 2] - 0.5 and prop.bounds[1, 2] > i.bounds[0, 2] + 1.0:
                 assert not hull.buffer(-0.3).contains(shapely.Point(prop.centroid[:2])), (prop.node, i.node)
-
-
-def test_dunes_are_steeper_in_the_lee():
-    ground = dunes(blank(80.0), FLAT, cell_m=1.0, height_m=5.0, wavelength_m=24.0, wind_deg=0.0)
-    slope = np.diff(ground.heights_m, axis=1)
-    assert np.ptp(ground.heights_m) > 4.0
-    assert -np.quantile(slope, 0.02) > 1.3 * np.quantile(slope, 0.98)
-    assert (slope > 0).mean() > 0.55
-
-
-def test_a_valley_climbs_from_its_bed():
-    bed, steps = [(-30.0, 0.0), (30.0, 0.0)], [(4.0, 6.0, 2.0), (12.0, 16.0, 3.0)]
-    ground = stepped_valley(blank(), FLAT, cell_m=1.0, bed=bed, steps=steps, roughness_m=0.3)
-    middle, banks, rim = (float(np.mean(ground.z(np.linspace(-25, 25, 50), np.full(50, y)))) for y in (0, 10, 26))
-    assert banks - middle == pytest.approx(2.0, abs=0.5)
-    assert rim - banks == pytest.approx(3.0, abs=0.5)
-
-
-def test_snow_is_banked_beside_the_way_and_bumpy_where_asked():
-    bank = banks_beside(blank(), FLAT, line=[(-30.0, 0.0), (30.0, 0.0)], width_m=6.0, height_m=1.0)
-    assert float(bank.z(0, 4.4)) > 0.8 > 0.2 > float(bank.z(0, 0))
-    bumps = moguls(blank(), FLAT, area=shapely.box(-10, -10, 10, 10), height_m=1.0)
-    assert np.ptp(bumps.z(np.linspace(-6, 6, 60), np.full(60, 1.1))) > 0.5
-    assert float(np.abs(bumps.z(20, 20))) < 1e-9
-    tilted = profile_slope(blank(), FLAT, profile=[(-30.0, 0.0), (0.0, 0.0), (30.0, 9.0)])
-    assert float(tilted.z(0, -20)) == pytest.approx(0.0, abs=0.2)
-    assert 4.0 < float(tilted.z(0, 20)) < 7.0
-
-
-def test_rocks_and_houses_give_the_heights_of_what_carries_things():
-    site = blank()
-    rocks = [Rock(shapely.Point(10.0 * k, 0.0).buffer(4.0), f"rock {k}", 3.0 + k) for k in (0, 1)]
-    tops = layered_rocks(site, rocks=rocks, bands=["rock"], cap="snow")
-    roofs = mudbrick_houses(site, houses=[MudbrickHouse((-15.0, 0.0), "house", 30.0)])
-    assert [float(i.bounds[1, 2]) for i in site.instances[:2]] == pytest.approx(tops, abs=1e-5)
-    parapet = float(site.instances[2].bounds[1, 2])
-    assert parapet - 1.0 < roofs[0] < parapet
 
 
 @each_scene(f"N_{kind}_{k}" for kind in ("Island", "Coast") for k in (0, 1))
@@ -202,23 +135,6 @@ def test_coastlines_are_natural_and_always_the_same():
     assert 0.5 < shapely.hausdorff_distance(line.boundary, coarse.boundary) < 6.0
 
 
-def test_inland_is_positive_on_the_land_and_negative_at_sea():
-    land = shapely.box(-10, -10, 10, 10)
-    away = inland_m(land, np.array([0.0, 9.0, 13.0]), np.zeros(3))
-    assert away == pytest.approx([10.0, 1.0, -3.0])
-    assert eased(np.array([-1.0, 0.5, 3.0]), 0.0, 1.0) == pytest.approx([0.0, 0.5, 1.0])
-
-
-def test_steep_ground_is_found():
-    site = blank()
-    terrain = ground_by_formula(
-        site, site.terrain, cell_m=2.0, height=lambda arrays: np.where(arrays["x"] > 0.0, 8.0, 0.0)
-    )
-    steep = steep_area(terrain, 40.0)
-    assert steep.contains(shapely.Point(1.0, 0.0))
-    assert not steep.intersects(shapely.box(6.0, -20.0, 25.0, 20.0))
-
-
 def test_piers_bear_above_and_are_open_below():
     site = blank()
     pier(site, at=(-15.0, 0.0), yaw_deg=0.0, length_m=30.0, width_m=5.0, z=4.0, bay_m=5.0, rail="iron")
@@ -226,16 +142,3 @@ def test_piers_bear_above_and_are_open_below():
     down = distances(scene, [(x, 0.4, 9.0) for x in (-12.0, 0.3, 14.0)], DOWN)
     assert 9.0 - down == pytest.approx([4.0] * 3, abs=0.01)
     assert distances(scene, [(-20.0, 1.2, 1.2)], (1.0, 0.0, 0.0))[0] > 30.0
-
-
-def test_walls_groynes_and_steps_bar_the_way():
-    site = blank()
-    sea_wall(site, box=(-10.0, 4.0, 10.0, 5.5), z=(0.0, 3.0))
-    groynes(site, lines=[[(0.0, -12.0), (0.0, 2.0)]], height_m=1.8)
-    flights(site, feet=[(6.0, -4.0)], yaw_deg=90.0, width_m=2.0, run_m=7.0, on=0.0, to_m=3.0)
-    scene = site.scene()
-    assert distances(scene, [(-5.0, -3.0, 1.5)], (0.0, 1.0, 0.0)) == pytest.approx([7.0], abs=0.6)
-    assert distances(scene, [(-3.0, -5.0, 1.2)], (1.0, 0.0, 0.0)) == pytest.approx([3.0], abs=0.2)
-    assert 5.5 < distances(scene, [(6.0, -1.0, 8.0)], DOWN)[0] < 7.5
-    assert not site.is_free(-5.0, 4.8, 0.3)
-    assert not site.is_free(6.0, 0.0, 0.3)

@@ -5,24 +5,18 @@ from functools import partial
 import numpy as np
 import pytest
 import shapely
-from shapely.geometry import Polygon
 from support.layout_checks import blank_site, catalogue, distances, each_scene, props_of
 
 from aerialdojo_gen.scenes.grammar import s_curve
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit.bridges import arcade, bridge_deck, bridge_parapets
-from aerialdojo_gen.scenes.kit.building_sites import HIGH_M, LONG_M, Stack, container_stacks
-from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame, scaffold
+from aerialdojo_gen.scenes.kit.concrete import Slab, concrete_frame
 from aerialdojo_gen.scenes.kit.halls import HallRoof, hall
-from aerialdojo_gen.scenes.kit.houses import HouseStyle, house_row
-from aerialdojo_gen.scenes.kit.landforms import earth_ramp, level_grid, terraces
-from aerialdojo_gen.scenes.kit.quays import quay
 from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
-from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, stand_platforms, tier_parts
+from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.placement import footprint
-from aerialdojo_gen.scenes.shapes import upright
 
 _AFLOAT = {"freighter", "fishing_boat", "tugboat", "sailboat", "motor_yacht", "rowing_boat", "buoy"}
 
@@ -45,28 +39,6 @@ def test_boats_float_clear_of_the_quays(scene_of, name):
         assert boat.bounds[0, 2] < 0.05
         hull = footprint(boat, 0.0)
         assert hull.intersection(dry).area < 0.02 * hull.area, boat.node
-
-
-def test_containers_are_stacked_in_tiers():
-    site = blank_site("I_T_0")
-    quay(site, area=rectangle(-30, -30, 30, 30), height_m=2.0)
-    container_stacks(site, stacks=[Stack((-20.0, -5.0), [[3, 1], [0, 2]])], on=2.0)
-    stack = site.instances[-1]
-    assert stack.bounds[1, 2] == pytest.approx(2.0 + 3 * HIGH_M, abs=0.1)
-    assert np.ptp(stack.bounds[:, 0]) == pytest.approx(2 * LONG_M + 0.5, abs=0.1)
-    assert not site.is_free(-10.0, -3.0, 0.3)
-    assert site.is_free(-10.0, 6.0, 0.3)
-
-
-def test_houses_of_a_row_take_turns():
-    site = blank_site("I_T_0")
-    row = [(-20.0, 0.0), (0.0, 0.0), (20.0, 0.0)]
-    house_row(site, at=row, yaw_deg=0.0, style=HouseStyle(), on=2.0, walls=("brick", "planks"), storeys=(1, 2, 3))
-    assert [{"brick", "planks"} & {part.material for part in i.parts} for i in site.instances] == [
-        {"brick"}, {"planks"}, {"brick"},
-    ]  # fmt: skip
-    tops = [float(i.bounds[1, 2]) for i in site.instances]
-    assert tops == sorted(set(tops))
 
 
 blank_line = partial(blank_site, "I_T_0")
@@ -110,26 +82,12 @@ def test_tracks_carry_rails_at_their_height():
     assert site.ground_z(-15.0, -3.0) == pytest.approx(0.35)
 
 
-def test_s_curves_join_parallel_tracks():
-    path = s_curve((0.0, 1.0), (20.0, 6.0))
-    assert path[0] == (0.0, 1.0)
-    assert path[-1] == pytest.approx((20.0, 6.0))
-    assert abs(path[1][1] - 1.0) < 0.2
-    assert abs(path[-2][1] - 6.0) < 0.2
-
-
 def test_arcades_open_where_their_arches_are():
     wall = arcade(-10.0, 10.0, 0.0, 8.0, [(0.0, 3.0, 3.0)], 2.0)
     solid = 20.0 * 8.0 - (6.0 * 3.0 + np.pi * 9.0 / 2)
     a, b, c = (wall.vertices[wall.faces[:, k]] for k in range(3))
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
     assert volume == pytest.approx(2.0 * solid, rel=0.02)
-
-
-def test_upright_faces_stand_where_they_are_drawn():
-    body = upright([Polygon([(0, 0), (2, 0), (2, 1), (0, 1)])], 0.5, y_m=3.0)
-    assert body.vertices.min(axis=0) == pytest.approx((0.0, 2.75, 0.0))
-    assert body.vertices.max(axis=0) == pytest.approx((2.0, 3.25, 1.0))
 
 
 def test_parapets_are_open_at_their_gaps():
@@ -170,19 +128,6 @@ def test_a_frame_bears_on_every_floor_and_is_open_between():
     assert site.is_free(4.0, 4.0, 1.0, z=3.6)
 
 
-def test_pits_have_benches_and_ramps_lead_down():
-    pit = rectangle(-15, -15, 15, 15)
-    site = blank()
-    flat = level_grid(site, site.terrain, cell_m=1.0)
-    ground = terraces(site, flat, area=pit, steps=[(0, 0), (3, -2), (6, -2), (9, -5)])
-    assert ground.z(0, 0) == pytest.approx(-5.0)
-    assert ground.z(-10.5, 0) == pytest.approx(-2.0, abs=0.1)
-    assert ground.z(-20, 0) == 0.0
-    ground = earth_ramp(site, ground, start=(-16, 0, 0.0), end=(4, 0, -5.0), width_m=4.0)
-    profile = ground.z(np.linspace(-16, 4, 21), np.zeros(21))
-    assert profile == pytest.approx(np.linspace(0.0, -5.0, 21), abs=0.15)
-
-
 def test_halls_are_entered_by_their_gates_alone():
     site = blank()
     gates = {"s": [(8.0, 12.0, 0.0, 4.0)]}
@@ -194,14 +139,6 @@ def test_halls_are_entered_by_their_gates_alone():
     assert (distance[1:] < 6.2).all()
     assert site.is_free(0.0, 0.0, 2.0)
     assert not site.is_free(-6.0, -6.0, 0.2)
-
-
-def test_scaffolds_take_the_side_left_of_their_line():
-    site = blank()
-    scaffold(site, line=((0.0, 0.0), (10.0, 0.0)), z=(0.0, 6.0))
-    assert not site.is_free(5.0, 0.6, 0.2)
-    assert site.is_free(5.0, -0.6, 0.2)
-    assert site.instances[-1].bounds[1, 2] == pytest.approx(7.1, abs=0.1)
 
 
 def test_guard_rails_follow_every_line():
@@ -262,10 +199,3 @@ def test_seats_keep_off_gangways_portals_and_what_is_to_stay_clear():
     for foot in feet:
         way = passage(foot, 1.1, tier.rows * tier.tread_m)
         assert not shapely.contains_xy(way, seats[:, 0], seats[:, 1]).any()
-
-
-def test_platforms_are_level_and_end_at_their_height():
-    parts = dict(stand_platforms(areas=[rectangle(0, 0, 3, 2)], z=(0.5, 2.0), floor="floor", rim="rim"))
-    assert parts["floor"].vertices[:, 2].min() == 0.5
-    assert parts["floor"].vertices[:, 2].max() == 2.0
-    assert parts["rim"].vertices[:, 2].max() == pytest.approx(2.12)

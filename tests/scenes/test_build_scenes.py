@@ -23,11 +23,12 @@ from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
 from aerialdojo_gen.scenes.grammar import along, grid, poisson_disc, smooth_path
 from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
-from aerialdojo_gen.scenes.kit.streets import crossings, parking_row, streets
+from aerialdojo_gen.scenes.kit.landforms import hill
+from aerialdojo_gen.scenes.kit.streets import crossings, streets
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import flat_terrain, mound, rolling_terrain
+from aerialdojo_gen.scenes.terrain import flat_terrain, rolling_terrain
 
 POST = """
 [post]
@@ -150,7 +151,8 @@ def site() -> Site:
 
 def test_ground_covers_the_site_once_and_ground_z_tells_its_height():
     place = site()
-    place.set_ground(mound(rolling_terrain((60, 40), 2.0, 5, 3.0, 25.0), (10, 5), 8, 4), "meadow")
+    rolling = rolling_terrain((60, 40), 2.0, 5, 3.0, 25.0)
+    place.set_ground(hill(place, rolling, at=(10, 5), radius_m=8, height_m=4), "meadow")
     streets(place, paths=[[(-30, -5), (0, 3), (30, -5)], [(0, -20), (4, 20)]])
     place.paint(disc(-15, 10, 4), "paving", 0.3)
     crossings(place, at=[(10, 0, 80, 6)])
@@ -227,13 +229,6 @@ def test_terrain_is_level_where_flattened_and_gentle_along_a_path():
     assert climb.max() < 0.7 * np.abs(np.diff(rough.z(*points.T))).max()
 
 
-def test_lowered_ground_is_deep_inside_and_unchanged_outside():
-    flat = rolling_terrain((40, 40), 1.0, 1, 0.0, 10.0)
-    bed = flat.lowered(Point(0, 0).buffer(10), 2.0, 3.0)
-    assert float(bed.z(0, 0)) == pytest.approx(-2.0)
-    assert float(bed.z(11.5, 0)) == 0.0
-
-
 def test_footprints_know_height_and_ground():
     place = site()
     category = next(iter(place.catalogue))
@@ -289,13 +284,3 @@ def test_grid_points_lie_in_their_area():
     poses = grid(area, (2, 3), np.random.default_rng(0), yaw_deg=45)
     assert len(poses) == pytest.approx(area.area / 6, rel=0.2)
     assert all(area.contains(Point(p.x, p.y)) for p in poses)
-
-
-def test_parking_bays_lie_side_by_side_before_their_closed_side():
-    place = site()
-    bays = parking_row(place, 10, 5, 90, 6)
-    assert np.allclose([b.y for b in bays], 5 - 2.6)
-    assert np.allclose(np.abs(np.diff([b.x for b in bays])), 2.6)
-    assert np.mean([b.x for b in bays]) == pytest.approx(10)
-    marks = next(p for p in place.scene()["ground"].parts if p.material == "marking")
-    assert marks.vertices[:, 1].max() == pytest.approx(5)

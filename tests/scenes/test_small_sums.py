@@ -14,7 +14,7 @@ from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain, rolling_terrain
 def test_the_height_at_a_point_is_that_of_the_array():
     rng = np.random.default_rng(3)
     hills = rolling_terrain((60.0, 41.0), 1.7, 5, 4.0, 19.0)
-    for ground in (hills, flat_terrain((60.0, 41.0), 2.5), Terrain(-30.0, -20.0, 1.0, rng.normal(size=(41, 61)))):
+    for ground in (hills, flat_terrain((60.0, 41.0)), Terrain(-30.0, -20.0, 1.0, rng.normal(size=(41, 61)))):
         points = [*rng.uniform(-45, 45, (400, 2)), *np.round(rng.uniform(-35, 35, (100, 2))), (-30.0, -20.0)]
         assert [ground.at(x, y) for x, y in points] == [float(ground.z(x, y)) for x, y in points]
 

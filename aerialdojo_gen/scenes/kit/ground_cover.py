@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -53,8 +54,7 @@ def paint_shore(
     lobe_m: _Radius = 1.4, seed: int = 0, grow_m: Number = 0.6,
 ) -> None:  # fmt: skip
     """Paint the shore of waters with an uneven outline; the water itself is painted over it."""
-    points = [water.boundary.interpolate(k / count, normalized=True) for k in range(count)]
-    lobes = [blob(p.x, p.y, lobe_m, seed + k, 0.4) for k, p in enumerate(points)]
+    lobes = _lobes([water.boundary.interpolate(k / count, normalized=True) for k in range(count)], lobe_m, seed, 0.4)
     site.paint(shapely.union_all([water.buffer(grow_m, quad_segs=3), *lobes]), material)
 
 
@@ -62,8 +62,7 @@ def paint_shore(
 def paint_scree(site: Site, *, areas: list[Area], material: Material, seed: int = 0) -> None:
     """Paint what fell from rocks about their feet."""
     for area in areas:
-        lobes = [blob(float(x), float(y), 1.5, seed + k, 0.4)
-                 for k, (x, y) in enumerate(shapely.get_coordinates(area)[::3])]  # fmt: skip
+        lobes = _lobes(shapely.points(shapely.get_coordinates(area)[::3]), 1.5, seed, 0.4)
         site.paint(shapely.union_all([area.buffer(1.1), *lobes]), material)
 
 
@@ -93,12 +92,12 @@ def paint_sea(
     site.paint(sea, deep)
     shore = land.boundary.intersection(site.extent)
     spots = _points(shore, 0.8 * shallow_m)
-    belt = [blob(p.x, p.y, shallow_m, seed + 300 + k, 0.4) for k, p in enumerate(spots)]
+    belt = _lobes(spots, shallow_m, seed + 300, 0.4)
     site.paint(shapely.union_all(belt).intersection(sea), shallow)
-    near = [blob(p.x, p.y, 0.4 * shallow_m, seed + 500 + k, 0.4) for k, p in enumerate(spots)]
+    near = _lobes(spots, 0.4 * shallow_m, seed + 500, 0.4)
     calm = shapely.union_all([*near, land.buffer(0.25 * shallow_m, quad_segs=3)]).intersection(sea)
     site.paint(calm, lagoon)
-    froth = [blob(p.x, p.y, 0.9, seed + 700 + k, 0.5) for k, p in enumerate(_points(shore, 2.1))]
+    froth = _lobes(_points(shore, 2.1), 0.9, seed + 700, 0.5)
     site.paint(shapely.union_all(froth).difference(land.buffer(-0.35)), foam)
     site.paint(land.difference(land.buffer(-1.5, quad_segs=3)), wet)
 
@@ -110,7 +109,7 @@ def paint_beach(
 ) -> None:  # fmt: skip
     """Paint a beach along a coastline, its inner edge ragged."""
     inner = land.buffer(-width_m)
-    lobes = [blob(p.x, p.y, lobe_m, seed + k, 0.5) for k, p in enumerate(_points(inner.boundary, spacing_m))]
+    lobes = _lobes(_points(inner.boundary, spacing_m), lobe_m, seed, 0.5)
     site.paint(land.difference(inner).union(shapely.union_all(lobes).intersection(land)), material)
 
 
@@ -193,6 +192,11 @@ def strew_rocks(
         plans.append(shapely.Point(x, y).buffer(r, quad_segs=3))
     if bodies:
         site.add(None, category, [(material, merge(bodies))], footprint=shapely.union_all(plans))
+
+
+def _lobes(points: Iterable[shapely.Point], radius_m: float, seed: int, ragged: float) -> list[shapely.Polygon]:
+    """Make blobs about points, of seeds one after the other."""
+    return [blob(p.x, p.y, radius_m, seed + k, ragged) for k, p in enumerate(points)]
 
 
 def _points(line: BaseGeometry, spacing_m: float) -> list[shapely.Point]:

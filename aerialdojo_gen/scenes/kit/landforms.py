@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from aerialdojo_gen.base.errors import AssetError
@@ -18,7 +18,7 @@ from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number, Point3
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, mound, rolling_terrain, smooth
+from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, rolling_terrain, smooth
 
 # Smoothing a way takes the square of its length.
 _LONGEST_M = 3000.0
@@ -46,8 +46,7 @@ def hillside_steps(
     x, y = grid(terrain)
     run = run_m[0] + (run_m[1] - run_m[0]) * np.clip((np.abs(x) - half_m) / soft_m, 0.0, 1.0)
     for at, rise in steps:
-        t = np.clip((y - at + run / 2 - 0.1) / run, 0.0, 1.0)
-        terrain = terrain.raised(rise * t * t * (3.0 - 2.0 * t))
+        terrain = terrain.raised(rise * smooth((y - at + run / 2 - 0.1) / run))
     return terrain
 
 
@@ -113,7 +112,7 @@ def inland_m(land: BaseGeometry, x: Floats, y: Floats) -> Floats:
 @ground_builder
 def hill(_site: Site, terrain: Terrain, *, at: At, radius_m: Number, height_m: Number) -> Terrain:
     """Raise a round hill, or sink a hollow where its height is negative."""
-    return mound(terrain, at, radius_m, height_m)
+    return terrain.raised(height_m * smooth(1.0 - terrain.distance(Point(at)) / radius_m))
 
 
 @ground_builder
@@ -176,7 +175,7 @@ def sink_area(
     _site: Site, terrain: Terrain, *, area: Area, depth_m: Number, blend_m: Annotated[Number, Field(gt=0)]
 ) -> Terrain:
     """Sink an area, such as the bed of a stream, with slopes inside its border."""
-    return terrain.lowered(area, depth_m, blend_m)
+    return terrain.raised(-depth_m * smooth(terrain.inside(area) / blend_m))
 
 
 @ground_builder
@@ -289,10 +288,8 @@ def dunes(
     phase = along / wavelength_m + 0.55 * bend
     s01 = phase - np.floor(phase)
     rise = power(np.clip(s01 / _WINDWARD, 0.0, 1.0), 1.25)
-    fall = np.clip((s01 - _WINDWARD) / (1.0 - _WINDWARD), 0.0, 1.0)
-    ridge = rise * (1.0 - fall * fall * (3.0 - 2.0 * fall))
-    high = height_m * (0.75 + 0.4 * swell) * ridge
-    return ground.raised(high)
+    ridge = rise * (1.0 - smooth((s01 - _WINDWARD) / (1.0 - _WINDWARD)))
+    return ground.raised(height_m * (0.75 + 0.4 * swell) * ridge)
 
 
 @ground_builder
@@ -310,8 +307,7 @@ def stepped_valley(
     d = d + 2.2 * _noise_at(seed + 5, xy[:, 0] / 9.0, xy[:, 1] / 9.0)
     rise = np.zeros(len(d))
     for near, far, height in steps:
-        t = np.clip((d - near) / (far - near), 0.0, 1.0)
-        rise += height * t * t * (3.0 - 2.0 * t)
+        rise += height * smooth((d - near) / (far - near))
     calm = np.clip(d / 6.0, 0.25, 1.0)
     shape = ground.heights_m.shape
     return replace(ground, heights_m=ground.heights_m * calm.reshape(shape) + rise.reshape(shape))

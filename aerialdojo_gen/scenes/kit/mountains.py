@@ -1,11 +1,9 @@
-"""Mountains and dry and cold country: massifs, crags, gorges, streams; layered rock, ice, a rink, cableways."""
+"""Mountains and dry and cold country: massifs, crags, gorges, streams; layered rock, ridges of ice."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -15,17 +13,16 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.simplex import OpenSimplex
-from aerialdojo_gen.geometry.portable import distances_along, norm, power, unit
-from aerialdojo_gen.scenes.grammar import Frame, slab
+from aerialdojo_gen.geometry.portable import distances_along, norm, power
+from aerialdojo_gen.scenes.grammar import slab
 from aerialdojo_gen.scenes.ground import polygons_of, ribbon
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.landforms import grid
-from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
-from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
+from aerialdojo_gen.scenes.shapes import box, crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, rolling_terrain, smooth
 
@@ -84,8 +81,7 @@ def massif(
         # Benches follow the contour but not quite: strata dip.
         level = (height + 0.03 * corners[:, 0]) / bench_m
         part = level - np.floor(level)
-        riser = np.clip((part - 0.5) / 0.4, 0.0, 1.0)
-        benched = (np.floor(level) + riser * riser * (3.0 - 2.0 * riser)) * bench_m - 0.03 * corners[:, 0]
+        benched = (np.floor(level) + smooth((part - 0.5) / 0.4)) * bench_m - 0.03 * corners[:, 0]
         height = 0.3 * height + 0.7 * benched
     return replace(ground, heights_m=height.reshape(ground.heights_m.shape))
 
@@ -133,9 +129,8 @@ def crags(site: Site, *, crags: list[Crag], materials: tuple[Material, Material]
             # The lower half is cut away where it would lie deep in the ground, so that no triangle is wasted.
             body = Mesh(np.maximum(body.vertices, (-np.inf, -np.inf, body.vertices[:, 2].min() * 0.45)), body.faces)
             parts.append((materials[k % 2], translated(body, (x, y, site.ground_z(x, y) - 0.15 * tall))))
-        by_material = {m: merge([b for n, b in parts if n == m]) for m in dict.fromkeys(m for m, _ in parts)}
         area = Point(crag.at).buffer(crag.radius_m * 1.15, quad_segs=4)
-        site.add(None, "crag", list(by_material.items()), footprint=area)
+        site.add(None, "crag", parts, footprint=area)
 
 
 @dataclass(frozen=True)
@@ -178,13 +173,10 @@ def paint_gorge(
 ) -> None:
     """Paint the rock of a gorge up to a wavy rim, gravel banks, and the stream, whose bed stays free."""
     half = site.head.size_m[1] / 2
-    ys = [float(y) for y in np.arange(-half, half + 1.0, 2.5)]
+    ys = np.arange(-half, half + 1.0, 2.5).tolist()
     edge = [half_m + 1.2 + 1.3 * float(np.sin(y * 0.9) + np.sin(y * 0.37 + 1.0)) for y in ys]
-    rims = [
-        [(s * (e if s > 0 else edge[-1 - k]), y) for k, (e, y) in enumerate(zip(edge, ys, strict=True))]
-        for s in (-1, 1)
-    ]
-    site.paint(Polygon([*rims[0], *rims[1][::-1]]), rock)
+    west = [(-out, y) for out, y in zip(edge[::-1], ys, strict=True)]
+    site.paint(Polygon([*west, *zip(edge[::-1], ys[::-1], strict=True)]), rock)
     line = [(stream.x(y), y) for y in ys]
     site.paint(ribbon(line, 15.0), bank)
     site.paint(ribbon(line, 5.4), water)
@@ -290,9 +282,7 @@ def _weathered(area: BaseGeometry, noise: OpenSimplex, phase: float, gullies: fl
     pieces = []
     for p in polygons_of(area):
         xy = shapely.get_coordinates(shapely.segmentize(orient(p).exterior, 1.5))[:-1]
-        d = np.array(
-            [[noise.noise3(x / 2.2, y / 2.2, phase), noise.noise3(x / 2.2, y / 2.2, phase + 40.0)] for x, y in xy]
-        )
+        d = np.array([[noise.noise3(x / 2.2, y / 2.2, phase + off) for off in (0.0, 40.0)] for x, y in xy])
         wide = np.array([noise.noise3(x / 5.0, y / 5.0, 80.0 + 0.2 * phase) for x, y in xy])
         moved = Polygon(xy + 0.5 * d + (gullies * np.minimum(wide, 0.15))[:, None] * _outwards(xy))
         pieces += polygons_of(moved if moved.is_valid else moved.buffer(0))
@@ -346,71 +336,3 @@ def ice_ridges(
             wander = rng.uniform(-0.35, 0.35, size=2)
             parts.append((material, translated(body, (p.x + wander[0], p.y + wander[1], z - 0.35))))
         site.add(None, "ice_ridge", parts, footprint=line.buffer(1.0))
-
-
-@site_builder
-def rink_boards(site: Site, *, rink: Area, boards: Material = "#eef2f6", cap: Material = "#2f5f9e") -> None:
-    """Put boards round a level rink, with a gap to step in by."""
-    if not isinstance(rink, Polygon):
-        raise AssetError("rink: must be an area in one piece")
-    z = site.ground_z(rink.centroid.x, rink.centroid.y)
-    ring = shapely.get_coordinates(shapely.segmentize(rink.exterior, 3.0))
-    gate = len(ring) // 8
-    path = [(float(x), float(y), z + 0.45) for x, y in (*ring[gate + 1 :], *ring[1:gate])]
-    top = [(x, y, z + 0.96) for x, y, _ in path]
-    parts: Parts = [(boards, sweep(path=path, section=(0.12, 1.0))), (cap, sweep(path=top, section=(0.16, 0.08)))]
-    site.add(None, "rink_boards", parts, footprint=rink.boundary.buffer(0.25))
-
-
-# The sag of a rope, as a share of its length.
-_SAG = 0.045
-
-
-@site_builder
-def cableway(
-    site: Site, *, masts: Line, cabins: Annotated[int, Field(ge=0, le=1000)] = 8, mast_m: Number = 11.6,
-    terminal_m: Number = 5.6, gauge_m: Annotated[Number, Field(gt=0)] = 6.4,
-    paints: Annotated[list[Material], Field(min_length=1)] = ["#d8342c", "#2f5f9e", "#e9b52a", "#3f7d4e"],  # noqa: B006
-) -> None:  # fmt: skip
-    """Hang two ropes with cabins between the heads of masts; the first and the last are terminals with a wheel."""
-    last = len(masts) - 1
-    heads = [
-        (x, y, site.ground_z(x, y) + (terminal_m if k in (0, last) else mast_m)) for k, (x, y) in enumerate(masts)
-    ]
-    parts: Parts = []
-    hung = 0
-    for a, b in pairwise(np.array(heads)):
-        along = unit((b - a)[:2])
-        side = np.array([-along[1], along[0], 0.0]) * gauge_m / 2
-        length = float(norm((b - a)[:2]))
-        t = np.linspace(0.0, 1.0, 9)
-        sag = -_SAG * length * 4 * t * (1 - t)
-        for way in (-1.0, 1.0):
-            line = a + (b - a) * t[:, None] + side * way + np.column_stack([0 * t, 0 * t, sag])
-            parts.append(("iron", sweep(path=[tuple(map(float, p)) for p in line], radius=0.045, sides=4)))
-            count = max(int(length // 16), 1) if hung < cabins else 0
-            for k in range(count):
-                s = (k + 0.5 + 0.22 * way) / count
-                p = a + (b - a) * s + side * way
-                z = float(p[2] - _SAG * length * 4 * s * (1 - s))
-                yaw_deg = math.degrees(math.atan2(along[1], along[0]))
-                parts += _cabin(Frame(float(p[0]), float(p[1]), yaw_deg), z, paints[hung % len(paints)])
-                hung += 1
-    for x, y, z in (heads[0], heads[-1]):
-        foot = site.ground_z(x, y)
-        wheel = cylinder(radius=gauge_m / 2, height=0.3, segments=20)
-        parts.append(("#3f7d4e", translated(wheel, (x, y, z - 0.15))))
-        shaft = cylinder(radius=0.4, height=z - foot + 0.6, segments=10)
-        parts.append(("steel", translated(shaft, (x, y, foot - 0.5))))
-        parts.append(("concrete", translated(box(size=(2.2, 2.2, 0.5)), (x, y, foot - 0.3))))
-    site.add(None, "lift_ropes", parts)
-
-
-def _cabin(frame: Frame, z: float, paint: str) -> Parts:
-    body: Parts = [
-        (paint, translated(box(size=(1.5, 1.3, 0.75), taper=(1.1, 1.1)), (0, 0, -3.1))),
-        ("glass", translated(box(size=(1.6, 1.4, 0.75), taper=(0.94, 0.92)), (0, 0, -2.35))),
-        (paint, translated(box(size=(1.55, 1.35, 0.18), taper=(0.8, 0.8)), (0, 0, -1.6))),
-        ("steel", translated(cylinder(radius=0.05, height=1.45, segments=6), (0, 0, -1.42))),
-    ]
-    return frame.parts(body, z)

@@ -9,12 +9,13 @@ from typing import Annotated, Literal
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.affinity import rotate, scale, translate
-from shapely.geometry import LineString, Point, Polygon
+from shapely.affinity import scale
+from shapely.geometry import LineString, Point
 
 from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import atan2, norm, power
-from aerialdojo_gen.scenes.grammar import noise_around, poisson_disc, slab
+from aerialdojo_gen.scenes.grammar import Frame, noise_around, poisson_disc, slab
+from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.wreckage import bars, chunk, tilted_plate
 from aerialdojo_gen.scenes.mesh import Parts, translated
@@ -23,7 +24,7 @@ from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
 from aerialdojo_gen.scenes.shapes import sweep
 from aerialdojo_gen.scenes.site import Site
-from aerialdojo_gen.scenes.terrain import Terrain
+from aerialdojo_gen.scenes.terrain import Terrain, smooth
 
 Breadth = Annotated[Number, Field(ge=0.1)]
 
@@ -52,8 +53,7 @@ def rises(
     corners = terrain.corners()[:, "xy".index(axis)]
     rise = np.zeros(len(corners))
     for start, end, height in stations:
-        t = np.clip((corners - start) / max(end - start, 0.1), 0.0, 1.0)
-        rise += height * t * t * (3.0 - 2.0 * t)
+        rise += height * smooth((corners - start) / max(end - start, 0.1))
     return terrain.raised(rise)
 
 
@@ -75,12 +75,9 @@ def heap(_site: Site, terrain: Terrain, area: Area, height_m: Number, seed: int)
     inside = terrain.inside(area).ravel()
     reach = max(float(inside.max()), 0.1)
     noise = OpenSimplex(seed=seed)
-    lumps = np.array(
-        [noise.noise2(x / 2.3, y / 2.3) if d > 0 else 0.0 for (x, y), d in zip(corners, inside, strict=True)]
-    )
+    lumps = [noise.noise2(x / 2.3, y / 2.3) if d > 0 else 0.0 for (x, y), d in zip(corners, inside, strict=True)]
     t = power(np.clip(inside / reach, 0.0, 1.0), 0.8)
-    rise = height_m * t * (1.0 + 0.35 * lumps)
-    return terrain.raised(rise)
+    return terrain.raised(height_m * t * (1.0 + 0.35 * np.array(lumps)))
 
 
 @site_builder
@@ -171,9 +168,7 @@ def slab_pile(
     for k in range(count):
         z += gap_m * float(rng.uniform(0.8, 1.25))
         level = k == count - 1
-        tilt = (
-            (0.0, 0.0) if level else tuple(float(v) for v in rng.uniform(-tilt_deg, tilt_deg, size=2) * (0.5, 0.25))
-        )
+        tilt = [0.0, 0.0] if level else (rng.uniform(-tilt_deg, tilt_deg, size=2) * (0.5, 0.25)).tolist()
         shift = rng.uniform(-0.7, 0.7, size=2) * (0.0 if level else 1.0)
         shrink = 1.0 - 0.035 * k
         middle = (x + float(shift[0]), y + float(shift[1]), z)
@@ -194,9 +189,8 @@ def slab_pile(
             if rng.uniform() < 0.5:
                 parts.append(("rust", bars((float(px), float(py)), z - 0.13, out, rng, 1.3)))
     u, v = size_m[0] / 2, size_m[1] / 2
-    plan = translate(rotate(Polygon([(-u, -v), (u, -v), (u, v), (-u, v)]), yaw_deg, origin=(0, 0)), x, y)
-    core = scale(plan, 0.8, 0.72)
-    parts.append(("rubble", slab(core, base - 0.5, z - 0.4)))
+    plan = Frame(x, y, yaw_deg).area(rectangle(-u, -v, u, v))
+    parts.append(("rubble", slab(scale(plan, 0.8, 0.72), base - 0.5, z - 0.4)))
     site.add(node, "collapsed_building", parts)
     # What lies on top of it is free to be stood on.
     site.occupy(plan, base - 100.0, z - 0.05)
@@ -221,8 +215,7 @@ def strew_things(
             z = site.foot_z(pose.x, pose.y)
             thing = site.place(Placement(category, *pose, z=z, place=place), "skip")
             if thing is not None:
-                (x0, y0, _), (x1, y1, _) = thing.bounds
-                room = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]).buffer(clear_m - 0.4, quad_segs=2)
+                room = rectangle(*thing.bounds[:, :2].ravel()).buffer(clear_m - 0.4, quad_segs=2)
                 site.occupy(room, z - 0.5, z + 2.0)
                 out.append(thing)
                 break

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.affinity import rotate, translate
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import substring
 
 from aerialdojo_gen.base.errors import AssetError
+from aerialdojo_gen.scenes.grammar import Frame
 from aerialdojo_gen.scenes.ground import Surface, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
-from aerialdojo_gen.scenes.kit.streets import KERB_M, MARK_M, Bridge, Deck, deck, drive, put_up_bridge
+from aerialdojo_gen.scenes.kit.streets import KERB_M, Bridge, Deck, deck, drive, marks_along, put_up_bridge
 from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
 from aerialdojo_gen.scenes.site import Site
 
-_DASH_M, _GAP_M = 2.0, 4.0
+_GAP_M = 4.0
 _ZEBRA_M, _STRIPE_M = 3.0, 0.5
 _RAIL_M, _GAUGE_M = 0.05, 1.5
 _AT_CROSSING_M = 5.0
@@ -136,20 +135,13 @@ def _painted(
     """Lay out streets: what is painted, in order, but rails and marks; all carriageways; all pavements."""
     driven = [road for road in roads if road.kind != "path"]
     paths = [road for road in roads if road.kind == "path"]
-    ribbons = [area_of(r, r.width_m) for r in driven]
-    carriageways = shapely.union_all(ribbons)
+    carriageways = shapely.union_all([area_of(r, r.width_m) for r in driven])
     kerbed = [area_of(r, r.width_m + 2 * r.pavement_m) for r in driven if r.pavement_m > 0.0]
     raised = [area_of(r, r.width_m) for r in paths if r.raised]
     pavements = shapely.union_all([*kerbed, *raised])
-    out = []
-    for surface, members in _by_surface(r for r in paths if not r.raised):
-        out.append(Surface(shapely.union_all([area_of(r, r.width_m) for r in members]), surface))
-    if not pavements.is_empty:
-        out.append(Surface(pavements, pavement, KERB_M, kerb))
-    for surface, _ in _by_surface(driven):
-        own = [area for r, area in zip(driven, ribbons, strict=True) if r.surface == surface]
-        out.append(Surface(shapely.union_all(own), surface))
-    return out, carriageways, pavements
+    between = [] if pavements.is_empty else [Surface(pavements, pavement, KERB_M, kerb)]
+    low = _by_surface([r for r in paths if not r.raised], area_of)
+    return [*low, *between, *_by_surface(driven, area_of)], carriageways, pavements
 
 
 def _marks(
@@ -178,12 +170,13 @@ def _on_deck(
     return surfaces if marks.is_empty else [*surfaces, Surface(marks, "marking")]
 
 
-def _by_surface(roads: Iterable[Street]) -> list[tuple[str, list[Street]]]:
-    """Streets by what they are paved with; smoother surfaces go over rougher ones."""
-    groups: dict[str, list[Street]] = {}
+def _by_surface(roads: Sequence[Street], area_of: Callable[[Street, float], BaseGeometry]) -> list[Surface]:
+    """Areas of streets by what they are paved with; smoother surfaces go over rougher ones."""
+    groups: dict[str, list[BaseGeometry]] = {}
     for road in roads:
-        groups.setdefault(road.surface, []).append(road)
-    return sorted(groups.items(), key=lambda item: (item[0].startswith("asphalt"), item[0]))
+        groups.setdefault(road.surface, []).append(area_of(road, road.width_m))
+    ordered = sorted(groups.items(), key=lambda item: (item[0].startswith("asphalt"), item[0]))
+    return [Surface(shapely.union_all(areas), surface) for surface, areas in ordered]
 
 
 def _junctions(roads: Sequence[Street]) -> list[Polygon]:
@@ -200,18 +193,10 @@ def _junctions(roads: Sequence[Street]) -> list[Polygon]:
 
 
 def _lane_marks(road: Street, line: LineString) -> list[BaseGeometry]:
-    lane = road.width_m / road.lanes
-    out = []
+    lane, out = road.width_m / road.lanes, []
     for k in range(1, road.lanes):
-        offset = k * lane - road.width_m / 2
-        middle = not road.oneway and road.lanes % 2 == 0 and 2 * k == road.lanes
-        shifted = line.offset_curve(offset, join_style="mitre") if abs(offset) > 1e-6 else line
-        for leg in getattr(shifted, "geoms", [shifted]):
-            if middle and road.lanes >= 4:
-                out.append(leg.buffer(MARK_M / 2, cap_style="flat", join_style="mitre"))
-                continue
-            for s in np.arange(_GAP_M / 2, leg.length - _DASH_M, _DASH_M + _GAP_M):
-                out.append(substring(leg, s, s + _DASH_M).buffer(MARK_M / 2, cap_style="flat"))
+        whole = road.lanes >= 4 and not road.oneway and 2 * k == road.lanes
+        out += marks_along(line, k * lane - road.width_m / 2, None if whole else _GAP_M)
     return out
 
 
@@ -231,7 +216,7 @@ def _zebra(x: float, y: float, roads: Sequence[Street], lines: Sequence[LineStri
     for n in range(count):
         v = (n - (count - 1) / 2) * 2 * _STRIPE_M
         stripe = rectangle(-_ZEBRA_M / 2, v - _STRIPE_M / 2, _ZEBRA_M / 2, v + _STRIPE_M / 2)
-        out.append(translate(rotate(stripe, yaw, origin=(0, 0)), x, y))
+        out.append(Frame(x, y, yaw).area(stripe))
     return out
 
 

@@ -5,19 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
 import shapely
 from pydantic import Field
-from shapely.affinity import rotate, translate
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring, unary_union
 
-from aerialdojo_gen.scenes.grammar import Polyline, Pose, slab
+from aerialdojo_gen.scenes.grammar import Frame, Polyline, Pose, slab
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, outer_walls, polygons_of, rectangle, ribbon
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, flipped, merge, translated
@@ -58,9 +57,9 @@ def drive(site: Site, path: Polyline, width_m: float, lanes: int, oneway: bool =
     lane_m, line = width_m / lanes, LineString(path)
     for k in range(lanes):
         offset = (k + 0.5) * lane_m - width_m / 2
-        shifted = line.offset_curve(offset, join_style="mitre") if abs(offset) > 1e-6 else line
-        if isinstance(shifted, LineString) and not shifted.is_empty:
-            site.lanes.append((shifted.reverse() if offset > 1e-6 and not oneway else shifted, lane_m))
+        middle = shifted(line, offset)
+        if isinstance(middle, LineString) and not middle.is_empty:
+            site.lanes.append((middle.reverse() if offset > 1e-6 and not oneway else middle, lane_m))
 
 
 @site_builder
@@ -70,14 +69,15 @@ def crossings(
 ) -> None:  # fmt: skip
     """Paint zebra crossings: middle, direction of walking and length of each (x, y, yaw_deg, length_m)."""
     for x, y, yaw_deg, length_m in at:
+        frame = Frame(x, y, yaw_deg)
         around = rectangle(-length_m / 2, -width_m / 2 - 0.5, length_m / 2, width_m / 2 + 0.5)
-        site.paint(_posed(around, x, y, yaw_deg), surface)
+        site.paint(frame.area(around), surface)
         site.crossings.append(Point(x, y))
         count = int(length_m // 1.0)
         for k in range(count):
             u = (k - (count - 1) / 2) * 1.0
             stripe = rectangle(u - 0.25, -width_m / 2, u + 0.25, width_m / 2)
-            site.paint(_posed(stripe, x, y, yaw_deg), "marking")
+            site.paint(frame.area(stripe), "marking")
 
 
 def parking_row(
@@ -92,19 +92,14 @@ def parking_row(
     material: str = "marking",
 ) -> list[Pose]:
     """Mark a row of parking bays and return the pose of each, facing the closed side; metres and degrees."""
-    width, depth = bay_m
+    (width, depth), frame = bay_m, Frame(x, y, yaw_deg)
     half = count * width / 2
     if z is None:
         for k in range(count + 1):
             v = k * width - half
-            site.paint(_posed(rectangle(-depth, v - MARK_M / 2, 0.0, v + MARK_M / 2), x, y, yaw_deg), material)
-        site.paint(_posed(rectangle(-MARK_M, -half, 0.0, half), x, y, yaw_deg), material)
-    c, s = float(np.cos(np.radians(yaw_deg))), float(np.sin(np.radians(yaw_deg)))
-    poses = []
-    for k in range(count):
-        u, v = -depth / 2, (k + 0.5) * width - half
-        poses.append(Pose(x + c * u - s * v, y + s * u + c * v, yaw_deg))
-    return poses
+            site.paint(frame.area(rectangle(-depth, v - MARK_M / 2, 0.0, v + MARK_M / 2)), material)
+        site.paint(frame.area(rectangle(-MARK_M, -half, 0.0, half)), material)
+    return [frame.pose(-depth / 2, (k + 0.5) * width - half) for k in range(count)]
 
 
 @site_builder
@@ -117,27 +112,31 @@ def arrows(
         rectangle(length_m * 0.15, -0.4, length_m * 0.16, 0.4)
     ).convex_hull  # fmt: skip
     for x, y, yaw_deg in at:
-        site.paint(_posed(shaft.union(head), x, y, yaw_deg), material)
+        site.paint(Frame(x, y, yaw_deg).area(shaft.union(head)), material)
 
 
 def _line(site: Site, path: Polyline, offset_m: float, dashed: bool, clear: BaseGeometry) -> None:
-    line = LineString(path)
-    if offset_m:
-        line = line.offset_curve(offset_m, join_style="mitre")
-    for leg in getattr(line, "geoms", [line]):
-        if not dashed:
-            mark = leg.buffer(MARK_M / 2, cap_style="flat", join_style="mitre").difference(clear)
-            if not mark.is_empty:
-                site.paint(mark, "marking")
+    for mark in marks_along(LineString(path), offset_m, _GAP_M if dashed else None):
+        # A dash is whole, or left out.
+        left = mark if dashed else mark.difference(clear)
+        if not left.is_empty and not (dashed and mark.intersects(clear)):
+            site.paint(left, "marking")
+
+
+def shifted(line: LineString, offset_m: float) -> BaseGeometry:
+    """Give the line that runs beside another, to its left where the offset is positive."""
+    return line.offset_curve(offset_m, join_style="mitre") if abs(offset_m) > 1e-6 else line
+
+
+def marks_along(line: LineString, offset_m: float, gap_m: float | None) -> Iterator[BaseGeometry]:
+    """Yield the marks beside a line: dashes with a gap between them, or a whole line."""
+    beside = shifted(line, offset_m)
+    for leg in getattr(beside, "geoms", [beside]):
+        if gap_m is None:
+            yield leg.buffer(MARK_M / 2, cap_style="flat", join_style="mitre")
             continue
-        for s in np.arange(_GAP_M / 2, leg.length - _DASH_M, _DASH_M + _GAP_M):
-            dash = substring(leg, s, s + _DASH_M).buffer(MARK_M / 2, cap_style="flat")
-            if not dash.intersects(clear):
-                site.paint(dash, "marking")
-
-
-def _posed(area: BaseGeometry, x: float, y: float, yaw_deg: float) -> BaseGeometry:
-    return translate(rotate(area, yaw_deg, origin=(0, 0)), x, y)
+        for s in np.arange(gap_m / 2, leg.length - _DASH_M, _DASH_M + gap_m):
+            yield substring(leg, s, s + _DASH_M).buffer(MARK_M / 2, cap_style="flat")
 
 
 @site_builder
