@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, PlainValidator, model_validator
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.scenes.colours import COLOURS, colour_name
-from aerialdojo_gen.scenes.materials import refuse_unknown
+from aerialdojo_gen.scenes.materials import refuse_unknown, validated
 from aerialdojo_gen.scenes.model import Instance, Material
 
 Floats = NDArray[np.float64]
@@ -62,8 +63,7 @@ PLACES: Mapping[str, _Boxes] = {
     ),
 }
 
-_SAYS = ("say", "also", "adjective", "clause")
-_KEYS = (*_SAYS, "has", "lacks", "count", "form", "colour", "material", "size", "order")
+_CLAIMS = ("has", "lacks", "count", "form", "colour", "material", "size", "order")
 _SUBJECTS = ("it", "its", "they", "their", "one", "there")
 _TERM = r"(?:(?P<{0}p>[a-z0-9_|]+)\.)?(?P<{0}m>length|width|height)"
 _SIZE = re.compile(
@@ -97,22 +97,85 @@ class Order:
     text: str  # As it was written
 
 
-@dataclass(frozen=True)
-class Appearance:
+def _comparison(text: Any) -> Comparison:
+    m = _SIZE.fullmatch(str(text).strip())
+    if m is None or (m["factor"] is None and m["bm"] is None):
+        raise ValueError(f'{text!r} is no comparison like "height > 1.9" or "length > 3 * width"')
+    other = None if m["bm"] is None else (m["bp"] or "", m["bm"])
+    return Comparison(m["ap"] or "", m["am"], m["sign"] == ">", float(m["factor"] or 1.0), other, text)
+
+
+def _order(text: Any) -> Order:
+    m = _ORDER.fullmatch(str(text).strip())
+    if m is None:
+        known = ", ".join([*(f'"a {r} b"' for r in RELATIONS), *(f'"a {p}"' for p in PLACES)])
+        raise ValueError(f"{text!r} is none of {known}")
+    return Order(m["a"], m["relation"] or m["place"], m["b"] or "", text)
+
+
+def _form(name: str) -> str:
+    if name not in FORMS:
+        raise ValueError(f"unknown form{nearest(name, FORMS)} (one of {', '.join(FORMS)})")
+    return name
+
+
+def both_ends(value: Any) -> Any:
+    """Read ``[low, high]``, or one number for both."""
+    return tuple(value) if isinstance(value, list) else (value, value)
+
+
+def _counted(ends: tuple[int, int]) -> tuple[int, int]:
+    if not 0 < ends[0] <= ends[1]:
+        raise ValueError("must be a whole number or [least, most], 1 or more")
+    return ends
+
+
+_SOME = Field(min_length=1)
+_LISTED = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else (value,))
+_Words = Annotated[tuple[str, ...], _LISTED, _SOME]
+_Choices = Annotated[tuple[str, ...], BeforeValidator(lambda value: tuple(str(value).split("|")))]
+_Count = Annotated[tuple[int, int], BeforeValidator(both_ends), AfterValidator(_counted)]
+
+
+class Appearance(BaseModel, frozen=True, extra="forbid", arbitrary_types_allowed=True):
     """A phrase and its claims."""
 
-    phrase: str  # Its first wording, which is its key in the catalogue
-    also: tuple[str, ...] = ()  # More phrases like it, which assert no more
-    adjectives: tuple[str, ...] = ()  # The same before the name: ``"slatted"``
-    clauses: tuple[str, ...] = ()  # The same as a clause: ``"it lies on its roof"``
-    has: tuple[str, ...] = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
-    lacks: tuple[str, ...] = ()
-    count: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # Copies of a part
-    form: Mapping[str, str] = field(default_factory=dict)  # One of `FORMS`, of each copy of a part
-    colour: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    material: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    size: tuple[Comparison, ...] = ()
-    order: tuple[Order, ...] = ()
+    say: _Words = ()
+    also: _Words = ()  # More phrases like it, which assert no more
+    adjectives: Annotated[_Words, Field(alias="adjective")] = ()  # The same before the name: ``"slatted"``
+    clauses: Annotated[_Words, Field(alias="clause")] = ()  # The same as a clause: ``"it lies on its roof"``
+    has: _Words = ()  # Parts that the body must have, or must not; ``"a|b"`` is either
+    lacks: _Words = ()
+    count: Annotated[dict[str, _Count], _SOME] = {}  # Copies of a part
+    form: Annotated[dict[str, Annotated[str, AfterValidator(_form)]], _SOME] = {}  # Of each copy of a part
+    colour: Annotated[dict[str, _Choices], _SOME] = {}
+    material: Annotated[dict[str, _Choices], _SOME] = {}
+    size: Annotated[tuple[Annotated[Comparison, PlainValidator(_comparison)], ...], _LISTED, _SOME] = ()
+    order: Annotated[tuple[Annotated[Order, PlainValidator(_order)], ...], _LISTED, _SOME] = ()
+
+    @model_validator(mode="after")
+    def _can_be_checked(self) -> Appearance:
+        if not (self.say or self.adjectives):
+            raise ValueError("must be a table with say or adjective: its words, and what they claim")
+        if self.also and not self.say:
+            raise ValueError("also needs say")
+        for clause in self.clauses:
+            if clause.split(" ")[0] not in _SUBJECTS:
+                raise ValueError(f"clause {clause!r} must begin with one of {', '.join(_SUBJECTS)}")
+        if not all(wording.strip() == wording != "" for wording in self._said):
+            raise ValueError("a wording is empty, or has blanks at its ends")
+        if not any(getattr(self, claim) for claim in _CLAIMS):
+            raise ValueError(f"{self.phrase!r} claims nothing that can be checked: add {', '.join(_CLAIMS)}")
+        return self
+
+    @property
+    def _said(self) -> tuple[str, ...]:
+        return (*self.say, *self.also, *self.adjectives, *self.clauses)
+
+    @property
+    def phrase(self) -> str:
+        """Its first wording, which is its key in the catalogue."""
+        return self._said[0]
 
     @property
     def details(self) -> tuple[str, ...]:
@@ -138,102 +201,25 @@ def parse_appearances(raw: Any, names: Sequence[str], materials: Sequence[str], 
     """Parse a category's looks."""
     if not isinstance(raw, list):
         raise AssetError(f"{where}: looks must be an array of tables")
-    appearances = tuple(_appearance(entry, names, materials, f"{where} looks[{k}]") for k, entry in enumerate(raw))
-    said: set[str] = set()
-    for k, appearance in enumerate(appearances):
-        for wording in (*appearance.wordings, *appearance.adjectives):
+    appearances, said = [], set[str]()
+    for k, entry in enumerate(raw):
+        own = f"{where} looks[{k}]"
+        one = validated(Appearance, entry, own)
+        for key, claimed, known in (("colour", one.colour, COLOURS), ("material", one.material, materials)):
+            refuse_unknown([word for words in claimed.values() for word in words], known, f"{own} {key}", key)
+        check_parts((*one.parts, *one.lacks), names, own)
+        for wording in (*one.wordings, *one.adjectives):
             if wording in said:
-                raise AssetError(f"{where} looks[{k}]: duplicate phrase {wording!r}")
+                raise AssetError(f"{own}: duplicate phrase {wording!r}")
             said.add(wording)
-    return appearances
+        appearances.append(one)
+    return tuple(appearances)
 
 
-def _appearance(entry: Any, names: Sequence[str], materials: Sequence[str], where: str) -> Appearance:
-    if not isinstance(entry, dict) or not {"say", "adjective"} & set(entry):
-        raise AssetError(f"{where}: must be a table with say or adjective: its words, and what they claim")
-    refuse_unknown(entry, _KEYS, where)
-    if "also" in entry and "say" not in entry:
-        raise AssetError(f"{where}: also needs say")
-    say, also = _words(entry, "say", where), _words(entry, "also", where)
-    adjectives, clauses = _words(entry, "adjective", where), _words(entry, "clause", where)
-    said = (*say, *also, *adjectives, *clauses)
-    for clause in clauses:
-        if clause.split(" ")[0] not in _SUBJECTS:
-            raise AssetError(f"{where}: clause {clause!r} must begin with one of {', '.join(_SUBJECTS)}")
-    if not all(wording.strip() == wording != "" for wording in said):
-        raise AssetError(f"{where}: a wording is empty, or has blanks at its ends")
-    if not set(entry) - set(_SAYS):
-        claims = ", ".join(_KEYS[len(_SAYS) :])
-        raise AssetError(f"{where}: {said[0]!r} claims nothing that can be checked: add {claims}")
-    appearance = Appearance(
-        said[0],
-        also,
-        adjectives,
-        clauses,
-        has=_words(entry, "has", where),
-        lacks=_words(entry, "lacks", where),
-        count={name: _range(n, f"{where} count {name}") for name, n in _table(entry, "count", where).items()},
-        form={name: str(form) for name, form in _table(entry, "form", where).items()},
-        colour=_choices(entry, "colour", COLOURS, where),
-        material=_choices(entry, "material", materials, where),
-        size=tuple(_comparison(text, where) for text in _words(entry, "size", where)),
-        order=tuple(_order(text, where) for text in _words(entry, "order", where)),
-    )
-    for name in (*appearance.parts, *appearance.lacks):
-        for one in name.split("|"):
-            if one not in names:
-                raise AssetError(f"{where}: no part {one!r}{nearest(one, names)}: parts are named by tag or role")
-    for form in appearance.form.values():
-        if form not in FORMS:
-            raise AssetError(f"{where}: unknown form {form!r}{nearest(form, FORMS)} (one of {', '.join(FORMS)})")
-    return appearance
-
-
-def _table(entry: Mapping[str, Any], key: str, where: str) -> Mapping[str, Any]:
-    value = entry.get(key, {})
-    if not isinstance(value, dict) or (key in entry and not value):
-        raise AssetError(f"{where}: {key} must be a table of parts")
-    return value
-
-
-def _words(entry: Mapping[str, Any], key: str, where: str) -> tuple[str, ...]:
-    value = entry.get(key, [])
-    value = [value] if isinstance(value, str) else value
-    if not isinstance(value, list) or not all(isinstance(v, str) for v in value) or (key in entry and not value):
-        raise AssetError(f"{where}: {key} must be a list of words")
-    return tuple(value)
-
-
-def _choices(entry: Mapping[str, Any], key: str, known: Sequence[str], where: str) -> dict[str, tuple[str, ...]]:
-    out = {}
-    for name, value in _table(entry, key, where).items():
-        words = tuple(value.split("|")) if isinstance(value, str) else ()
-        refuse_unknown(words or (str(value),), known, f"{where} {key}", key)
-        out[name] = words
-    return out
-
-
-def _range(value: Any, where: str) -> tuple[int, int]:
-    ends = value if isinstance(value, list) else [value, value]
-    if len(ends) != 2 or not all(type(n) is int for n in ends) or not 0 < ends[0] <= ends[1]:
-        raise AssetError(f"{where}: must be a whole number or [least, most], got {value!r}")
-    return ends[0], ends[1]
-
-
-def _comparison(text: str, where: str) -> Comparison:
-    m = _SIZE.fullmatch(text.strip())
-    if m is None or (m["factor"] is None and m["bm"] is None):
-        raise AssetError(f'{where} size: {text!r} is no comparison like "height > 1.9" or "length > 3 * width"')
-    other = None if m["bm"] is None else (m["bp"] or "", m["bm"])
-    return Comparison(m["ap"] or "", m["am"], m["sign"] == ">", float(m["factor"] or 1.0), other, text)
-
-
-def _order(text: str, where: str) -> Order:
-    m = _ORDER.fullmatch(text.strip())
-    if m is None:
-        known = ", ".join([*(f'"a {r} b"' for r in RELATIONS), *(f'"a {p}"' for p in PLACES)])
-        raise AssetError(f"{where} order: {text!r} is none of {known}")
-    return Order(m["a"], m["relation"] or m["place"], m["b"] or "", text)
+def check_parts(names: Iterable[str], known: Sequence[str], where: str) -> None:
+    """Raise an `AssetError` for the name of a part, or one of several, ``"a|b"``, that a category does not have."""
+    hint = f"{where}: parts are named by tag or role"
+    refuse_unknown([one for name in names for one in name.split("|")], known, hint, "part")
 
 
 class Materials(Protocol):

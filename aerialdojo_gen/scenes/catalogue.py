@@ -6,7 +6,7 @@ import gc
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -20,12 +20,21 @@ from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.geometry.frames import wrap_angle_rad
 from aerialdojo_gen.scenes.builders import builders
 from aerialdojo_gen.scenes.catalogue_files import TARGETS, catalogue_files
-from aerialdojo_gen.scenes.designs import Design, DesignSets, load_sets
 from aerialdojo_gen.scenes.kernels import placed_vertices
 from aerialdojo_gen.scenes.materials import MaterialLibrary, load_materials, read_toml, refuse_unknown
 from aerialdojo_gen.scenes.mesh import Mesh, merge, rotation, to_part
 from aerialdojo_gen.scenes.model import FRONTS, Anatomy, Instance, Part, Run, remap_runs
-from aerialdojo_gen.scenes.prop import Category, Entry, Variant, designs_of, parse_category, parse_entry, tags_of
+from aerialdojo_gen.scenes.prop import (
+    Category,
+    Design,
+    DesignSets,
+    Entry,
+    Variant,
+    load_sets,
+    parse_category,
+    parse_entry,
+    words_of,
+)
 from aerialdojo_gen.scenes.vocabulary import MAX_TRIANGLES, copies_in, part_mesh
 
 _MATERIALS = "materials.toml"
@@ -110,7 +119,7 @@ class Catalogue:
         form = prop.designs[0] if design is None else prop.design(design)
         if own.stretch is not None:
             x, y, z = (mine * factor for mine, factor in zip(form.stretch, own.stretch, strict=True))
-            form = replace(form, stretch=(x, y, z))
+            form = form.model_copy(update={"stretch": (x, y, z)})
         sizes = self._draw_params(prop, kind, {**form.params, **(own.params or {})}, rng)
         shape_seed = int(rng.integers(_CROWN_SHAPES))
         surfaces = dict(prop.roles) | dict(kind.roles) | dict(own.roles or {})
@@ -168,8 +177,8 @@ class Catalogue:
     ) -> _Body:
         meshes: list[_Piece] = []
         for k, part in enumerate(prop.parts):
-            only = designs_of(part)
-            if (kind.without | form.without).intersection(tags_of(part)) or (only and form.name not in only):
+            only = words_of(part, "design")
+            if (kind.without | form.without).intersection(words_of(part, "tag")) or (only and form.name not in only):
                 continue
             own = part
             if _is_drawn_crown(part):
@@ -178,7 +187,7 @@ class Catalogue:
                 body, copies = part_mesh(own, sizes, words, form.stretch), copies_in(own, sizes)
             except ShapeError as error:
                 raise AssetError(f"{prop.source} parts[{k}] ({part['shape']}): {error}") from error
-            meshes.append(_Piece(part["role"], body, tags_of(part), copies))
+            meshes.append(_Piece(part["role"], body, words_of(part, "tag"), copies))
         total = sum(len(piece.body.faces) for piece in meshes)
         if total > MAX_TRIANGLES:
             raise AssetError(f"{prop.source} has {total:,} triangles, the maximum is {MAX_TRIANGLES:,}")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
+import pydantic_core
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from aerialdojo_gen.base import safe_parse
 from aerialdojo_gen.base.errors import AssetError
@@ -24,16 +24,22 @@ from aerialdojo_gen.scenes.textures_facade import Layout, draw_facade
 from aerialdojo_gen.scenes.textures_natural import NATURAL
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
-_KEYS = {"texture", "colour", "tile_m", "layouts"}
-_SMALLEST_TILE_M, _LARGEST_TILE_M = 0.01, 1000.0
+Model = TypeVar("Model", bound=BaseModel)
 
 
-@dataclass(frozen=True)
-class _Entry:
-    texture: str | None
-    colour: str
-    tile_m: float = 1.0
-    layouts: Mapping[str, Layout] | None = None  # Of a façade, in place of a texture
+class _Entry(BaseModel, frozen=True, extra="forbid"):
+    """A surface of the file."""
+
+    colour: Annotated[str, Field(pattern="^#[0-9a-fA-F]{6}$")]
+    texture: str | None = None
+    tile_m: Annotated[float, Field(ge=0.01, le=1000)] = 1.0
+    layouts: dict[Annotated[str, Field(pattern=r"^[^\W\d]\w*$")], Layout] = {}  # Of a façade, in place of a texture
+
+    @model_validator(mode="after")
+    def _one_pattern(self) -> _Entry:
+        if self.texture is not None and self.layouts:
+            raise ValueError("it has a texture or layouts, not both")
+        return self
 
 
 class MaterialLibrary:
@@ -73,7 +79,7 @@ class MaterialLibrary:
     def layouts(self, spec: str) -> tuple[str, ...]:
         """Names of the layouts that a façade comes in; none of other surfaces."""
         entry = self._entries.get(_split(spec)[0])
-        return tuple(entry.layouts or ()) if entry else ()
+        return tuple(entry.layouts) if entry else ()
 
     def laid_out(self, spec: str, draw: int, flush: bool = False) -> str:
         """Give a façade the layout that a number draws, unless its specification names one.
@@ -82,7 +88,7 @@ class MaterialLibrary:
         """
         (name, colour, layout), known = _split(spec), self.layouts(spec)
         if flush and known:
-            known = tuple(k for k, one in (self._entries[name].layouts or {}).items() if one.flush) or known
+            known = tuple(k for k, one in self._entries[name].layouts.items() if one.flush) or known
         return spec if layout or not known else f"{name}:{colour}:{known[draw % len(known)]}"
 
     def __getitem__(self, spec: str) -> Material:
@@ -90,7 +96,7 @@ class MaterialLibrary:
         if spec not in self._cache:
             self.check(spec, "material")
             name, colour, _ = _split(spec)
-            entry = self._entries.get(name, _Entry(None, spec))
+            entry = self._entries.get(name) or _Entry(colour=spec)
             rgb = parse_colour(colour or entry.colour)
             image = None
             if entry.layouts:
@@ -107,7 +113,8 @@ class MaterialLibrary:
     def tile_m(self, spec: str) -> float:
         """Edge of a texture tile of a material, metres; 1 for a flat colour."""
         self.check(spec, "material")
-        return self._entries.get(_split(spec)[0], _Entry(None, spec)).tile_m
+        entry = self._entries.get(_split(spec)[0])
+        return 1.0 if entry is None else entry.tile_m
 
 
 def load_materials(path: Path) -> MaterialLibrary:
@@ -115,31 +122,9 @@ def load_materials(path: Path) -> MaterialLibrary:
     entries = {}
     for name, body in read_toml(path).items():
         where = f"{path}: material {name!r}"
-        if not isinstance(body, dict):
-            raise AssetError(f"{where} is no table")
-        refuse_unknown(body, _KEYS, where)
-        texture, colour, tile_m = body.get("texture"), body.get("colour"), body.get("tile_m", 1.0)
-        refuse_unknown([] if texture is None else [texture], TEXTURES, where, "texture")
-        if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
-            raise AssetError(f"{where}: colour must be of the form #rrggbb, got {colour!r}")
-        if not isinstance(tile_m, int | float) or not _SMALLEST_TILE_M <= tile_m <= _LARGEST_TILE_M:
-            raise AssetError(f"{where}: tile_m must be {_SMALLEST_TILE_M:g} to {_LARGEST_TILE_M:g} m, got {tile_m!r}")
-        if texture is not None and "layouts" in body:
-            raise AssetError(f"{where} has a texture or layouts, not both")
-        entries[name] = _Entry(texture, colour, float(tile_m), _layouts(body.get("layouts", {}), where))
+        entry = entries[name] = validated(_Entry, body, where)
+        refuse_unknown([] if entry.texture is None else [entry.texture], TEXTURES, where, "texture")
     return MaterialLibrary(entries, path.name)
-
-
-def _layouts(raw: Any, where: str) -> dict[str, Layout]:
-    if not isinstance(raw, dict) or not all(name.isidentifier() for name in raw):
-        raise AssetError(f"{where}: layouts are tables by names of letters, digits and _")
-    made = {}
-    for name, body in raw.items():
-        try:
-            made[name] = Layout.model_validate(body)
-        except ValidationError as error:
-            raise AssetError(f"{where}: layout {name!r}: {'; '.join(explain(error, Layout))}") from error
-    return made
 
 
 def _split(spec: str) -> tuple[str, str, str]:
@@ -159,6 +144,15 @@ def refuse_unknown(body: Iterable[Any], known: Iterable[str], where: str, what: 
     for key in body:
         if key not in names:
             raise AssetError(f"{where}: unknown {what} {key!r}{nearest(str(key), names)}")
+
+
+def validated(model: type[Model], body: Any, where: str) -> Model:
+    """Validate a table strictly against its model; an `AssetError` names the key."""
+    try:
+        # As JSON, because only there a list is a strict tuple: "nan" and false are numbers to a lenient model.
+        return model.model_validate_json(pydantic_core.to_json(body), strict=True)
+    except ValidationError as error:
+        raise AssetError(f"{where}: {'; '.join(explain(error, model))}") from error
 
 
 def read_toml(path: Path) -> dict[str, Any]:

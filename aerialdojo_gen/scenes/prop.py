@@ -1,79 +1,97 @@
-"""Categories of the catalogue as data: read from TOML tables and checked to the last key."""
+"""Categories of the catalogue as data, their variants and designs: read from TOML tables, checked to the last key."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from aerialdojo_gen.base.errors import AssetError, ShapeError
 from aerialdojo_gen.base.names import nearest
-from aerialdojo_gen.scenes.appearances import Appearance, parse_appearances
+from aerialdojo_gen.scenes.appearances import Appearance, both_ends, check_parts, parse_appearances
 from aerialdojo_gen.scenes.builders import builders
-from aerialdojo_gen.scenes.designs import PLAIN, Design, DesignSets, parse_designs
-from aerialdojo_gen.scenes.materials import MaterialLibrary, refuse_unknown
+from aerialdojo_gen.scenes.materials import MaterialLibrary, read_toml, refuse_unknown, validated
 from aerialdojo_gen.scenes.model import FRONTS
+from aerialdojo_gen.scenes.recipe import Side
 from aerialdojo_gen.scenes.vocabulary import ARRAY_KEYS, PLACEMENT_KEYS, RING_KEYS, SHAPES, names_used, shape_keys
 
 KINDS = ("prop", "vegetation", "vehicle", "building", "landmark", "life")
-Range = tuple[float, float]
-_CATEGORY_KEYS = ("name", "kind", "params", "roles", "parts", "builder", "variants", "looks", "front", "tells",
-                  "designs", "scale")  # fmt: skip
-_VARIANT_KEYS = ("name", "attributes", "roles", "params", "without", "weight", "tells")
-_MIRRORS = ("x", "y", "xy")
-_MAX_PARTS = 1000
-_MAX_VALUE = 10_000.0
-_MIN_SCALE, _MAX_SCALE = 0.1, 10.0
+_HEAD_KEYS = ("name", "kind", "front", "looks", "variants", "designs")
 
 
-@dataclass(frozen=True)
-class Variant:
+def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[0] > ends[1]:
+        raise ValueError("must be a number or [low, high]")
+    return ends
+
+
+_Value = Annotated[float, Field(ge=-10_000, le=10_000)]
+Range = Annotated[tuple[_Value, _Value], BeforeValidator(both_ends), AfterValidator(_ascending)]
+_Factor = Annotated[float, Field(ge=0.5, le=2)]
+
+
+class Design(BaseModel, frozen=True, extra="forbid"):
+    """How a design differs from what the category's parts say."""
+
+    name: Annotated[str, Field(pattern=r"^[^\W\d]\w*$")]
+    stretch: tuple[_Factor, _Factor, _Factor] = (1.0, 1.0, 1.0)  # Along the thing's own x, y and z
+    params: dict[str, float] = {}
+    without: frozenset[str] = frozenset()
+    held_out: bool = False  # Whether it stands in no scene of the training side
+
+
+PLAIN = Design(name="plain")
+DesignSets = Mapping[str, tuple[Design, ...]]
+
+
+class Variant(BaseModel, frozen=True, extra="forbid"):
     """A variant of a category: its differences from the default."""
 
     name: str
-    attributes: Mapping[str, str]
-    roles: Mapping[str, str]
-    params: Mapping[str, Range]
-    without: frozenset[str]
-    weight: float
-    identifying_parts: tuple[str, ...] = ()
+    attributes: dict[str, str] = {}
+    roles: dict[str, str] = {}
+    params: dict[str, Range] = {}
+    without: frozenset[str] = frozenset()
+    weight: Annotated[float, Field(gt=0)] = 1.0
+    identifying_parts: Annotated[tuple[str, ...], Field(alias="tells")] = ()
 
 
-@dataclass(frozen=True)
-class Category:
+class Category(BaseModel, frozen=True, extra="forbid"):
     """A category of props."""
 
     category: str  # Its key, e.g. ``"delivery_van"``
     name: str  # Common noun, e.g. ``"delivery van"``
     kind: str  # One of `KINDS`
-    looks: tuple[Appearance, ...]
-    params: Mapping[str, Range]  # Sizes drawn once an instance; a fixed one has low == high
-    roles: Mapping[str, str]  # Default material of every role
-    parts: tuple[Mapping[str, Any], ...]  # Tables of the parts; empty where a builder makes them
-    builder: str | None  # Name of the builder
-    variants: tuple[Variant, ...]  # At least one; a category without variants has one of an empty name
     source: str  # File and category, for messages
-    target: bool = True  # Whether tasks may ask for it: false of landmarks and of scenery
-    front: str = ""
-    identifying_parts: tuple[str, ...] = ()  # Parts that make its name true; empty where the whole body does
+    target: bool  # Whether tasks may ask for it: false of landmarks and of scenery
+    front: str
+    params: dict[str, Range] = {}  # Sizes drawn once an instance; a fixed one has low == high
+    roles: dict[str, str] = {}  # Default material of every role
+    parts: Annotated[tuple[dict[str, Any], ...], Field(max_length=1000)] = ()  # Empty where a builder makes them
+    builder: str | None = None  # Name of the builder
+    identifying_parts: Annotated[tuple[str, ...], Field(alias="tells")] = ()  # Empty where the whole body does
+    scale: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 1.0  # Of all that its parts or builder say
+    looks: tuple[Appearance, ...] = ()
+    variants: tuple[Variant, ...] = (Variant(name=""),)  # A category without variants has one of an empty name
     designs: tuple[Design, ...] = (PLAIN,)  # Forms that it comes in; the first is what its parts say
-    scale: float = 1.0  # Factor of all that its parts or its builder say
 
     def design(self, name: str) -> Design:
         """Look a design up; an `AssetError` names the nearest one."""
-        for one in self.designs:
-            if one.name == name:
-                return one
-        raise AssetError(f"{self.source}: unknown design {name!r}{nearest(name, [one.name for one in self.designs])}")
+        return self._named(self.designs, name, "design")
 
     def variant(self, name: str) -> Variant:
         """Look a variant up; an `AssetError` names the nearest one."""
-        for v in self.variants:
-            if v.name == name:
-                return v
-        known = [v.name for v in self.variants]
-        raise AssetError(f"{self.source}: unknown variant {name!r}{nearest(name, known)}")
+        return self._named(self.variants, name, "variant")
+
+    def _named(self, several: Sequence[_Named], name: str, what: str) -> _Named:
+        refuse_unknown([name], [one.name for one in several], self.source, what)
+        return next(one for one in several if one.name == name)
+
+
+_Named = TypeVar("_Named", Design, Variant)
+_TABLE_KEYS = ("params", "roles", "parts", "builder", "tells", "scale")
 
 
 class Entry(NamedTuple):
@@ -102,7 +120,7 @@ def parse_entry(path: Path, category: str, body: Any, target: bool = True) -> En
         raise AssetError(f"{where} is no table")
     if not category.isidentifier() or category != category.lower():
         raise AssetError(f"{where}: a category is named in snake_case")
-    refuse_unknown(body, _CATEGORY_KEYS, where)
+    refuse_unknown(body, (*_HEAD_KEYS, *_TABLE_KEYS), where)
     name, kind = body.get("name"), body.get("kind", "prop")
     if not isinstance(name, str) or not name.strip():
         raise AssetError(f"{where}: name is missing: what a person calls it")
@@ -117,87 +135,47 @@ def parse_category(entry: Entry, materials: MaterialLibrary, sets: DesignSets) -
     front = body.get("front", "")
     if "front" in body and (not isinstance(front, str) or front not in FRONTS):
         raise AssetError(f"{where}: front must be one of {', '.join(FRONTS)}, got {front!r}")
-    params = _params(body.get("params", {}), f"{where} params")
-    roles = _roles(body.get("roles", {}), None, materials, f"{where} roles")
-    builder, parts = body.get("builder"), body.get("parts", [])
-    if (builder is None) == (not parts):
+    head = {"category": category, "name": entry.name, "kind": entry.kind, "source": where, "target": target}
+    table = {key: body[key] for key in _TABLE_KEYS if key in body}
+    prop = validated(Category, {**head, "front": front, **table}, where)
+    _check_materials(prop.roles, materials, f"{where} roles")
+    if (prop.builder is None) == (not prop.parts):
         raise AssetError(f"{where}: give parts or a builder, one of them")
-    refuse_unknown([] if builder is None else [builder], builders(), where, "builder")
-    if not isinstance(parts, list):
-        raise AssetError(f"{where}: parts must be an array of tables, [[{category}.parts]]")
-    for k, part in enumerate(parts):
-        _check_part(part, params, roles, materials, f"{where} parts[{k}]")
-    if len(parts) > _MAX_PARTS:
-        raise AssetError(f"{where}: {len(parts):,} parts, the maximum is {_MAX_PARTS}")
-    tags = {tag for p in parts for tag in tags_of(p)}
-    named = sorted({*tags, *roles, *(p["role"] for p in parts)})
+    refuse_unknown([] if prop.builder is None else [prop.builder], builders(), where, "builder")
+    for k, part in enumerate(prop.parts):
+        _check_part(part, prop, materials, f"{where} parts[{k}]")
+    tags = {tag for part in prop.parts for tag in words_of(part, "tag")}
+    named = sorted({*tags, *prop.roles, *(part["role"] for part in prop.parts)})
     looks = parse_appearances(body.get("looks", []), named, materials.names, where)
-    identifying_parts = _identifying_parts(body.get("tells", []), named, where)
+    check_parts(prop.identifying_parts, named, f"{where}: tells")
     raw = body.get("variants", [])
     if not isinstance(raw, list):
         raise AssetError(f"{where}: variants must be an array of tables, [[{category}.variants]]")
     variants: list[Variant] = []
-    for k, v in enumerate(raw):
-        variants.append(_variant(v, params, roles, tags, named, materials, f"{where} variants[{k}]"))
-        if variants[-1].name in {x.name for x in variants[:-1]}:
+    for k, one in enumerate(raw):
+        variants.append(_variant(one, prop, tags, named, materials, f"{where} variants[{k}]"))
+        if variants[-1].name in {v.name for v in variants[:-1]}:
             raise AssetError(f"{where} variants[{k}]: duplicate variant {variants[-1].name!r}")
-    if not variants:
-        variants.append(Variant("", {}, {}, {}, frozenset(), 1.0))
     chosen = body.get("designs", "plain")
     sets = {"plain": (PLAIN,), **sets}
     refuse_unknown([chosen] if isinstance(chosen, str) else [], sets, where, "set of designs")
-    designs = sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, params, tags, f"{where} designs")
-    scale = body.get("scale", 1.0)
-    if not isinstance(scale, int | float) or isinstance(scale, bool) or not _MIN_SCALE <= scale <= _MAX_SCALE:
-        raise AssetError(f"{where}: scale must be a number from {_MIN_SCALE:g} to {_MAX_SCALE:g}, got {scale!r}")
-    known = [one.name for one in designs]
-    for k, part in enumerate(parts):
-        refuse_unknown(designs_of(part), known, f"{where} parts[{k}]", "design")
-    return Category(
-        category,
-        entry.name,
-        entry.kind,
-        looks,
-        params,
-        roles,
-        tuple(parts),
-        builder,
-        tuple(variants),
-        where,
-        target,
-        front,
-        identifying_parts,
-        designs,
-        float(scale),
+    designs = (
+        sets[chosen] if isinstance(chosen, str) else parse_designs(chosen, prop.params, tags, f"{where} designs")
     )
+    for k, part in enumerate(prop.parts):
+        refuse_unknown(words_of(part, "design"), [one.name for one in designs], f"{where} parts[{k}]", "design")
+    own = {"looks": looks, "designs": designs} | ({"variants": tuple(variants)} if variants else {})
+    return prop.model_copy(update=own)
 
 
-def tags_of(part: Mapping[str, Any]) -> tuple[str, ...]:
-    """Tags of a part: none, one, or those of a list."""
-    tag = part.get("tag", ())
-    return (tag,) if isinstance(tag, str) else tuple(tag)
+def words_of(part: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    """Tags of a part, or names of the designs that have it: none, one, or those of a list."""
+    words = part.get(key, ())
+    return (words,) if isinstance(words, str) else tuple(words)
 
 
-def designs_of(part: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the designs that have a part: none where all have it."""
-    design = part.get("design", ())
-    return (design,) if isinstance(design, str) else tuple(design)
-
-
-def _identifying_parts(raw: Any, named: Sequence[str], where: str) -> tuple[str, ...]:
-    if not isinstance(raw, list) or not all(isinstance(name, str) for name in raw):
-        raise AssetError(f"{where}: tells must be a list of parts, got {raw!r}")
-    for name in raw:
-        for one in name.split("|"):
-            if one not in named:
-                raise AssetError(f"{where}: tells: no part {one!r}{nearest(one, named)}: named by tag or role")
-    return tuple(raw)
-
-
-def _check_part(
-    part: Any, params: Mapping[str, Range], roles: Mapping[str, str], materials: MaterialLibrary, where: str
-) -> None:
-    if not isinstance(part, dict) or "shape" not in part:
+def _check_part(part: dict[str, Any], prop: Category, materials: MaterialLibrary, where: str) -> None:
+    if "shape" not in part:
         raise AssetError(f"{where}: shape is missing")
     shape = part["shape"]
     refuse_unknown([shape], SHAPES, where, "shape")
@@ -213,88 +191,73 @@ def _check_part(
             refuse_unknown(part[key], inner, f"{where} {key}")
     if part.get("ring", {}).get("axis", "z") not in ("x", "y", "z"):
         raise AssetError(f"{where} ring: axis must be x, y or z")
-    if part.get("mirror", "x") not in _MIRRORS:
+    if part.get("mirror", "x") not in ("x", "y", "xy"):
         raise AssetError(f"{where}: mirror must be x, y or xy, got {part['mirror']!r}")
-    tags = part.get("tag", "")
-    if not isinstance(tags, str) and not (isinstance(tags, list) and all(isinstance(t, str) for t in tags)):
-        raise AssetError(f"{where}: tag must be a word or a list of words, got {tags!r}")
-    given = part.get("design", "plain")
-    if not isinstance(given, str) and not (isinstance(given, list) and all(isinstance(d, str) for d in given)):
-        raise AssetError(f"{where}: design must be a name or a list of names, got {given!r}")
+    for key in ("tag", "design"):
+        words = part.get(key, "")
+        if not isinstance(words, str) and not (
+            isinstance(words, list) and all(isinstance(one, str) for one in words)
+        ):
+            raise AssetError(f"{where}: {key} must be a word or a list of words, got {words!r}")
     role = part.get("role")
     if not isinstance(role, str):
         raise AssetError(f"{where}: role is missing: a role of the category or a material")
-    if role not in roles:
-        _check_material(role, roles, materials, where)
+    if role not in prop.roles:
+        known = role.startswith("#") or role.partition(":")[0] in materials.names
+        if not known and (near := nearest(role, prop.roles)):
+            raise AssetError(f"{where}: unknown role {role!r}{near}")
+        materials.check(role, where)
     try:
         used = sorted(names_used(part))
     except ShapeError as error:
         raise AssetError(f"{where}: {error}") from error
-    refuse_unknown(used, params, where, "parameter")
+    refuse_unknown(used, prop.params, where, "parameter")
 
 
 def _variant(
-    body: Any,
-    params: Mapping[str, Range],
-    roles: Mapping[str, str],
-    tags: set[str],
-    named: Sequence[str],
-    materials: MaterialLibrary,
-    where: str,
+    raw: Any, prop: Category, tags: set[str], named: Sequence[str], materials: MaterialLibrary, where: str
 ) -> Variant:
-    if not isinstance(body, dict) or not isinstance(body.get("name"), str) or not body["name"]:
+    if not isinstance(raw, dict) or not raw.get("name"):
         raise AssetError(f"{where}: name is missing")
-    where = f"{where} ({body['name']})"
-    refuse_unknown(body, _VARIANT_KEYS, where)
-    attributes = body.get("attributes", {})
-    if not isinstance(attributes, dict) or not all(isinstance(v, str) for v in attributes.values()):
-        raise AssetError(f"{where}: attributes must be words")
-    own_params = _params(body.get("params", {}), f"{where} params")
-    refuse_unknown(own_params, params, f"{where} params")
-    without = body.get("without", [])
-    if not isinstance(without, list):
-        raise AssetError(f"{where}: without must be a list of tags, got {without!r}")
-    for tag in without:
-        if not isinstance(tag, str) or tag not in tags:
-            raise AssetError(f"{where}: without names the unknown tag {tag!r}{nearest(str(tag), tags)}")
-    weight = body.get("weight", 1)
-    if not isinstance(weight, int | float) or weight <= 0:
-        raise AssetError(f"{where}: weight must be a positive number, got {weight!r}")
-    own_roles = _roles(body.get("roles", {}), roles, materials, f"{where} roles")
-    identifying_parts = _identifying_parts(body.get("tells", []), named, where)
-    return Variant(
-        body["name"], attributes, own_roles, own_params, frozenset(without), float(weight), identifying_parts
-    )
+    where = f"{where} ({raw['name']})"
+    variant = validated(Variant, raw, where)
+    refuse_unknown(variant.params, prop.params, f"{where} params")
+    refuse_unknown(sorted(variant.without), tags, f"{where} without", "tag")
+    refuse_unknown(variant.roles, prop.roles, f"{where} roles")
+    _check_materials(variant.roles, materials, f"{where} roles")
+    check_parts(variant.identifying_parts, named, f"{where}: tells")
+    return variant
 
 
-def _params(body: Any, where: str) -> dict[str, Range]:
-    if not isinstance(body, dict):
-        raise AssetError(f"{where} is no table")
-    out = {}
-    for key, value in body.items():
-        ends = value if isinstance(value, list) else [value, value]
-        if len(ends) != 2 or not all(isinstance(v, int | float) for v in ends) or ends[0] > ends[1]:
-            raise AssetError(f"{where}: {key} must be a number or [low, high], got {value!r}")
-        if not -_MAX_VALUE <= ends[0] <= ends[1] <= _MAX_VALUE:
-            raise AssetError(f"{where}: {key} must lie within {_MAX_VALUE:,.0f}, got {value!r}")
-        out[key] = (float(ends[0]), float(ends[1]))
-    return out
+def _check_materials(roles: Mapping[str, str], materials: MaterialLibrary, where: str) -> None:
+    for role, spec in roles.items():
+        materials.check(spec, f"{where} {role}")
 
 
-def _roles(body: Any, known: Mapping[str, str] | None, materials: MaterialLibrary, where: str) -> dict[str, str]:
-    if not isinstance(body, dict):
-        raise AssetError(f"{where} is no table")
-    if known is not None:
-        refuse_unknown(body, known, where)
-    for role, spec in body.items():
-        if not isinstance(spec, str):
-            raise AssetError(f"{where}: {role} must be a material, got {spec!r}")
-        _check_material(spec, (), materials, f"{where} {role}")
-    return dict(body)
+def of_side(designs: Sequence[Design], side: Side) -> Sequence[Design]:
+    """Designs that a scene of one side may have: the first where it has no other."""
+    if side == "plain":
+        return designs[:1]
+    return [one for one in designs if one.held_out == (side == "held_out")] or designs[:1]
 
 
-def _check_material(spec: str, roles: Mapping[str, str] | tuple[()], materials: MaterialLibrary, where: str) -> None:
-    known = spec.startswith("#") or spec.partition(":")[0] in materials.names
-    if not known and (near := nearest(spec, roles)):
-        raise AssetError(f"{where}: unknown role {spec!r}{near}")
-    materials.check(spec, where)
+def parse_designs(raw: Any, params: Mapping[str, Any], tags: set[str], where: str) -> tuple[Design, ...]:
+    """Check a list of designs."""
+    if not isinstance(raw, list) or not raw:
+        raise AssetError(f"{where}: designs must be an array of tables, or the name of a set")
+    designs = tuple(validated(Design, one, f"{where}[{k}]") for k, one in enumerate(raw))
+    for k, one in enumerate(designs):
+        refuse_unknown(one.params, params, f"{where}[{k}] params")
+        refuse_unknown(sorted(one.without), tags, f"{where}[{k}] without", "tag")
+    names = [one.name for one in designs]
+    if len(set(names)) < len(names):
+        raise AssetError(f"{where}: two designs have one name ({', '.join(names)})")
+    if designs[0].held_out:
+        raise AssetError(f"{where}[0]: the first design is not held out: it is the one that all others differ from")
+    return designs
+
+
+def load_sets(path: Path) -> DesignSets:
+    """Read the designs that categories share; without the file there are none."""
+    body = read_toml(path) if path.is_file() else {}
+    return {name: parse_designs(raw, {}, set(), f"{path}: {name}") for name, raw in body.items()}

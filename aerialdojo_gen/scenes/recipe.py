@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import numpy as np
-import pydantic_core
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from aerialdojo_gen.base.errors import AssetError
-from aerialdojo_gen.base.explain import explain
 from aerialdojo_gen.geometry.portable import unit
-from aerialdojo_gen.scenes.designs import Side
 from aerialdojo_gen.scenes.light import LightHead, sun_at
-from aerialdojo_gen.scenes.materials import read_toml
+from aerialdojo_gen.scenes.materials import read_toml, validated
 
-Model = TypeVar("Model", bound=BaseModel)
 _MAX_TEXT = 200
+Side = Literal["train", "held_out", "plain"]  # Which designs of their categories the things of a scene have
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 # Ground is cut into cells of a metre or so: larger sites than this take gigabytes, and more than a drone can fly.
 Extent = Annotated[float, Field(ge=2, le=1000)]
@@ -154,12 +151,3 @@ def imported_of(path: Path, body: dict[str, Any]) -> Imported | None:
     if set(body) != {"imported"} or not isinstance(body["imported"], dict):
         raise AssetError(f"{path}: a scene is imported or a plan: remove all other keys than [imported]")
     return validated(Imported, body["imported"], f"{path}: imported")
-
-
-def validated(model: type[Model], body: dict[str, Any], where: str) -> Model:
-    """Validate a table strictly against its model; an `AssetError` names the key."""
-    try:
-        # As JSON, because only there a list is a strict tuple: "nan" and false are numbers to a lenient model.
-        return model.model_validate_json(pydantic_core.to_json(body), strict=True)
-    except ValidationError as error:
-        raise AssetError(f"{where}: {'; '.join(explain(error, model))}") from error

@@ -19,7 +19,6 @@ from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.base.names import nearest
 from aerialdojo_gen.base.rng import generator, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue, Overrides, placed
-from aerialdojo_gen.scenes.designs import of_side
 from aerialdojo_gen.scenes.ground import Surface, ground_meshes, rectangle
 from aerialdojo_gen.scenes.horizon.build import make_horizon
 from aerialdojo_gen.scenes.materials import parse_colour
@@ -36,6 +35,7 @@ from aerialdojo_gen.scenes.placement import (
     hull,
     rest_on_ground,
 )
+from aerialdojo_gen.scenes.prop import of_side
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 

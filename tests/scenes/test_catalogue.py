@@ -22,6 +22,7 @@ MATERIALS = """
 paint = { colour = "#c8c8c8" }
 metal = { colour = "#808080" }
 brick = { texture = "brick", colour = "#9a4a3c", tile_m = 0.5 }
+boards = { texture = "planks", colour = "#9a6b3f", tile_m = 0.5 }
 """
 MAILBOX = """
 [mailbox]
@@ -42,17 +43,50 @@ variants = [
 """
 
 
-def written(folder: Path, materials: str, props: str) -> Path:
+LAMP = """
+[lamp]
+name = "lamp"
+front = "x"
+tells = ["glass"]
+roles = { pole = "paint:#101010", glass = "#ffffff" }
+looks = [
+  { say = "a tall pole", form = { shaft = "slender" }, size = ["height > 3", "shaft.height > 4 * length"] },
+  { say = "two arms", count = { arm = 2 } },
+  { say = "one arm", count = { arm = 1 } },
+  { say = "no hat", lacks = "hat" },
+  { say = "a pointed hat on top", form = { hat = "pointed" }, order = ["hat on top", "hat above pole"] },
+  { say = "glass above a black foot", colour = { glass = "white", foot = "black" }, order = ["glass above foot"] },
+  { say = "a wooden foot", material = { foot = "boards" } },
+  { say = "a round pole and a square foot", form = { pole = "round", foot = "boxy" } },
+  { say = "a red glass", colour = { glass = "red|orange" } },
+]
+parts = [
+  { shape = "cylinder", radius = 0.06, height = 4, segments = 12, role = "pole", tag = "shaft" },
+  { shape = "box", size = [0.4, 0.4, 0.3], role = "pole", tag = "foot" },
+  { shape = "box", size = [0.3, 0.05, 0.05], at = [0.2, 0, 3.6], mirror = "x", role = "pole", tag = ["arm", "pair"] },
+  { shape = "box", size = [0.3, 0.05, 0.05], at = [0.2, 0, 3.6], role = "pole", tag = ["arm", "single"] },
+  { shape = "sphere", radii = [0.15, 0.15, 0.15], at = [0.4, 0, 3.7], role = "glass" },
+  { shape = "cone", radius = 0.2, height = 0.4, at = [0, 0, 4], role = "glass", tag = "hat" },
+]
+variants = [
+  { name = "double", without = ["single", "hat"] },
+  { name = "single", without = ["pair"], tells = ["hat"] },
+]
+"""
+
+
+def written(folder: Path, lamp: str = LAMP) -> Path:
     """Write a folder of assets."""
     (folder / "props").mkdir()
-    (folder / "materials.toml").write_text(materials)
-    (folder / "props" / "street.toml").write_text(props)
+    (folder / "materials.toml").write_text(MATERIALS)
+    (folder / "props" / "street.toml").write_text(MAILBOX)
+    (folder / "props" / "lamp.toml").write_text(lamp)
     return folder
 
 
 @pytest.fixture
 def assets(tmp_path):
-    return written(tmp_path, MATERIALS, MAILBOX)
+    return written(tmp_path)
 
 
 def look_up_all(assets: Path) -> None:
@@ -62,49 +96,83 @@ def look_up_all(assets: Path) -> None:
         catalogue[category]
 
 
-def spoil(path: Path, text: str, old: str, new: str) -> str:
-    """Say how the catalogue refuses a file in which a text stands in place of another."""
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-    with pytest.raises(AssetError) as caught:
-        look_up_all(path.parents[1] if path.name == "street.toml" else path.parent)
-    message = str(caught.value)
-    assert message.startswith(str(path))
-    assert "\n" not in message
-    return message
+MAILBOX_FAULTS = [
+    ("height = ", "hight = ", "[mailbox] parts[1] (cylinder): unknown key 'hight': did you mean 'height'?"),
+    ("radius = 0.05, ", "", "[mailbox] parts[1] (cylinder): key 'radius' is missing"),
+    ('shape = "cylinder"', 'shape = "cylindre"', "parts[1]: unknown shape 'cylindre': did you mean 'cylinder'?"),
+    ('role = "pole"', 'role = "pol"', "parts[1] (cylinder): unknown role 'pol': did you mean 'pole'?"),
+    ('role = "brick"', 'role = "brik"', "parts[2] (box): unknown material 'brik': did you mean 'brick'?"),
+    ('pole = "metal"', 'pole = "metall"', "roles pole: unknown material 'metall': did you mean 'metal'?"),
+    ("#b02020", "#b0202", "roles body: colour of material 'paint:#b0202' is not of the form #rrggbb"),
+    ('"body_h"]', '"body_hh"]', "parts[0] (box): unknown parameter 'body_hh': did you mean 'body_h'?"),
+    ('"body_h"]', '"body_h**2"]', "parts[0] (box): 'body_h**2' is no arithmetic expression"),
+    ("[0.9, 1.1]", "[1.1, 0.9]", "[params] body_h = [1.1, 0.9]: must be a number or [low, high]"),
+    ("weight = 3", "weigth = 3", "variants[0] (red): unknown key 'weigth': did you mean 'weight'?"),
+    ("weight = 3", "weight = 0", "variants[0] (red): weight = 0: Input should be greater than 0"),
+    ('name = "blue"', 'name = "red"', "variants[1]: duplicate variant 'red'"),
+    ('["flag"]', '["flagg"]', "variants[1] (blue) without: unknown tag 'flagg': did you mean 'flag'?"),
+    ("{ body = \"paint:#2020b0\" }", "{ bod = \"metal\" }", "variants[1] (blue) roles: unknown key 'bod'"),
+    ("{ body_h = 2.0 }", "{ bodyh = 2.0 }", "(blue) params: unknown key 'bodyh': did you mean 'body_h'?"),
+    ('kind = "prop"', 'kind = "prob"', "[mailbox]: unknown kind 'prob': did you mean 'prop'?"),
+    ('name = "mailbox"', "", "[mailbox]: name is missing"),
+    ('kind = "prop"', 'kinds = "prop"', "[mailbox]: unknown key 'kinds': did you mean 'kind'?"),
+    ('kind = "prop"', 'kind = "prop"\nbuilder = "x"', "[mailbox]: give parts or a builder, one of them"),
+    ('kind = "prop"', 'kind = "prop', "Illegal character"),
+    ('tag = "flag"', 'tag = "flag", ring = { number = 3 }', "parts[2] (box): ring must be a table with a count"),
+    ('tag = "flag"', 'tag = "flag", ring = { count = 3, radus = 1 }', "ring: unknown key 'radus'"),
+    ('tag = "flag"', 'tag = "flag", mirror = "z"', "parts[2] (box): mirror must be x, y or xy, got 'z'"),
+]  # fmt: skip
+LAMP_FAULTS = [
+    ('front = "x"', 'front = "z"', "front must be one of none, +x, -x, +y, -y, x, y, got 'z'"),
+    (
+        'tells = ["glass"]',
+        'tells = ["glas"]',
+        "tells: parts are named by tag or role: unknown part 'glas': did you mean 'glass'?",
+    ),
+    ('{ say = "no hat", lacks = "hat" }', '{ say = "no hat" }', "'no hat' claims nothing that can be checked"),
+    ('lacks = "hat"', 'laks = "hat"', "unknown key 'laks': did you mean 'lacks'?"),
+    ('shaft = "slender"', 'shaft = "slim"', "shaft = 'slim': unknown form (one of round, boxy"),
+    (
+        'lacks = "hat"',
+        'lacks = "hut"',
+        "looks[3]: parts are named by tag or role: unknown part 'hut': did you mean 'hat'?",
+    ),
+    ('"red|orange"', '"red|orang"', "unknown colour 'orang': did you mean 'orange'?"),
+    ('"height > 3"', '"height = 3"', "'height = 3' is no comparison like"),
+    ('"hat on top"', '"hat atop pole"', "'hat atop pole' is none of"),
+    ("count = { arm = 1 }", "count = { arm = 0 }", "[count] arm = 0: must be a whole number or [least, most]"),
+    ('say = "one arm"', 'say = "one arm", also = ["two arms"]', "duplicate phrase 'two arms'"),
+    ('lacks = "hat"', 'adjective = "bare"', "'no hat' claims nothing that can be checked: add has"),
+    ('lacks = "hat"', 'lacks = "hat", clause = "a hat lacks"', "clause 'a hat lacks' must begin with one of it"),
+    ('tag = "hat"', "tag = [3]", "tag must be a word or a list of words"),
+]
+MATERIAL_FAULTS = [
+    ('texture = "brick"', 'texture = "brck"', "unknown texture 'brck': did you mean 'brick'?"),
+    ("tile_m = 0.5", "tile_m = -1", "tile_m = -1: Input should be greater than or equal to 0.01"),
+    ("tile_m = 0.5", "tile = 1", "unknown key 'tile': did you mean 'tile_m'?"),
+    ('"#9a4a3c"', '"grey"', "colour = 'grey': String should match pattern '^#[0-9a-fA-F]{6}$'"),
+]
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("file", "old", "new", "says"),
     [
-        ("height = ", "hight = ", "[mailbox] parts[1] (cylinder): unknown key 'hight': did you mean 'height'?"),
-        ("radius = 0.05, ", "", "[mailbox] parts[1] (cylinder): key 'radius' is missing"),
-        ('shape = "cylinder"', 'shape = "cylindre"', "parts[1]: unknown shape 'cylindre': did you mean 'cylinder'?"),
-        ('role = "pole"', 'role = "pol"', "parts[1] (cylinder): unknown role 'pol': did you mean 'pole'?"),
-        ('role = "brick"', 'role = "brik"', "parts[2] (box): unknown material 'brik': did you mean 'brick'?"),
-        ('pole = "metal"', 'pole = "metall"', "roles pole: unknown material 'metall': did you mean 'metal'?"),
-        ("#b02020", "#b0202", "roles body: colour of material 'paint:#b0202' is not of the form #rrggbb"),
-        ('"body_h"]', '"body_hh"]', "parts[0] (box): unknown parameter 'body_hh': did you mean 'body_h'?"),
-        ('"body_h"]', '"body_h**2"]', "parts[0] (box): 'body_h**2' is no arithmetic expression"),
-        ("[0.9, 1.1]", "[1.1, 0.9]", "params: body_h must be a number or [low, high], got [1.1, 0.9]"),
-        ("weight = 3", "weigth = 3", "variants[0] (red): unknown key 'weigth': did you mean 'weight'?"),
-        ("weight = 3", "weight = 0", "variants[0] (red): weight must be a positive number, got 0"),
-        ('name = "blue"', 'name = "red"', "variants[1]: duplicate variant 'red'"),
-        ('["flag"]', '["flagg"]', "without names the unknown tag 'flagg': did you mean 'flag'?"),
-        ("{ body = \"paint:#2020b0\" }", "{ bod = \"metal\" }", "variants[1] (blue) roles: unknown key 'bod'"),
-        ("{ body_h = 2.0 }", "{ bodyh = 2.0 }", "(blue) params: unknown key 'bodyh': did you mean 'body_h'?"),
-        ('kind = "prop"', 'kind = "prob"', "[mailbox]: unknown kind 'prob': did you mean 'prop'?"),
-        ('name = "mailbox"', "", "[mailbox]: name is missing"),
-        ('kind = "prop"', 'kinds = "prop"', "[mailbox]: unknown key 'kinds': did you mean 'kind'?"),
-        ('kind = "prop"', 'kind = "prop"\nbuilder = "x"', "[mailbox]: give parts or a builder, one of them"),
-        ('kind = "prop"', 'kind = "prop', "Illegal character"),
-        ('tag = "flag"', 'tag = "flag", ring = { number = 3 }', "parts[2] (box): ring must be a table with a count"),
-        ('tag = "flag"', 'tag = "flag", ring = { count = 3, radus = 1 }', "ring: unknown key 'radus'"),
-        ('tag = "flag"', 'tag = "flag", mirror = "z"', "parts[2] (box): mirror must be x, y or xy, got 'z'"),
+        *(("props/street.toml", *row) for row in MAILBOX_FAULTS),
+        *(("props/lamp.toml", *row) for row in LAMP_FAULTS),
+        *(("materials.toml", *row) for row in MATERIAL_FAULTS),
     ],
-)  # fmt: skip
-def test_errors_name_file_category_and_key(assets, old, new, says):
-    assert says in spoil(assets / "props" / "street.toml", MAILBOX, old, new)
+)
+def test_what_is_wrong_is_named_with_file_category_and_key(assets, file, old, new, says):
+    path = assets / file
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(AssetError) as caught:
+        look_up_all(assets)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert "\n" not in message
+    assert says in message
 
 
 @pytest.mark.parametrize(
@@ -126,19 +194,6 @@ def test_what_is_wrong_with_a_category_stops_no_scene_without_it(assets):
     assert catalogue.instantiate("mailbox", "m", generator(0, "t")).category == "mailbox"
     with pytest.raises(AssetError, match="unknown key 'hight'"):
         catalogue.instantiate("letterbox", "l", generator(0, "t"))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ('texture = "brick"', 'texture = "brck"', "unknown texture 'brck': did you mean 'brick'?"),
-        ("tile_m = 0.5", "tile_m = -1", "tile_m must be 0.01 to 1000 m, got -1"),
-        ("tile_m = 0.5", "tile = 1", "unknown key 'tile': did you mean 'tile_m'?"),
-        ('"#9a4a3c"', '"grey"', "colour must be of the form #rrggbb, got 'grey'"),
-    ],
-)
-def test_errors_in_materials(assets, old, new, says):
-    assert f"material 'brick': {says}" in spoil(assets / "materials.toml", MATERIALS, old, new)
 
 
 def test_what_was_asked_for_but_is_unknown(assets):
@@ -204,65 +259,27 @@ def test_sign_text_speaks_of_attributes(assets):
     assert widths[1] > 4 * widths[0]
 
 
-LAMP_MATERIALS = 'paint = { colour = "#c8c8c8" }\nboards = { texture = "planks", colour = "#9a6b3f", tile_m = 0.5 }\n'
-LAMP = """
-[lamp]
-name = "lamp"
-front = "x"
-tells = ["glass"]
-roles = { pole = "paint:#101010", glass = "#ffffff" }
-looks = [
-  { say = "a tall pole", form = { shaft = "slender" }, size = ["height > 3", "shaft.height > 4 * length"] },
-  { say = "two arms", count = { arm = 2 } },
-  { say = "one arm", count = { arm = 1 } },
-  { say = "no hat", lacks = "hat" },
-  { say = "a pointed hat on top", form = { hat = "pointed" }, order = ["hat on top", "hat above pole"] },
-  { say = "glass above a black foot", colour = { glass = "white", foot = "black" }, order = ["glass above foot"] },
-  { say = "a wooden foot", material = { foot = "boards" } },
-  { say = "a round pole and a square foot", form = { pole = "round", foot = "boxy" } },
-  { say = "a red glass", colour = { glass = "red|orange" } },
-]
-parts = [
-  { shape = "cylinder", radius = 0.06, height = 4, segments = 12, role = "pole", tag = "shaft" },
-  { shape = "box", size = [0.4, 0.4, 0.3], role = "pole", tag = "foot" },
-  { shape = "box", size = [0.3, 0.05, 0.05], at = [0.2, 0, 3.6], mirror = "x", role = "pole", tag = ["arm", "pair"] },
-  { shape = "box", size = [0.3, 0.05, 0.05], at = [0.2, 0, 3.6], role = "pole", tag = ["arm", "single"] },
-  { shape = "sphere", radii = [0.15, 0.15, 0.15], at = [0.4, 0, 3.7], role = "glass" },
-  { shape = "cone", radius = 0.2, height = 0.4, at = [0, 0, 4], role = "glass", tag = "hat" },
-]
-variants = [
-  { name = "double", without = ["single", "hat"] },
-  { name = "single", without = ["pair"], tells = ["hat"] },
-]
-"""
 TRUE = {
     "double": {"a tall pole", "two arms", "no hat", "glass above a black foot"},
     "single": {"a tall pole", "one arm", "a pointed hat on top", "glass above a black foot"},
 }
 
 
-@pytest.fixture
-def lamp_assets(tmp_path):
-    return written(tmp_path, LAMP_MATERIALS, LAMP)
-
-
-def lamp(lamp_assets, variant, yaw_deg=0.0, position=(0.0, 0.0, 0.0)):
-    return load_catalogue(lamp_assets).instantiate(
-        "lamp", "lamp_000", generator(0, "test"), position, yaw_deg, variant
-    )
+def lamp(assets, variant, yaw_deg=0.0, position=(0.0, 0.0, 0.0)):
+    return load_catalogue(assets).instantiate("lamp", "lamp_000", generator(0, "test"), position, yaw_deg, variant)
 
 
 @pytest.mark.parametrize("variant", TRUE)
 @pytest.mark.parametrize("yaw_deg", [0.0, 37.0, 200.0])
-def test_phrases_are_true_of_the_variants_that_bear_them_out_whichever_way_they_stand(lamp_assets, variant, yaw_deg):
-    catalogue = load_catalogue(lamp_assets)
-    thing = lamp(lamp_assets, variant, yaw_deg, (120.25, -80.5, 3.0))
+def test_phrases_are_true_of_the_variants_that_bear_them_out_whichever_way_they_stand(assets, variant, yaw_deg):
+    catalogue = load_catalogue(assets)
+    thing = lamp(assets, variant, yaw_deg, (120.25, -80.5, 3.0))
     assert {one.phrase for one in valid_phrases(catalogue["lamp"].looks, thing, catalogue.materials)} == TRUE[variant]
 
 
-def test_a_phrase_that_is_not_true_says_what_is(lamp_assets):
-    catalogue = load_catalogue(lamp_assets)
-    body = Body(lamp(lamp_assets, "double"), catalogue.materials)
+def test_a_phrase_that_is_not_true_says_what_is(assets):
+    catalogue = load_catalogue(assets)
+    body = Body(lamp(assets, "double"), catalogue.materials)
     wrong = {look.phrase: body.false_claims(look) for look in catalogue["lamp"].looks}
     assert wrong["one arm"] == ["has 2 x arm"]
     assert wrong["a red glass"] == ["its glass is white"]
@@ -271,52 +288,31 @@ def test_a_phrase_that_is_not_true_says_what_is(lamp_assets):
     assert wrong["a round pole and a square foot"] == ["its pole is not round"]  # the foot is of the pole's role too
 
 
-def test_what_the_catalogue_cannot_bear_out_is_named(lamp_assets):
-    faults = catalogue_faults(load_catalogue(lamp_assets))
+def test_what_the_catalogue_cannot_bear_out_is_named(assets):
+    faults = catalogue_faults(load_catalogue(assets), ["lamp"])
     assert [f.partition("]: ")[2].partition(" is true")[0] for f in faults] == [
         "'a wooden foot'", "'a round pole and a square foot'", "'a red glass'",
     ]  # fmt: skip
-    path = lamp_assets / "props" / "street.toml"
+    path = assets / "props" / "lamp.toml"
     path.write_text(LAMP.replace('tells = ["glass"]', 'tells = ["hat"]'))
-    assert any("variant 'double': tells: it has no hat" in f for f in catalogue_faults(load_catalogue(lamp_assets)))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ('front = "x"', 'front = "z"', "front must be one of none, +x, -x, +y, -y, x, y, got 'z'"),
-        ('tells = ["glass"]', 'tells = ["glas"]', "tells: no part 'glas': did you mean 'glass'?"),
-        ('{ say = "no hat", lacks = "hat" }', '{ say = "no hat" }', "'no hat' claims nothing that can be checked"),
-        ('lacks = "hat"', 'laks = "hat"', "unknown key 'laks': did you mean 'lacks'?"),
-        ('shaft = "slender"', 'shaft = "slim"', "unknown form 'slim'"),
-        ('lacks = "hat"', 'lacks = "hut"', "no part 'hut': did you mean 'hat'?"),
-        ('"red|orange"', '"red|orang"', "unknown colour 'orang': did you mean 'orange'?"),
-        ('"height > 3"', '"height = 3"', "'height = 3' is no comparison like"),
-        ('"hat on top"', '"hat atop pole"', "'hat atop pole' is none of"),
-        ("count = { arm = 1 }", "count = { arm = 0 }", "must be a whole number or [least, most], got 0"),
-        ('say = "one arm"', 'say = "one arm", also = ["two arms"]', "duplicate phrase 'two arms'"),
-        ('lacks = "hat"', 'adjective = "bare"', "'no hat' claims nothing that can be checked: add has"),
-        ('lacks = "hat"', 'lacks = "hat", clause = "a hat lacks"', "clause 'a hat lacks' must begin with one of it"),
-        ('tag = "hat"', "tag = [3]", "tag must be a word or a list of words"),
-    ],
-)
-def test_what_is_wrong_in_a_look_is_named(lamp_assets, old, new, says):
-    assert says in spoil(lamp_assets / "props" / "street.toml", LAMP, old, new)
+    assert any(
+        "variant 'double': tells: it has no hat" in f for f in catalogue_faults(load_catalogue(assets), ["lamp"])
+    )
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-720, 720), st.sampled_from(sorted(FRONTS)))
 def test_fronts_turn_with_the_thing(tmp_path_factory, yaw_deg, front):
     text = LAMP.replace('front = "x"', f'front = "{front}"')
-    folder = written(tmp_path_factory.mktemp("lamp_assets"), LAMP_MATERIALS, text)
+    folder = written(tmp_path_factory.mktemp("assets"), text)
     anatomy = lamp(folder, "double", yaw_deg).anatomy
     wanted = [math.radians(yaw_deg + side) for side in FRONTS[front]]
     assert np.allclose(np.exp(1j * np.array(anatomy.fronts_rad)), np.exp(1j * np.array(wanted)))
 
 
 @pytest.mark.parametrize("variant", TRUE)
-def test_a_scene_file_keeps_which_faces_are_which(lamp_assets, tmp_path, variant):
-    catalogue, thing = load_catalogue(lamp_assets), lamp(lamp_assets, variant, 33.0, (7.1, 2.3, 0.0))
+def test_a_scene_file_keeps_which_faces_are_which(assets, tmp_path, variant):
+    catalogue, thing = load_catalogue(assets), lamp(assets, variant, 33.0, (7.1, 2.3, 0.0))
     materials = {p.material: catalogue.materials[p.material] for p in thing.parts}
     write_glb(Scene("U_Test_0", (thing,), materials, np.array([[-9.0] * 3, [9.0] * 3])), tmp_path / "s.glb")
     again = read_glb(tmp_path / "s.glb").instances[0]

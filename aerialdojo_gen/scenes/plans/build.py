@@ -22,13 +22,12 @@ from aerialdojo_gen.scenes.expressions import evaluate
 from aerialdojo_gen.scenes.grammar import Frame, Pose, along, poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.kit import kit
-from aerialdojo_gen.scenes.materials import refuse_unknown
+from aerialdojo_gen.scenes.materials import refuse_unknown, validated
 from aerialdojo_gen.scenes.mesh import Parts
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.placement import Placement
 from aerialdojo_gen.scenes.plans.model import Ground, Paint, Pattern, Place, PlanHead, Structure, Thing
 from aerialdojo_gen.scenes.plans.values import PlanNames
-from aerialdojo_gen.scenes.recipe import validated
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import flat_terrain
 from aerialdojo_gen.scenes.vocabulary import SHAPES, part_mesh

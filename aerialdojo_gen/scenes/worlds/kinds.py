@@ -13,7 +13,7 @@ from aerialdojo_gen.base.names import unknown
 from aerialdojo_gen.base.safe_parse import read_toml
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import Weather
-from aerialdojo_gen.scenes.recipe import validated
+from aerialdojo_gen.scenes.materials import validated
 
 Range = tuple[float, float]
 Weights = Annotated[dict[str, Annotated[float, Field(gt=0)]], Field(min_length=1)]
