@@ -34,37 +34,32 @@ def _round(value: float, digits: float = 0) -> float:
     return round(value, int(digits)) if digits else round(value)
 
 
-_FUNCTIONS: dict[str, Callable[..., float]] = {
-    "min": min, "max": max, "abs": abs, "sqrt": math.sqrt, "round": _round, "floor": math.floor, "ceil": math.ceil,
-    "sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
-    "tan": lambda d: math.tan(math.radians(d)), "atan2": lambda y, x: math.degrees(math.atan2(y, x)),
-}  # fmt: skip
-
-
 def eased(t: Floats | float, start: Floats | float, end: Floats | float) -> Floats:
     """Climb smoothly from 0 at `start` to 1 at `end`: numbers, or arrays of one shape."""
     u = np.clip((np.asarray(t, dtype=np.float64) - start) / (end - start), 0.0, 1.0)
     return np.asarray(u * u * (3.0 - 2.0 * u))
 
 
-_OF_ARRAYS: dict[str, Callable[..., Any]] = {
-    "min": np.minimum, "max": np.maximum, "abs": np.abs, "sqrt": np.sqrt, "exp": exp, "pow": power,
-    "hypot": np.hypot, "clip": np.clip, "eased": eased, "choose": lambda t, a, b: np.where(t > 0.0, a, b),
-    "sin": lambda d: np.sin(np.radians(d)), "cos": lambda d: np.cos(np.radians(d)),
-    "atan2": lambda y, x: np.degrees(atan2(y, x)),
+# Functions with the least and the largest number of their arguments: of numbers, and of arrays.
+_Functions = Mapping[str, tuple[Callable[..., Any], int, int]]
+_FUNCTIONS: _Functions = {
+    "min": (min, 2, 99), "max": (max, 2, 99), "abs": (abs, 1, 1), "sqrt": (math.sqrt, 1, 1), "round": (_round, 1, 2),
+    "floor": (math.floor, 1, 1), "ceil": (math.ceil, 1, 1), "sin": (lambda d: math.sin(math.radians(d)), 1, 1),
+    "cos": (lambda d: math.cos(math.radians(d)), 1, 1), "tan": (lambda d: math.tan(math.radians(d)), 1, 1),
+    "atan2": (lambda y, x: math.degrees(math.atan2(y, x)), 2, 2),
 }  # fmt: skip
-# Minimum and maximum number of arguments, where it is not one.
-_ARITY = {"min": (2, 99), "max": (2, 99), "round": (1, 2), "atan2": (2, 2)}
-_ARITY_OF_ARRAYS = {"clip": 3, "eased": 3, "choose": 3} | dict.fromkeys(("min", "max", "pow", "hypot", "atan2"), 2)
-_ALL_ARITIES = {name: _ARITY.get(name, (1, 1)) for name in _FUNCTIONS}
+_OF_ARRAYS: _Functions = {
+    "min": (np.minimum, 2, 2), "max": (np.maximum, 2, 2), "abs": (np.abs, 1, 1), "sqrt": (np.sqrt, 1, 1),
+    "exp": (exp, 1, 1), "pow": (power, 2, 2), "hypot": (np.hypot, 2, 2), "clip": (np.clip, 3, 3),
+    "eased": (eased, 3, 3), "choose": (lambda t, a, b: np.where(t > 0.0, a, b), 3, 3),
+    "sin": (lambda d: np.sin(np.radians(d)), 1, 1), "cos": (lambda d: np.cos(np.radians(d)), 1, 1),
+    "atan2": (lambda y, x: np.degrees(atan2(y, x)), 2, 2),
+}  # fmt: skip
 _CONSTANTS = {"pi": math.pi}
 
 
 def names_in(text: str) -> frozenset[str]:
-    """List the names in an arithmetic expression of numbers, names, ``+ - * / // %``.
-
-    Brackets and a few functions.
-    """
+    """List the names in an arithmetic expression of numbers, names, ``+ - * / // %``, brackets, a few functions."""
     return _parse(text)[1]
 
 
@@ -107,22 +102,15 @@ def _parse(text: str, arrays: bool = False) -> tuple[Computed, frozenset[str]]:
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ShapeError(f"{text!r} is no arithmetic expression") from error
     used: set[str] = set()
-    arity = {name: (_ARITY_OF_ARRAYS.get(name, 1),) * 2 for name in _OF_ARRAYS} if arrays else _ALL_ARITIES
-    computed = _compiled(tree, text, used, _OF_ARRAYS if arrays else _FUNCTIONS, arity)
+    computed = _compiled(tree, text, used, _OF_ARRAYS if arrays else _FUNCTIONS)
     return computed, frozenset(used)
 
 
-def _compiled(
-    node: ast.expr,
-    text: str,
-    used: set[str],
-    functions: Mapping[str, Callable[..., Any]],
-    arities: Mapping[str, tuple[int, int]],
-) -> Computed:
+def _compiled(node: ast.expr, text: str, used: set[str], functions: _Functions) -> Computed:
     """Check an expression, collect its names, and make a function of them: it is computed many times."""
 
     def inner(part: ast.expr) -> Computed:
-        return _compiled(part, text, used, functions, arities)
+        return _compiled(part, text, used, functions)
 
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
@@ -139,9 +127,9 @@ def _compiled(
             operand, sign = inner(node.operand), _UNARY[type(node.op)]
             return lambda names: sign(operand(names))
         case ast.Call(func=ast.Name(id=name), keywords=[]) if name in functions:
-            least, most = arities[name]
+            function, least, most = functions[name]
             if not least <= len(node.args) <= most:
                 raise ShapeError(f"{text!r}: {name} does not take {len(node.args)} arguments")
-            function, arguments = functions[name], [inner(one) for one in node.args]
+            arguments = [inner(one) for one in node.args]
             return lambda names: function(*[one(names) for one in arguments])
     raise ShapeError(f"{text!r} is no arithmetic expression: {ast.unparse(node)!r} is not allowed")

@@ -156,31 +156,6 @@ def between_gates(
     return [(low, high) for low, (high, _) in zip(starts, stops, strict=False) if high - low > least_m]
 
 
-def grid(
-    area: BaseGeometry,
-    spacing_m: tuple[float, float],
-    rng: np.random.Generator,
-    jitter_m: float = 0.0,
-    yaw_deg: float = 0.0,
-) -> list[Pose]:
-    """List the points of a turned grid about an area's centre that lie in the area, moved by up to `jitter_m`."""
-    if area.is_empty:
-        return []
-    c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
-    x0, y0, x1, y1 = area.bounds
-    reach = float(np.hypot(x1 - x0, y1 - y0)) / 2
-    nx, ny = (int(reach / d) + 1 for d in spacing_m)
-    centre = area.centroid
-    poses = []
-    for j in range(-ny, ny + 1):
-        for i in range(-nx, nx + 1):
-            u, v = np.array([i, j]) * spacing_m + rng.uniform(-1, 1, size=2) * jitter_m
-            x, y = float(centre.x + c * u - s * v), float(centre.y + s * u + c * v)
-            if shapely.contains_xy(area, x, y):
-                poses.append(Pose(x, y, yaw_deg))
-    return poses
-
-
 class _Taken(NamedTuple):
     """Discs by the cells, a radius wide, that their middles lie in: `cells` has a disc of each, `after` the next."""
 

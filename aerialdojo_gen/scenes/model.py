@@ -82,11 +82,17 @@ class Instance:
 
     def faces_of(self, name: str) -> NDArray[np.int64]:
         """Indices into `faces` of a named part, or of several, ``"a|b"``; empty where it has none."""
-        return np.zeros(0, np.int64) if self.anatomy is None else self.anatomy.faces(name, self.face_counts)
+        copies = self.copies_of(name)
+        return np.unique(np.concatenate(copies)) if copies else np.zeros(0, np.int64)
 
     def copies_of(self, name: str) -> list[NDArray[np.int64]]:
-        """Indices into `faces` of every copy of a named part; empty where it has none."""
-        return [] if self.anatomy is None else self.anatomy.copies(name, self.face_counts)
+        """Indices (k,) into `faces` of every copy of a named part, or of several; empty where it has none."""
+        offsets, out = np.cumsum([0, *self.face_counts]), []
+        runs = {} if self.anatomy is None else self.anatomy.runs
+        for run in (run for one in name.split("|") for run in runs.get(one, ())):
+            start = int(offsets[run.part]) + run.first
+            out += [np.arange(start + k * run.faces, start + (k + 1) * run.faces) for k in range(run.copies)]
+        return out
 
     @property
     def face_counts(self) -> list[int]:
@@ -183,21 +189,6 @@ class Anatomy:
     fronts_rad: tuple[float, ...]
     identifying_parts: tuple[str, ...]
     runs: Mapping[str, tuple[Run, ...]]  # The faces of every named part; a name is a tag or a role of the catalogue
-
-    def copies(self, name: str, counts: Sequence[int]) -> list[NDArray[np.int64]]:
-        """The copies of a part, each as indices (k,) into the instance's `faces`; empty where it lacks the part."""
-        offsets = np.cumsum([0, *counts])
-        found = []
-        for one in name.split("|"):
-            for run in self.runs.get(one, ()):
-                start = int(offsets[run.part]) + run.first
-                found += [np.arange(start + k * run.faces, start + (k + 1) * run.faces) for k in range(run.copies)]
-        return found
-
-    def faces(self, name: str, counts: Sequence[int]) -> NDArray[np.int64]:
-        """All faces of a part, sorted: indices into the instance's `faces`; see `copies`."""
-        copies = self.copies(name, counts)
-        return np.unique(np.concatenate(copies)) if copies else np.zeros(0, np.int64)
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON, as stored in a scene file."""

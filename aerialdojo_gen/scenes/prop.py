@@ -203,8 +203,8 @@ def _check_part(part: dict[str, Any], prop: Category, materials: MaterialLibrary
     if not isinstance(role, str):
         raise AssetError(f"{where}: role is missing: a role of the category or a material")
     if role not in prop.roles:
-        known = role.startswith("#") or role.partition(":")[0] in materials.names
-        if not known and (near := nearest(role, prop.roles)):
+        is_material = role.startswith("#") or role.partition(":")[0] in materials.names
+        if not is_material and (near := nearest(role, prop.roles)):
             raise AssetError(f"{where}: unknown role {role!r}{near}")
         materials.check(role, where)
     try:

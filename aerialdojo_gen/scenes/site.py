@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 import shapely
@@ -36,7 +36,7 @@ from aerialdojo_gen.scenes.placement import (
     rest_on_ground,
 )
 from aerialdojo_gen.scenes.prop import of_side
-from aerialdojo_gen.scenes.recipe import SceneHead
+from aerialdojo_gen.scenes.recipe import Move, SceneHead
 from aerialdojo_gen.scenes.terrain import Terrain, flat_terrain
 
 # The largest scene of the dataset has 479.
@@ -150,15 +150,16 @@ class Site:
         before = dict(self._counts)
         name = thing.node or self.node(thing.category)
         variant = self.next_variant(thing.category) if thing.variant is None else thing.variant
-        attributes = {**thing.attributes, **({"place": thing.place} if thing.place else {})}
-        options: dict[str, Any] = {
-            "variant": None if variant == DRAWN else variant, "scale": thing.scale,
-            "design": thing.design or self.design(thing.category, name),
-            "own": Overrides(thing.params, thing.roles, attributes or None, thing.stretch),
-        }  # fmt: skip
-        instance = self.catalogue.instantiate(
-            thing.category, name, self.rng_for("prop", name), (*at, base), thing.yaw_deg, **options
-        )
+
+        def made(at: tuple[float, float, float], yaw_deg: float, place: str) -> Instance:
+            words = {**thing.attributes, **({"place": place} if place else {})}
+            return self.catalogue.instantiate(
+                thing.category, name, self.rng_for("prop", name), at, yaw_deg, None if variant == DRAWN else variant,
+                thing.scale, thing.design or self.design(thing.category, name),
+                Overrides(thing.params, thing.roles, words or None, thing.stretch),
+            )  # fmt: skip
+
+        instance = made((*at, base), thing.yaw_deg, thing.place)
         area = footprint(instance, base) if thing.solid or fit != "as_is" else None
         high = float(instance.bounds[1, 2])
         if area is not None and fit != "as_is" and not self._has_room(area, base, high):
@@ -169,10 +170,15 @@ class Site:
         self._reserve_node(name)
         if thing.solid and area is not None:
             self._footprints.add(area, base, high)
-        moved = self._at_moved_pose(thing.category, name, (*at, base), thing.yaw_deg, options)
+        standing, move = instance, self.head.moves.get(name)
+        if move is not None:
+            # Its original footprint stays occupied, so that everything placed later keeps its place.
+            self._moved_nodes.add(name)
+            place = thing.place if move.place is None else move.place
+            standing = made(self._moved_to(move, (*at, base)), thing.yaw_deg + move.turn_deg, place)
         if thing.z is None:
             self._on_ground.append(len(self.instances))
-        self.instances.append(moved or instance)
+        self.instances.append(standing)
         self._reserve(thing, instance)
         return instance
 
@@ -216,16 +222,8 @@ class Site:
             self._outlines[key] = hull(trial.vertices[:, :2]).buffer(0.1, quad_segs=2)
         return translate(rotate(self._outlines[key], yaw_deg, origin=(0, 0)), *at)
 
-    def _at_moved_pose(
-        self, category: str, node: str, at: tuple[float, float, float], yaw_deg: float, options: Mapping[str, Any]
-    ) -> Instance | None:
-        """Instantiate a prop where the recipe moves it to; None where it is not moved.
-
-        Its original footprint stays occupied, so that everything placed later keeps its place.
-        """
-        move = self.head.moves.get(node)
-        if move is None:
-            return None
+    def _moved_to(self, move: Move, at: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Where a thing goes that the recipe moves; on the ground it keeps its height above it."""
         x, y, z = at
         target = (x + move.by_m[0], y + move.by_m[1])
         above = z - self.ground_z(x, y)
@@ -236,27 +234,20 @@ class Site:
             ]
             above = max(above, min((min(ring) - self.ground_z(*target)) / 2.0, 0.0))
         base = self.ground_z(*target) + above
-        self._moved_nodes.add(node)
-        if move.place is not None:
-            own: Overrides = options["own"]
-            options = {**options, "own": own._replace(attributes={**(own.attributes or {}), "place": move.place})}
-        return self.catalogue.instantiate(
-            category, node, self.rng_for("prop", node), (*target, base + move.up_m), yaw_deg + move.turn_deg,
-            **options,
-        )  # fmt: skip
+        return (*target, base + move.up_m)
 
     def add(
         self,
         node: str | None,
         category: str,
-        parts: Sequence[Part | tuple[str, Mesh]],
+        parts: Iterable[tuple[str, Mesh]],
         attributes: Mapping[str, str] | None = None,
         *,
         footprint: BaseGeometry | None = None,
     ) -> Instance:
         """Add structure made by the layout: parts in world metres, attributes for descriptions, footprint."""
         name = self._reserve_node(node or self.node(category))
-        shape = tuple(replace(part, material=self.laid_out(part.material, name)) for part in self._as_parts(parts))
+        shape = [replace(part, material=self.laid_out(part.material, name)) for part in self._as_parts(parts)]
         instance = Instance(name, category, "", dict(attributes or {}), placed(shape, (0, 0, 0)))
         if not any(part.faces.size for part in instance.parts):
             raise AssetError(f"{self.name}: {name} has no body: it is too small, or lies off the site")
@@ -271,10 +262,6 @@ class Site:
         row = node.rstrip("0123456789")
         first = rank(self.head.seed, "facade", self.name, row, material.partition(":")[0])
         return self.catalogue.materials.laid_out(material, first + int(node[len(row) :] or 0), flush)
-
-    def part(self, body: Mesh, material: str) -> Part:
-        """Give a mesh in world coordinates a material; its pattern runs on from its neighbours'."""
-        return to_part(body, material, self.catalogue.materials.tile_m(material))
 
     # Room
 
@@ -334,10 +321,10 @@ class Site:
         parts = placed(self._as_parts(meshes), (0, 0, 0))
         return Instance(self._reserve_node("ground"), "ground", "", {}, parts)
 
-    def _as_parts(self, parts: Sequence[Part | tuple[str, Mesh]]) -> tuple[Part, ...]:
-        done = [part for part in parts if isinstance(part, Part)]
-        bodies = by_material(part for part in parts if not isinstance(part, Part))
-        return (*done, *(self.part(body, material) for material, body in bodies))
+    def _as_parts(self, parts: Iterable[tuple[str, Mesh]]) -> list[Part]:
+        """Give meshes in world coordinates their materials; the pattern of one runs on from its neighbours'."""
+        tile_m = self.catalogue.materials.tile_m
+        return [to_part(body, material, tile_m(material)) for material, body in by_material(parts)]
 
     def _reserve_node(self, node: str) -> str:
         if node in self._nodes:

@@ -147,18 +147,20 @@ def shape_keys(shape: str) -> tuple[frozenset[str], frozenset[str]]:
 
 def names_used(part: Mapping[str, Any]) -> frozenset[str]:
     """List the parameters used in a part's expressions; `ShapeError` for what is no expression."""
-    shape = part["shape"]
-    found: set[str] = set()
-    for key, value in part.items():
-        if key in ("shape", "role", "tag", "design", "mirror") or (shape, key) in _WORDS:
-            continue
-        if key in ("array", "ring"):
-            for inner, number in value.items():
-                if (key, inner) not in _WORDS:
-                    _collect(number, found)
-        else:
-            _collect(value, found)
-    return frozenset(found)
+    words, tables = ("shape", "role", "tag", "design", "mirror"), ("array", "ring")
+    given = [(part["shape"], key, value) for key, value in part.items() if key not in (*words, *tables)]
+    given += [(table, key, value) for table in tables for key, value in part.get(table, {}).items()]
+    return frozenset[str]().union(*(_names_in(value) for what, key, value in given if (what, key) not in _WORDS))
+
+
+def _names_in(value: Any) -> frozenset[str]:
+    if isinstance(value, str):
+        return names_in(value)
+    if isinstance(value, list):
+        return frozenset[str]().union(*map(_names_in, value))
+    if not isinstance(value, int | float):
+        raise ShapeError(f"{value!r} is neither a number nor an expression")
+    return frozenset()
 
 
 def part_mesh(
@@ -283,16 +285,6 @@ def _number(value: Any, names: Mapping[str, float]) -> Any:
     if not isinstance(value, int | float):
         raise ShapeError(f"{str(value)[:40]!r} is neither a number nor an expression")
     return value
-
-
-def _collect(value: Any, found: set[str]) -> None:
-    if isinstance(value, str):
-        found |= names_in(value)
-    elif isinstance(value, list):
-        for item in value:
-            _collect(item, found)
-    elif not isinstance(value, int | float):
-        raise ShapeError(f"{value!r} is neither a number nor an expression")
 
 
 def _fill(text: Any, words: Mapping[str, str]) -> str:

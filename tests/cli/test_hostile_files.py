@@ -16,7 +16,7 @@ from aerialdojo_gen.rendering import finished
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb, write_glb
-from aerialdojo_gen.scenes.grammar import grid, poisson_disc
+from aerialdojo_gen.scenes.grammar import poisson_disc
 from aerialdojo_gen.scenes.ground import disc
 from aerialdojo_gen.scenes.model import Material, Scene
 from aerialdojo_gen.scenes.recipe import load_imported
@@ -107,7 +107,7 @@ def test_what_an_entry_cannot_make_is_an_error_of_its_plan(tmp_path, entry, says
 def test_ground_stays_a_number_where_an_area_to_be_levelled_has_shrunk_to_nothing():
     ground = rolling_terrain((20.0, 20.0), 2.0, 1, 1.0, 9.0)
     assert ground.flattened(disc(0, 0, 1.0).buffer(-1.2), 0.5).heights_m.tolist() == ground.heights_m.tolist()
-    assert poisson_disc(Polygon(), 1.0, np.random.default_rng(0)) == grid(Polygon(), (1, 1), np.random.default_rng(0))
+    assert poisson_disc(Polygon(), 1.0, np.random.default_rng(0)) == []
 
 
 def test_the_sun_of_an_imported_scene_stands_above_too(tmp_path):

@@ -20,11 +20,14 @@ from support.layout_checks import (
     built_elsewhere,
     catalogue,
     clashes,
+    distances,
+    each_scene,
     floating,
     kinds_of,
     looks_of,
     nightly_unless,
     props_of,
+    touching,
     walled_in,
 )  # fmt: skip
 
@@ -32,8 +35,11 @@ from aerialdojo_gen.base.paper_figures import paper_counts
 from aerialdojo_gen.base.rng import generator
 from aerialdojo_gen.geometry.rays import TriangleRayCaster
 from aerialdojo_gen.geometry.soup import soup
+from aerialdojo_gen.planning.collision import CollisionWorld
 from aerialdojo_gen.scenes import checks
+from aerialdojo_gen.scenes.checks import SITTER
 from aerialdojo_gen.scenes.horizon.build import MAX_TRIANGLES
+from aerialdojo_gen.scenes.kit.rail import RAIL_M
 from aerialdojo_gen.scenes.model import Scene
 
 SCENES = sorted(path.stem for path in (ASSETS / "scenes").glob("*.toml"))
@@ -111,19 +117,10 @@ def test_it_holds_what_the_paper_the_recipe_and_the_annotations_ask_for(scene: S
         assert scene[thing["node"]].category == thing["category"]
 
 
-def test_its_names_are_unique_and_its_triangles_sound(scene: Scene) -> None:
+def test_its_names_are_unique(scene: Scene) -> None:
     nodes = Counter(i.node for i in scene.instances)
     assert [node for node, n in nodes.items() if n > 1 or not re.fullmatch(r"[a-z][a-z0-9_]*", node)] == []
     assert [i.node for i in scene.instances if i.category == "ground"] == ["ground"]
-    for instance in scene.instances:
-        assert instance.parts
-        for part in instance.parts:
-            assert part.material in scene.materials
-            assert np.isfinite(part.vertices).all()
-            assert len(part.faces)
-            assert len(part.uv) == len(part.vertices)
-            assert part.faces.min() >= 0
-            assert part.faces.max() < len(part.vertices)
 
 
 def test_it_keeps_to_its_bounds_and_its_budget(scene: Scene) -> None:
@@ -181,3 +178,92 @@ def test_the_two_scenes_of_a_type_differ(scene_of: Callable[[str], Scene], kind:
         for s in (first, second)
     ]
     assert len(structure[0] & structure[1]) <= 1
+
+
+ROLLING = ("locomotive", "steam_locomotive", "passenger_carriage", "freight_wagon", "tank_wagon", "handcar")
+
+
+@each_scene(["I_RailCorridor_0", "I_RailCorridor_1"])
+def test_wheels_stand_on_rails(scene_of, name):
+    scene = scene_of(name)
+    tracks = tuple(i for i in scene.instances if i.category == "track")
+    rails = Scene(name, tracks, scene.materials, scene.bounds)
+    stock = [i for i in props_of(scene) if i.category in ROLLING]
+    assert len(stock) >= 6
+    for car in stock:
+        low = car.vertices[car.vertices[:, 2] < RAIL_M + 0.02]
+        on = np.abs(distances(rails, low + np.array([0.0, 0.0, 0.3]), (0.0, 0.0, -1.0)) - 0.3) < 0.05
+        assert on.mean() > 0.3, car.node
+
+
+@each_scene(["I_Bridge_0", "I_Bridge_1"])
+def test_one_can_fly_under_the_bridge_and_not_through_its_road(scene_of, name):
+    scene = scene_of(name)
+    x = np.linspace(-12.0, 12.0, 13)
+    assert (distances(scene, [(u, 0.3, 0.5) for u in x], (0.0, 0.0, -1.0)) < 0.6).all()
+    # From one side to the other, well below the deck and above the water.
+    across = distances(scene, [(u, -7.0, -6.0) for u in x], (0.0, 1.0, 0.0))
+    assert (across > 14.0).sum() >= 5
+
+
+@each_scene(["U_Stadium_0"])
+def test_one_flies_from_the_pitch_through_a_portal_and_out_of_the_ground(scene_of, name):
+    # Under the upper rows and through the outer wall; beside the portal the front wall bars the way.
+    xs = (-12.0, 0.0, 12.0)
+    eyes = [*((x + 1.1, -10.9, 2.0) for x in xs), *((x + 1.9, -10.9, 0.9) for x in xs)]
+    through, beside = distances(scene_of(name), eyes, (0.0, -1.0, 0.0)).reshape(2, 3)
+    assert (through > 9.0).all()
+    assert (beside < 1.5).all()
+
+
+@pytest.fixture(scope="module", params=[nightly_unless("U_Mall_0" in DAILY, "U_Mall_0")])
+def mall(request: pytest.FixtureRequest, scene_of: Callable[[str], Scene]) -> Scene:
+    return scene_of(request.param)
+
+
+@pytest.fixture(scope="module")
+def world(mall: Scene) -> CollisionWorld:
+    return CollisionWorld(mall)
+
+
+def test_every_prop_says_where_it_stands(mall: Scene) -> None:
+    for i in props_of(mall):
+        assert i.attributes.get("place", "").strip() or catalogue()[i.category].kind == "life", i.node
+
+
+def test_props_do_not_stand_in_each_other(mall: Scene) -> None:
+    pairs = touching(i for i in props_of(mall) if catalogue()[i.category].kind != "building" and i.category != SITTER)
+    # Hedges run on from block to block, and trees grow out of them.
+    assert [p for p in sorted(pairs) if not any("hedge" in n for n in p)] == []
+
+
+@pytest.mark.parametrize(
+    ("p", "q"),
+    [
+        ((-10.5, 15.0, 3.2), (-10.5, 60.0, 3.2)),
+        ((-29.0, 17.7, 4.3), (8.0, 17.7, 4.3)),
+        ((-33.65, 3.0, 3.9), (-33.65, 14.0, 3.9)),
+        ((-11.0, -20.0, 3.3), (-11.0, -1.5, 3.3)),
+        ((-59.6, 0.0, 4.4), (-59.6, 40.0, 4.4)),
+        ((47.0, 18.6, 2.4), (90.0, 18.6, 2.4)),
+        ((51.0, 37.0, 6.3), (90.0, 37.0, 6.3)),
+        ((57.0, -30.0, 2.9), (57.0, -12.0, 2.9)),
+        ((38.0, -14.0, 7.0), (38.0, 50.0, 7.0)),
+    ],
+    ids=["passage", "north arcade", "west arcade", "gate", "west canopy", "deck", "middle floor", "terrace", "drive"],
+)
+def test_a_drone_can_fly_under_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
+    assert not world.segment_in_collision(np.array(p), np.array(q), 0.25)
+
+
+@pytest.mark.parametrize(
+    ("p", "q"),
+    [
+        ((-20.0, 10.0, 2.0), (-20.0, 55.0, 2.0)),
+        ((0.0, 30.0, 12.0), (0.0, 30.0, 3.0)),
+        ((65.0, 30.0, 2.0), (65.0, 30.0, 9.0)),
+    ],
+    ids=["hall", "roof", "slab"],
+)
+def test_walls_and_floors_stop_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
+    assert world.segment_in_collision(np.array(p), np.array(q), 0.25)

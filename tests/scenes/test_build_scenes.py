@@ -21,8 +21,8 @@ from aerialdojo_gen.pipeline.stages.work import build_scenes
 from aerialdojo_gen.scenes.build import build_scene
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.scenes.grammar import along, grid, poisson_disc, smooth_path
-from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle, ribbon
+from aerialdojo_gen.scenes.grammar import poisson_disc, smooth_path
+from aerialdojo_gen.scenes.ground import Surface, disc, ground_meshes, rectangle
 from aerialdojo_gen.scenes.kit.landforms import hill
 from aerialdojo_gen.scenes.kit.streets import crossings, streets
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
@@ -270,17 +270,3 @@ def test_poisson_discs_are_those_of_the_rule_taken_dart_by_dart(seed, radius, li
                 taken.append((x, y, own))
                 wanted.append((x, y, yaw))
     assert [tuple(pose) for pose in poisson_disc(area, radius, np.random.default_rng(seed), density, limit)] == wanted
-
-
-def test_poses_along_a_path_reach_both_ends_and_face_along_it():
-    poses = along([(0, 0), (10, 0), (10, 10)], 2.5, offset_m=1.0)
-    assert len(poses) == 9
-    assert poses[0] == pytest.approx((0, 1, 0))
-    assert poses[-1] == pytest.approx((9, 10, 90))
-
-
-def test_grid_points_lie_in_their_area():
-    area = ribbon([(0, 0), (20, 20)], 8)
-    poses = grid(area, (2, 3), np.random.default_rng(0), yaw_deg=45)
-    assert len(poses) == pytest.approx(area.area / 6, rel=0.2)
-    assert all(area.contains(Point(p.x, p.y)) for p in poses)

@@ -71,10 +71,6 @@ def test_the_schema_fits_every_plan(schema, path):
     assert schema.is_valid({**plan, "site": [{"entries": []}]})
 
 
-def test_the_schema_fits_a_yard(schema):
-    assert schema.is_valid(YARD)
-
-
 @pytest.mark.parametrize(
     "entry",
     [
@@ -89,6 +85,7 @@ def test_the_schema_fits_a_yard(schema):
 )
 def test_the_schema_marks_what_would_not_be_built(schema, tmp_path, catalogue, entry):
     plan = {**YARD, "site": [entry]}
+    assert schema.is_valid(YARD)
     assert not schema.is_valid(plan)
     with pytest.raises(AssetError):
         build(tmp_path, catalogue, plan)

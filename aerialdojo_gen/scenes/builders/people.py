@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.shapes import box, cone, cylinder, lathe, profile, sp
 # Joints of a body of 1.75 m that stands, metres above its soles.
 _BODY_M = 1.75
 _HIP, _KNEE, _ANKLE = 0.93, 0.5, 0.08
-_SHOULDER, _HEAD = 1.43, 1.61
+_SHOULDER = 1.43
 _UPPER_ARM, _FOREARM, _THIGH, _SHIN = 0.29, 0.25, 0.43, 0.42
 _STAND, _WALK, _SIT, _WORK, _CALL, _ON_SEAT, RIDE = range(7)
 _SEATED = frozenset({_SIT, _ON_SEAT, RIDE})

@@ -19,7 +19,7 @@ from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts, rim, trestle
 from aerialdojo_gen.scenes.kit.structures import block, columns, deck, railing, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
-from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Box, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Box, Line, Material, Number, Positive
 from aerialdojo_gen.scenes.shapes import sweep, upright
 from aerialdojo_gen.scenes.site import Site
 
@@ -166,9 +166,8 @@ _SIDES = (-2.4, 2.4)
 
 @part_builder
 def stone_viaduct(
-    *, x0: Number, x1: Number, foot_m: Number, arches: list[tuple[Number, Annotated[Number, Field(gt=0)], Number]],
-    piers: list[Number], ballast_m: Number, stone: Material, trim: Material,
-    ballast: Material = "gravel:#867e74",
+    *, x0: Number, x1: Number, foot_m: Number, arches: list[tuple[Number, Positive, Number]], piers: list[Number],
+    ballast_m: Number, stone: Material, trim: Material, ballast: Material = "gravel:#867e74",
 ) -> Parts:  # fmt: skip
     """Make a viaduct for one track at z = 0: arches with rings, a string course, parapets, pilasters, ballast.
 

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails, posts
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Materials, Number
 from aerialdojo_gen.scenes.shapes import box, cone, crown
 from aerialdojo_gen.scenes.site import Site
 
@@ -59,7 +59,7 @@ def hoarding(
 @site_builder
 def site_offices(
     site: Site, *, at: At, yaw_deg: Number = 0.0, columns: _Count, storeys: _Count,
-    colours: Annotated[list[Material], Field(min_length=1)], on: Number = 0.0,
+    colours: Materials, on: Number = 0.0,
 ) -> float:  # fmt: skip
     """Stack cabins, with galleries and stairs along their front; gives the height of the stack's roof.
 
@@ -107,7 +107,7 @@ def _cabin(v: float, z: float, colour: str) -> Parts:
 
 @site_builder
 def aggregate_bays(
-    site: Site, *, at: At, yaw_deg: Number = 0.0, materials: Annotated[list[Material], Field(min_length=1)],
+    site: Site, *, at: At, yaw_deg: Number = 0.0, materials: Materials,
     bay_m: tuple[Number, Number] = (5.0, 5.0), wall: Material = "blocks",
 ) -> None:  # fmt: skip
     """Build open bays (depth, width) side by side, each with a heap of its material.

@@ -22,7 +22,7 @@ from aerialdojo_gen.scenes.kit.structures import Point, block, deck, railing, st
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Bodies, Material, Materials, Number
 from aerialdojo_gen.scenes.shapes import box, prism, profile, sphere, sweep, upright
 from aerialdojo_gen.scenes.site import Site
 
@@ -33,8 +33,7 @@ _RoofKind = Literal["flat", "gable", "hip"]
 def building(
     site: Site, *, outline: Area, wall: Material, roof: Material, storeys: int = 2, storey_m: Number = 3.2,
     roof_kind: _RoofKind = "flat", roof_m: Number = 2.5, parapet_m: Number = 0.6, overhang_m: Number = 0.4,
-    on: Number | None = None, category: str = "building", attributes: dict[str, str] = {},  # noqa: B006
-    extra: Bodies = [],  # noqa: B006
+    on: Number | None = None, category: str = "building", attributes: dict[str, str] = {}, extra: Bodies = [],  # noqa: B006
 ) -> float:  # fmt: skip
     """Put up a building on an outline, on its lowest corner's ground; gives the height of its walls' top, metres."""
     if not isinstance(outline, Polygon):
@@ -210,7 +209,6 @@ def oriented_rectangle(plan: Polygon) -> tuple[tuple[float, float], float, float
 _OnWall = tuple[Number, Number, Number]
 # Both ends on walls, and their height.
 _Across = tuple[Number, Number, Number, Number, Number]
-_Materials = Annotated[list[Material], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -274,7 +272,7 @@ def fire_escapes(
 
 
 @site_builder
-def awnings(site: Site, *, at: list[_OnWall], cloths: _Materials, width_m: Number = 3.0, z_m: Number = 2.6) -> None:
+def awnings(site: Site, *, at: list[_OnWall], cloths: Materials, width_m: Number = 3.0, z_m: Number = 2.6) -> None:
     """Hang sloping awnings on walls (x, y, yaw_deg), their lower edges at `z_m`; the cloths are dealt in turn."""
     for k, pose in enumerate(at):
         cloth = cloths[k % len(cloths)]
@@ -289,7 +287,7 @@ def awnings(site: Site, *, at: list[_OnWall], cloths: _Materials, width_m: Numbe
 @site_builder
 def washing_lines(
     site: Site, *, across: list[_Across],
-    cloths: _Materials = ["#e8e4da", "#b8443a", "#3f6fa8", "#e0b64a", "#6f9a6a", "#d98aa0"],  # noqa: B006
+    cloths: Materials = ["#e8e4da", "#b8443a", "#3f6fa8", "#e0b64a", "#6f9a6a", "#d98aa0"],  # noqa: B006
 ) -> None:  # fmt: skip
     """Hang washing on sagging cords across lanes: (x, y, x, y, z) of each; the cloths are drawn."""
     for x0, y0, x1, y1, z_m in across:

@@ -19,7 +19,7 @@ from aerialdojo_gen.scenes.kit.structures import block, railing
 from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number, Positive
 from aerialdojo_gen.scenes.shapes import box, cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -106,8 +106,8 @@ def round_hedge(site: Site, *, disc: tuple[Number, Number, Number], opening: Are
 
 @site_builder
 def walls(
-    site: Site, *, lines: list[Line], height_m: Annotated[Number, Field(gt=0)], material: Material,
-    thickness_m: Annotated[Number, Field(gt=0)] = 0.3, category: str = "wall",
+    site: Site, *, lines: list[Line], height_m: Positive, material: Material,
+    thickness_m: Positive = 0.3, category: str = "wall",
 ) -> None:  # fmt: skip
     """Put up plain walls along lines, on the ground at their points, each as a structure of its own."""
     for line in lines:

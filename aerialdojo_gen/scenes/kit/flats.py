@@ -26,9 +26,8 @@ _PITCH_M, _DEPTH_M, _WIDE_M = 6.4, 1.6, 3.2
 @site_builder
 def flats(
     site: Site, *, at: At, yaw_deg: Number, size_m: tuple[Number, Number],
-    storeys: Annotated[int, Field(ge=2, le=30)], wall: Material, band: Material, name: str,
-    arch_m: Number = 6.0, base: Material = "blocks:#8d867a", paving: Material = "paving",
-    roof: Material = "gravel:#a09a90",
+    storeys: Annotated[int, Field(ge=2, le=30)], wall: Material, band: Material, name: str, arch_m: Number = 6.0,
+    base: Material = "blocks:#8d867a", paving: Material = "paving", roof: Material = "gravel:#a09a90",
 ) -> float:  # fmt: skip
     """Put up flats, with balconies along the front and a passage through the middle; gives the height of the roof.
 

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.mesh import Mesh, merge, posed, rotation, translated
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.model import ScalarField
-from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Materials, Number, Positive, Spacing
 from aerialdojo_gen.scenes.shapes import crown, cylinder
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain
@@ -30,10 +30,9 @@ _Radius = Annotated[Number, Field(ge=0.1)]
 
 @site_builder
 def paint_patches(
-    site: Site, *, materials: Annotated[list[Material], Field(min_length=1)],
-    count: Annotated[int, Field(ge=0, le=1000)], radius_m: tuple[_Radius, _Radius], seed: int = 0,
-    ragged: Number = 0.55, stream: str = "patches", box: Box | None = None,
-    skip: Annotated[int, Field(ge=0, le=1000)] = 0,
+    site: Site, *, materials: Materials, count: Annotated[int, Field(ge=0, le=1000)],
+    radius_m: tuple[_Radius, _Radius], seed: int = 0, ragged: Number = 0.55, stream: str = "patches",
+    box: Box | None = None, skip: Annotated[int, Field(ge=0, le=1000)] = 0,
 ) -> None:  # fmt: skip
     """Paint patches about the site, or a box of it, of the materials in turn.
 
@@ -67,9 +66,7 @@ def paint_scree(site: Site, *, areas: list[Area], material: Material, seed: int 
 
 
 @site_builder
-def strips_beside(
-    site: Site, *, line: Line, offsets_m: list[Number], width_m: Annotated[Number, Field(gt=0)], material: Material
-) -> None:
+def strips_beside(site: Site, *, line: Line, offsets_m: list[Number], width_m: Positive, material: Material) -> None:
     """Paint strips beside a line, such as ruts or the marks of a groomer, left of it at positive offsets."""
     for offset_m in offsets_m:
         strip = LineString(line).offset_curve(offset_m)
@@ -77,12 +74,9 @@ def strips_beside(
             site.paint(strip.buffer(width_m / 2, cap_style="flat", quad_segs=2), material)
 
 
-_Spacing = Annotated[Number, Field(ge=0.5)]
-
-
 @site_builder
 def paint_sea(
-    site: Site, *, land: Area, shallow_m: _Spacing = 9.0, deep: Material = "water:#2f7d9a",
+    site: Site, *, land: Area, shallow_m: Spacing = 9.0, deep: Material = "water:#2f7d9a",
     shallow: Material = "water:#55a9ac", lagoon: Material = "water:#7cc4bd", foam: Material = "water:#dcebe8",
     wet: Material = "sand:#b99c6c",
 ) -> None:  # fmt: skip
@@ -104,7 +98,7 @@ def paint_sea(
 
 @site_builder
 def paint_beach(
-    site: Site, *, land: Area, width_m: Number, material: Material, lobe_m: Number = 3.2, spacing_m: _Spacing = 4.0,
+    site: Site, *, land: Area, width_m: Number, material: Material, lobe_m: Number = 3.2, spacing_m: Spacing = 4.0,
     seed: int = 0,
 ) -> None:  # fmt: skip
     """Paint a beach along a coastline, its inner edge ragged."""
@@ -175,7 +169,7 @@ def steep_area(terrain: Terrain, degrees: float) -> BaseGeometry:
 
 @site_builder
 def strew_rocks(
-    site: Site, *, area: Area, spacing_m: _Spacing, radius_m: tuple[Number, Number], material: Material,
+    site: Site, *, area: Area, spacing_m: Spacing, radius_m: tuple[Number, Number], material: Material,
     category: str = "shore_rocks", limit: Annotated[int, Field(ge=1, le=2000)] = 200, flat: Number = 0.75,
 ) -> None:  # fmt: skip
     """Strew rocks over an area where it is free, half sunk, as one structure; `flat` is their height over width."""
@@ -222,8 +216,7 @@ def keep_free(site: Site, *, areas: list[Area], z: tuple[Number, Number] = (-100
 
 @site_builder
 def strew_trees(
-    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)],
-    spacing_m: Annotated[Number, Field(ge=0.5)],
+    site: Site, *, area: Area, of: Annotated[list[str], Field(min_length=1)], spacing_m: Spacing,
     stream: str = "trees", limit: Annotated[int, Field(ge=1, le=10_000)] = 10_000,
 ) -> None:  # fmt: skip
     """Strew trees over an area, of categories in turn; a spot without room stays empty."""
@@ -282,7 +275,7 @@ class Strewn:
 
 @site_builder
 def woods(
-    site: Site, *, area: Area, spacing_m: Annotated[Number, Field(ge=0.5)],
+    site: Site, *, area: Area, spacing_m: Spacing,
     species: Annotated[list[Species], Field(min_length=1)], density: ScalarField | None = None, place: str = "",
 ) -> None:  # fmt: skip
     """Grow trees over an area where there is room, of a species drawn by habitat at every place.
@@ -339,9 +332,8 @@ def undergrowth(
 
 @site_builder
 def broadleaves(
-    site: Site, *, area: Area, spacing_m: Annotated[Number, Field(ge=0.5)],
-    limit: Annotated[int, Field(ge=1, le=2000)], height_m: tuple[Number, Number],
-    density: ScalarField | None = None, leaves: Material = "foliage:#4a7a32",
+    site: Site, *, area: Area, spacing_m: Spacing, limit: Annotated[int, Field(ge=1, le=2000)],
+    height_m: tuple[Number, Number], density: ScalarField | None = None, leaves: Material = "foliage:#4a7a32",
 ) -> None:  # fmt: skip
     """Grow round-crowned trees where there is room, as one structure: background that nothing refers to."""
     rng = site.rng_for("broadleaves", round(area.area, 2))

@@ -17,7 +17,7 @@ from aerialdojo_gen.scenes.kit.buildings import pitched_roof, wall_with_openings
 from aerialdojo_gen.scenes.kit.steelwork import bars, posts
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
-from aerialdojo_gen.scenes.plans.values import Box, Material, Number
+from aerialdojo_gen.scenes.plans.values import Box, Material, Number, Spacing
 from aerialdojo_gen.scenes.shapes import extrude, upright
 from aerialdojo_gen.scenes.site import Site
 
@@ -102,7 +102,7 @@ def overhead_crane(site: Site, *, box: Box, at_x: Number, z_m: Number, colour: M
 @site_builder
 def shed_on_posts(
     site: Site, *, box: Box, eaves_m: Number, rise_m: Number, roof: Material,
-    post_m: Annotated[Number, Field(ge=0.5)] = 5.0, on: Number = 0.0, post: Material = "wood",
+    post_m: Spacing = 5.0, on: Number = 0.0, post: Material = "wood",
 ) -> float:  # fmt: skip
     """Put up a gable roof on posts without walls, about `post_m` apart; gives the height of its eaves."""
     x0, y0, x1, y1 = box

@@ -23,7 +23,7 @@ from aerialdojo_gen.scenes.kit.structures import block
 from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.plans.values import At, Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Material, Materials, Number
 from aerialdojo_gen.scenes.shapes import box, prism
 from aerialdojo_gen.scenes.site import Site
 
@@ -356,9 +356,8 @@ def _porch_and_garage(site: Site, lot: Lot) -> None:
 
 @site_builder
 def vegetable_beds(
-    site: Site, *, at: list[At], greens: Annotated[list[Material], Field(min_length=1)], soil: Material = "soil",
-    edge: Material = "wood",
-) -> None:  # fmt: skip
+    site: Site, *, at: list[At], greens: Materials, soil: Material = "soil", edge: Material = "wood"
+) -> None:
     """Lay out raised beds of three rows about points; the greens, each higher than the last, are dealt in turn."""
     for k, (x, y) in enumerate(at):
         plan = rectangle(x - 1.5, y - 1.0, x + 1.5, y + 1.0)

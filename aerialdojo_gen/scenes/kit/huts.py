@@ -19,17 +19,16 @@ from aerialdojo_gen.scenes.kit.buildings import Roof, pitched_roof, put_up_build
 from aerialdojo_gen.scenes.kit.quays import bars
 from aerialdojo_gen.scenes.kit.structures import block, columns, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Line, Material, Materials, Number, Positive
 from aerialdojo_gen.scenes.shapes import box, cylinder, profile, sweep
 from aerialdojo_gen.scenes.site import Site
 
 _Pose = tuple[Number, Number, Number]
-_Walls = Annotated[list[Material], Field(min_length=1)]
 
 
 @site_builder
 def stilt_huts(
-    site: Site, *, at: list[_Pose], walls: _Walls, on: Number | None = None, width_m: Number = 5.0,
+    site: Site, *, at: list[_Pose], walls: Materials, on: Number | None = None, width_m: Number = 5.0,
     depth_m: Number = 4.4, porch_m: Number = 1.8, roof: Material = "thatch", trim: Material = "#e9dcc0",
     steps: bool = True,
 ) -> None:  # fmt: skip
@@ -82,7 +81,7 @@ def _room(d: float, w: float, front: float, z: float, wall: str, roof: str, trim
 
 @site_builder
 def boathouses(
-    site: Site, *, at: list[_Pose], walls: _Walls, on: Number, width_m: Number = 4.6, depth_m: Number = 7.0,
+    site: Site, *, at: list[_Pose], walls: Materials, on: Number, width_m: Number = 4.6, depth_m: Number = 7.0,
     roof: Material = "shingles:#55504c", trim: Material = "#efe9dc",
 ) -> None:  # fmt: skip
     """Put up boathouses whose open fronts look over the water: three walls, a gable roof, posts below the floor."""
@@ -184,14 +183,13 @@ def _raised_cabin(site: Site, cabin: Cabin, roof: str) -> float:
         (roof, slab(rectangle(-u - 0.15, -v - 0.15, u + 0.15, v + 0.15), height, height + _SNOW_M)),
         ("steel", slab(rectangle(-u, -v, u + 2.4, v), -0.16, 0.0)),
     ]
-    stilt = cylinder(radius=0.1, height=_STILT_M + 0.8, segments=6)
-    for a in (-u + 0.3, 0.0, u - 0.3, u + 2.2):
-        for b in np.linspace(-v + 0.4, v - 0.4, max(int(width // 3), 2)):
-            parts.append(("steel", translated(stilt, (a, float(b), -_STILT_M - 0.8))))
+    across = np.linspace(-v + 0.4, v - 0.4, max(int(width // 3), 2)).tolist()
+    feet = [(a, b) for a in (-u + 0.3, 0.0, u - 0.3, u + 2.2) for b in across]
+    parts.append(("steel", columns(feet, -_STILT_M - 0.8, 0.0, 0.1, 6)))
     rail = [(u, -v, _RAIL_M), (u + 2.35, -v, _RAIL_M), (u + 2.35, v - 1.4, _RAIL_M)]
     parts.append(("#e9b52a", sweep(path=rail, radius=0.04, sides=5)))
-    for x, y, _ in (*rail, (u + 2.35, 0.0, 0.0), (u + 2.35, v, 0.0)):
-        parts.append(("#e9b52a", translated(cylinder(radius=0.035, height=_RAIL_M, segments=5), (x, y, 0.0))))
+    posts = [*((x, y) for x, y, _ in rail), (u + 2.35, 0.0), (u + 2.35, v)]
+    parts.append(("#e9b52a", columns(posts, 0.0, _RAIL_M, 0.035, 5)))
     for k in range(5):
         at = (u + 2.55 + 0.28 * k, v - 0.7, -0.26 * (k + 1))
         parts.append(("steel", translated(box(size=(0.28, 1.2, 0.06)), at)))
@@ -285,7 +283,7 @@ class CrumblingWall:
     line: Line
     height_m: Annotated[Number, Field(gt=0, le=100)] = 3.0  # Where it still stands
     decay: Annotated[Number, Field(ge=0, le=1)] = 0.6  # How much of its height is lost at the worst places
-    thickness_m: Annotated[Number, Field(gt=0)] = 0.7
+    thickness_m: Positive = 0.7
 
 
 @site_builder

@@ -16,7 +16,7 @@ from aerialdojo_gen.base.simplex import OpenSimplex
 from aerialdojo_gen.geometry.portable import exp, power
 from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Floats
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number, Point3
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Formula, Line, Number, Point3, Positive, Spacing
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, rolling_terrain, smooth
 
@@ -27,9 +27,8 @@ _Run = Annotated[Number, Field(ge=0.1)]
 
 @ground_builder
 def rolling_ground(
-    site: Site, terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)], height_m: Number,
-    wavelength_m: Annotated[Number, Field(gt=0)], octaves: Annotated[int, Field(ge=1, le=8)] = 4,
-    seed: int | None = None, over: bool = False,
+    site: Site, terrain: Terrain, *, cell_m: Spacing, height_m: Number, wavelength_m: Positive,
+    octaves: Annotated[int, Field(ge=1, le=8)] = 4, seed: int | None = None, over: bool = False,
 ) -> Terrain:  # fmt: skip
     """Make rolling ground by noise of a seed, the plan's by default, in place of what was there or `over` it."""
     seed = site.head.seed if seed is None else seed
@@ -40,7 +39,7 @@ def rolling_ground(
 @ground_builder
 def hillside_steps(
     _site: Site, terrain: Terrain, *, steps: list[tuple[Number, Number]], half_m: Number,
-    soft_m: Annotated[Number, Field(gt=0)] = 4.0, run_m: tuple[_Run, _Run] = (1.0, 8.0),
+    soft_m: Positive = 4.0, run_m: tuple[_Run, _Run] = (1.0, 8.0),
 ) -> Terrain:  # fmt: skip
     """Let the ground rise northwards in steps (y, rise): steep up to `half_m` from the middle, soft beyond."""
     x, y = grid(terrain)
@@ -52,9 +51,8 @@ def hillside_steps(
 
 @ground_builder
 def round_levels(
-    _site: Site, terrain: Terrain, *, discs: list[tuple[Number, Number, Number, Number]],
-    blend_m: Annotated[Number, Field(gt=0)] = 7.0,
-) -> Terrain:  # fmt: skip
+    _site: Site, terrain: Terrain, *, discs: list[tuple[Number, Number, Number, Number]], blend_m: Positive = 7.0
+) -> Terrain:
     """Level discs (x, y, radius, height), one after the other, with a slope about each back to the old ground."""
     x, y = grid(terrain)
     for u, v, radius, to_m in discs:
@@ -64,9 +62,8 @@ def round_levels(
 
 @ground_builder
 def level_about(
-    _site: Site, terrain: Terrain, *, area: Area, to_m: Number, reach_m: Number,
-    blend_m: Annotated[Number, Field(gt=0)],
-) -> Terrain:  # fmt: skip
+    _site: Site, terrain: Terrain, *, area: Area, to_m: Number, reach_m: Number, blend_m: Positive
+) -> Terrain:
     """Level an area and `reach_m` about it, with a slope back to the old ground."""
     return terrain.blended(to_m, smooth(1.0 - (terrain.distance(area) - reach_m) / blend_m))
 
@@ -84,7 +81,7 @@ def bank_about(
 @ground_builder
 def ground_by_formula(
     site: Site, terrain: Terrain, *, height: Formula, let: dict[str, Formula] = {}, inland: dict[str, Area] = {},  # noqa: B006
-    noise_m: Annotated[Number, Field(gt=0)] = 20.0, cell_m: Annotated[Number, Field(ge=0.5)] | None = None,
+    noise_m: Positive = 20.0, cell_m: Spacing | None = None,
 ) -> Terrain:  # fmt: skip
     """Shape the ground by a formula over x and y, the height z so far, and noise of a wavelength, from -1 to 1.
 
@@ -160,7 +157,7 @@ def slope(
 @ground_builder
 def level_along(
     _site: Site, terrain: Terrain, *, lines: list[Line], width_m: Number, blend_m: Number = 3.0,
-    smooth_m: Annotated[Number, Field(gt=0)] = 12.0,
+    smooth_m: Positive = 12.0,
 ) -> Terrain:  # fmt: skip
     """Lay ways into the ground, each level across, and smoothed along over `smooth_m`."""
     for line in lines:
@@ -171,9 +168,7 @@ def level_along(
 
 
 @ground_builder
-def sink_area(
-    _site: Site, terrain: Terrain, *, area: Area, depth_m: Number, blend_m: Annotated[Number, Field(gt=0)]
-) -> Terrain:
+def sink_area(_site: Site, terrain: Terrain, *, area: Area, depth_m: Number, blend_m: Positive) -> Terrain:
     """Sink an area, such as the bed of a stream, with slopes inside its border."""
     return terrain.raised(-depth_m * smooth(terrain.inside(area) / blend_m))
 
@@ -187,9 +182,7 @@ def level_under_things(site: Site, terrain: Terrain, *, blend_m: Number = 3.0, m
 
 
 @ground_builder
-def bank_scree(
-    _site: Site, terrain: Terrain, *, areas: list[Area], rise_m: Number, reach_m: Annotated[Number, Field(gt=0)]
-) -> Terrain:
+def bank_scree(_site: Site, terrain: Terrain, *, areas: list[Area], rise_m: Number, reach_m: Positive) -> Terrain:
     """Let the ground rise towards the feet of rocks."""
     for area in areas:
         terrain = terrain.raised(rise_m * np.clip(1.0 - terrain.distance(area) / reach_m, 0.0, 1.0) ** 2)
@@ -225,7 +218,7 @@ _Steps = Annotated[list[tuple[Number, Number]], Field(min_length=2, max_length=1
 
 
 @ground_builder
-def level_grid(site: Site, _terrain: Terrain, *, cell_m: Annotated[Number, Field(ge=0.5)]) -> Terrain:
+def level_grid(site: Site, _terrain: Terrain, *, cell_m: Spacing) -> Terrain:
     """Make level ground at z = 0 that is fine enough to be dug in, in place of what was there."""
     return level_terrain(site.head.size_m, cell_m)
 
@@ -246,9 +239,8 @@ def terraces(_site: Site, terrain: Terrain, *, area: Area, steps: _Steps) -> Ter
 
 @ground_builder
 def earth_ramp(
-    _site: Site, terrain: Terrain, *, start: Point3, end: Point3, width_m: Number,
-    blend_m: Annotated[Number, Field(gt=0)] = 2.0,
-) -> Terrain:  # fmt: skip
+    _site: Site, terrain: Terrain, *, start: Point3, end: Point3, width_m: Number, blend_m: Positive = 2.0
+) -> Terrain:
     """Lay a straight ramp into the ground from one point to another, with slopes beside it."""
     line = LineString([start[:2], end[:2]])
     away = terrain.distance(line.buffer(width_m / 2, cap_style="flat"))
@@ -269,12 +261,9 @@ def rough_area(site: Site, terrain: Terrain, *, area: Area, height_m: Number, st
 _WINDWARD = 0.7
 
 
-_Cell = Annotated[Number, Field(ge=0.5)]
-
-
 @ground_builder
 def dunes(
-    site: Site, _terrain: Terrain, *, cell_m: _Cell, height_m: Number, wavelength_m: Annotated[Number, Field(ge=1)],
+    site: Site, _terrain: Terrain, *, cell_m: Spacing, height_m: Number, wavelength_m: Annotated[Number, Field(ge=1)],
     wind_deg: Number,
 ) -> Terrain:  # fmt: skip
     """Make a sand sea: wavy crests across the wind, gentle windward slopes and steep slip faces."""
@@ -294,7 +283,7 @@ def dunes(
 
 @ground_builder
 def stepped_valley(
-    site: Site, _terrain: Terrain, *, cell_m: _Cell, bed: Line, steps: list[tuple[Number, Number, Number]],
+    site: Site, _terrain: Terrain, *, cell_m: Spacing, bed: Line, steps: list[tuple[Number, Number, Number]],
     roughness_m: Number,
 ) -> Terrain:  # fmt: skip
     """Make a valley along the middle line of its bed, from which the ground climbs in steps (from, to, rise)."""
@@ -321,7 +310,7 @@ def _noise_at(seed: int, x: Floats, y: Floats) -> Floats:
 @ground_builder
 def profile_slope(
     _site: Site, terrain: Terrain, *, profile: Annotated[list[tuple[Number, Number]], Field(min_length=2)],
-    lean: Number = 0.0, smooth_m: Annotated[Number, Field(gt=0)] = 4.0,
+    lean: Number = 0.0, smooth_m: Positive = 4.0,
 ) -> Terrain:  # fmt: skip
     """Raise the ground by a profile from south to north, (y, z), and by `lean` metres a metre eastwards."""
     from scipy.ndimage import gaussian_filter1d
@@ -343,9 +332,7 @@ def banks_beside(_site: Site, terrain: Terrain, *, line: Line, width_m: Number, 
 
 
 @ground_builder
-def moguls(
-    _site: Site, terrain: Terrain, *, area: Area, height_m: Number, pitch_m: Annotated[Number, Field(ge=0.5)] = 4.4
-) -> Terrain:
+def moguls(_site: Site, terrain: Terrain, *, area: Area, height_m: Number, pitch_m: Spacing = 4.4) -> Terrain:
     """Cover an area with the bumps that turning skis leave."""
     x, y = terrain.corners()[:, :2].T
     fade = np.clip(terrain.inside(area).ravel() / 2.0, 0.0, 1.0)

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.ground import disc, polygons_of, rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, columns, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, translated
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Materials, Number, Positive
 from aerialdojo_gen.scenes.shapes import box, cone, cylinder, prism, sphere, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -68,9 +68,8 @@ def ride_hall(
 
 @site_builder
 def booths(
-    site: Site, *, at: At, yaw_deg: Number, count: _Count, colours: Annotated[list[Material], Field(min_length=1)],
-    words: _Words, node: str | None = None,
-) -> None:  # fmt: skip
+    site: Site, *, at: At, yaw_deg: Number, count: _Count, colours: Materials, words: _Words, node: str | None = None
+) -> None:
     """Put up a row of game booths, 3 m wide each, open along `yaw_deg`: counters, prizes, striped roofs, signs."""
     frame = Frame(*at, yaw_deg)
     base = site.ground_z(*at)
@@ -308,8 +307,8 @@ _SAG = 0.045
 @site_builder
 def cableway(
     site: Site, *, masts: Line, cabins: Annotated[int, Field(ge=0, le=1000)] = 8, mast_m: Number = 11.6,
-    terminal_m: Number = 5.6, gauge_m: Annotated[Number, Field(gt=0)] = 6.4,
-    paints: Annotated[list[Material], Field(min_length=1)] = ["#d8342c", "#2f5f9e", "#e9b52a", "#3f7d4e"],  # noqa: B006
+    terminal_m: Number = 5.6, gauge_m: Positive = 6.4,
+    paints: Materials = ["#d8342c", "#2f5f9e", "#e9b52a", "#3f7d4e"],  # noqa: B006
 ) -> None:  # fmt: skip
     """Hang two ropes with cabins between the heads of masts; the first and the last are terminals with a wheel."""
     last = len(masts) - 1

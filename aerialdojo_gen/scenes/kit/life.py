@@ -20,19 +20,8 @@ from aerialdojo_gen.scenes.site import Site
 
 # Who walks on what: roads, rails, water and beds of plants are left out.
 WALKED = (
-    "paving",
-    "tiles",
-    "cobbles",
-    "concrete",
-    "boards",
-    "planks",
-    "gravel",
-    "grass",
-    "meadow",
-    "dirt",
-    "sand",
-    "snow",
-)
+    "paving", "tiles", "cobbles", "concrete", "boards", "planks", "gravel", "grass", "meadow", "dirt", "sand", "snow",
+)  # fmt: skip
 _SOFT = frozenset({"grass", "meadow", "sand"})
 _AT_WORK = frozenset({"work", "rescue"})
 _STAND, _WALK, _SIT, _WORK, _CALL = range(5)
@@ -91,13 +80,9 @@ def _under_water(site: Site, spot: Pose, wet: Sequence[np.ndarray]) -> bool:
 
 
 def _people(
-    site: Site,
-    number: int,
-    dressed: Sequence[str],
-    spots: Iterator[Pose],
-    ground: Sequence[str],
+    site: Site, number: int, dressed: Sequence[str], spots: Iterator[Pose], ground: Sequence[str],
     rng: np.random.Generator,
-) -> None:
+) -> None:  # fmt: skip
     """Place groups of one to three until there are so many people, or no spot is left."""
     order, placed = rng.permutation(len(dressed)), 0
     for spot in spots:
@@ -173,10 +158,8 @@ def _herd(
     for _ in range(40 * number):
         if placed == number:
             return
-        away, turn = (
-            _HERD_M * math.sqrt(float(rng.random())) * min(1.0, number / 4.0),
-            float(rng.uniform(0.0, 2.0 * math.pi)),
-        )
+        away = _HERD_M * math.sqrt(float(rng.random())) * min(1.0, number / 4.0)
+        turn = float(rng.uniform(0.0, 2.0 * math.pi))
         x, y = middle.x + away * math.cos(turn), middle.y + away * math.sin(turn)
         yaw = middle.yaw_deg + float(rng.normal(scale=50.0))
         if _walkable(site, x, y, ground, _ROOM_M):

@@ -21,7 +21,7 @@ from aerialdojo_gen.scenes.kit import ground_builder, site_builder
 from aerialdojo_gen.scenes.kit.landforms import grid
 from aerialdojo_gen.scenes.mesh import Floats, Mesh, Parts, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, At, Line, Material, Materials, Number, Positive, Spacing
 from aerialdojo_gen.scenes.shapes import box, crown
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.terrain import Terrain, level_terrain, rolling_terrain, smooth
@@ -34,7 +34,7 @@ class Ridge:
     """A crest of points (x, y, z), or a peak of one; its flanks reach so far, hollow above 1 and bulging below."""
 
     line: Annotated[list[tuple[Number, Number, Annotated[Number, Field(ge=0)]]], Field(min_length=1, max_length=1000)]
-    width_m: Annotated[Number, Field(gt=0)]
+    width_m: Positive
     hollow: Annotated[Number, Field(ge=0.1, le=4)] = 1.3
 
 
@@ -43,14 +43,14 @@ class Crag:
     """A crag that stands on the ground, of so many blocks."""
 
     at: At
-    radius_m: Annotated[Number, Field(gt=0)]
-    height_m: Annotated[Number, Field(gt=0)]
+    radius_m: Positive
+    height_m: Positive
     blocks: Annotated[int, Field(ge=1, le=12)] = 5
 
 
 @ground_builder
 def massif(
-    site: Site, _terrain: Terrain, *, ridges: list[Ridge], cell_m: Annotated[Number, Field(ge=0.5)] = 1.6,
+    site: Site, _terrain: Terrain, *, ridges: list[Ridge], cell_m: Spacing = 1.6,
     bench_m: Annotated[Number, Field(ge=0)] = 4.5, rough_m: Number = 2.0,
 ) -> Terrain:  # fmt: skip
     """Make mountains in place of what was there; where ridges overlap, the higher shows, with a soft valley between.
@@ -138,7 +138,7 @@ class Stream:
     """A stream that winds northwards."""
 
     swing_m: Number = 3.2  # To either side
-    bend_m: Annotated[Number, Field(gt=0)] = 11.0  # Northing a radian of its waves
+    bend_m: Positive = 11.0  # Northing a radian of its waves
     x_m: Number = 0.0  # What it winds about
 
     def x(self, y: float) -> float:
@@ -198,7 +198,7 @@ def by_stream(
 @ground_builder
 def valley(
     _site: Site, terrain: Terrain, *, depth_m: Number, half_m: Number, stream: Stream,
-    slope_m: Annotated[Number, Field(gt=0)], bed_m: Number = 0.6,
+    slope_m: Positive, bed_m: Number = 0.6,
 ) -> Terrain:  # fmt: skip
     """Cut a valley with soft slopes along a stream, whose bed lies a little lower."""
     x, y = grid(terrain)
@@ -236,10 +236,7 @@ class Rock:
 
 
 @site_builder
-def layered_rocks(
-    site: Site, *, rocks: list[Rock], bands: Annotated[list[Material], Field(min_length=1)],
-    cap: Material | None = None,
-) -> list[float]:  # fmt: skip
+def layered_rocks(site: Site, *, rocks: list[Rock], bands: Materials, cap: Material | None = None) -> list[float]:
     """Put up rocks in layers of alternating hardness, from the foot up; gives the heights of their tops, metres.
 
     A thin `cap`, such as snow, lies over each.

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.kit.streets import parking_row
 from aerialdojo_gen.scenes.kit.structures import Point, block, columns, deck, letters, parapet, ramp, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
-from aerialdojo_gen.scenes.plans.values import At, Box, Material, Number
+from aerialdojo_gen.scenes.plans.values import At, Box, Material, Materials, Number
 from aerialdojo_gen.scenes.site import Site
 
 # What people come in, and how often.
@@ -152,24 +152,15 @@ def _rows(x0: float, y0: float, x1: float, y1: float) -> list[_Row]:
     count = int((width - 9.0) // 2.6)
     middle = (y0 + y1) / 2
     x = x0 + 6.5 + count * 1.3
-    return [
-        (x, y0 + 0.7, -90.0, count),
-        (x, y1 - 0.7, 90.0, count),
-        (x, middle, 90.0, count - 1),
-        (x, middle, -90.0, count - 1),
-    ]
+    double = [(x, middle, yaw_deg, count - 1) for yaw_deg in (90.0, -90.0)]
+    return [(x, y0 + 0.7, -90.0, count), (x, y1 - 0.7, 90.0, count), *double]
 
 
 def _deck_lines(x: float, y: float, yaw_deg: float, count: int, z: float) -> list[Mesh]:
     """A centimetre over the slab: painted lines would flicker in it."""
-    sign = 1.0 if yaw_deg > 0 else -1.0
-    half = count * 2.6 / 2
-    out = []
-    for k in range(count + 1):
-        u = x - half + k * 2.6
-        low, high = sorted((y, y - sign * 5.0))
-        out.append(block(u - 0.07, low, u + 0.07, high, z, z + 0.012))
-    return out
+    low, high = (y - 5.0, y) if yaw_deg > 0 else (y, y + 5.0)
+    along = [x - count * 2.6 / 2 + k * 2.6 for k in range(count + 1)]
+    return [block(u - 0.07, low, u + 0.07, high, z, z + 0.012) for u in along]
 
 
 def _ramp_mouths(x0: float, y0: float, x1: float, y1: float, level: int) -> list[BaseGeometry]:
@@ -182,10 +173,9 @@ def _ramp_mouths(x0: float, y0: float, x1: float, y1: float, level: int) -> list
 
 def _ramps(x0: float, y0: float, x1: float, y1: float, heights: tuple[float, ...], floor: str, wall: str) -> Parts:
     half = _RAMP_M / 2
-    parts: Parts = []
     # The head turns in over a landing as wide as the ramp.
     head = y1 - _RAMP_M - 1.0
-    parts += ramp((x1 + half + 0.3, y0), (x1 + half + 0.3, head), 0.0, heights[1], _RAMP_M, floor=floor, wall=wall)
+    parts = ramp((x1 + half + 0.3, y0), (x1 + half + 0.3, head), 0.0, heights[1], _RAMP_M, floor=floor, wall=wall)
     landing = rectangle(x1, head, x1 + _RAMP_M + 0.5, y1)
     parts += deck(landing, heights[1], floor=floor, under=wall, posts=[(x1 + _RAMP_M, y1 - 0.5)], post=wall)
     parts.append((wall, block(x1 + _RAMP_M + 0.3, head, x1 + _RAMP_M + 0.5, y1, heights[1], heights[1] + 0.95)))
@@ -227,7 +217,7 @@ def _stair_tower(corner: Point, heights: tuple[float, ...], tower: str) -> Parts
 
 @site_builder
 def lockup_garages(
-    site: Site, *, at: At, count: _Count, doors: Annotated[list[Material], Field(min_length=1)],
+    site: Site, *, at: At, count: _Count, doors: Materials,
     open_doors: list[int] = [], bay_m: tuple[Number, Number] = (3.4, 6.0), height_m: Number = 2.9,  # noqa: B006
     wall: Material = "brick:#a5664e", roof: Material = "sheet_metal:#70787a", phrase: str = "",
 ) -> float:  # fmt: skip

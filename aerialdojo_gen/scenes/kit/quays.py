@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated
 
 import numpy as np
 import shapely
-from pydantic import Field
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -24,7 +22,7 @@ from aerialdojo_gen.scenes.kit.houses import HouseStyle, house, window_parts
 from aerialdojo_gen.scenes.kit.structures import Point, block, columns, letters, rail_legs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
 from aerialdojo_gen.scenes.placement import Placement
-from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3
+from aerialdojo_gen.scenes.plans.values import Area, At, Box, Line, Material, Number, Point3, Spacing
 from aerialdojo_gen.scenes.shapes import box, crown, cylinder, sweep
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.site import Site
@@ -139,9 +137,8 @@ def mole(
 
 @site_builder
 def pier(
-    site: Site, *, at: At, yaw_deg: Number, length_m: Number, width_m: Number, z: Number,
-    bay_m: Annotated[Number, Field(ge=0.5)] = 5.0, floor: Material = "boards:#9a8462",
-    pile: Material = "logs:#6f5a44", rail: Material | None = None,
+    site: Site, *, at: At, yaw_deg: Number, length_m: Number, width_m: Number, z: Number, bay_m: Spacing = 5.0,
+    floor: Material = "boards:#9a8462", pile: Material = "logs:#6f5a44", rail: Material | None = None,
     gates: list[tuple[Number, Number]] = [], category: str = "pier",  # noqa: B006
 ) -> None:  # fmt: skip
     """Build a pier on rows of piles that one can fly between; its ground stays free.
@@ -196,9 +193,8 @@ def bars(path: Sequence[Point], z_m: float, material: str = "#f1f0ea", height_m:
 
 @site_builder
 def sea_wall(
-    site: Site, *, box: Box, z: tuple[Number, Number],
-    wall: Material = "blocks:#a79f92", cap: Material = "concrete", rail: Material | None = "#e8ecec",
-    gates: list[tuple[Number, Number]] = [],  # noqa: B006
+    site: Site, *, box: Box, z: tuple[Number, Number], wall: Material = "blocks:#a79f92", cap: Material = "concrete",
+    rail: Material | None = "#e8ecec", gates: list[tuple[Number, Number]] = [],  # noqa: B006
 ) -> None:  # fmt: skip
     """Put up a wall along x that holds a terrace and looks to -y: body, coping, buttresses, a railing along its edge.
 
@@ -307,9 +303,8 @@ def flooded_house(site: Site, at: At, yaw_deg: Number, style: HouseStyle) -> Non
 
 @site_builder
 def flat_house(
-    site: Site, box: Box, *, storeys: int, wall: Material, name: str = "",
-    facing_deg: Number = -90.0, trim: Material = "#f2efe6", roof: Material = "gravel", door: Material = "wood",
-    parapet_m: Number = 0.35,
+    site: Site, box: Box, *, storeys: int, wall: Material, name: str = "", facing_deg: Number = -90.0,
+    trim: Material = "#f2efe6", roof: Material = "gravel", door: Material = "wood", parapet_m: Number = 0.35,
 ) -> float:  # fmt: skip
     """Put up a building with a flat roof that people can flee to; gives the height of its roof, metres.
 

@@ -8,20 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated
 
 import numpy as np
 import shapely
-from pydantic import Field
 from shapely.geometry import LineString
 
 from aerialdojo_gen.base.errors import AssetError
 from aerialdojo_gen.scenes.grammar import Frame, along, leg, slab
 from aerialdojo_gen.scenes.ground import rectangle, ribbon
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
-from aerialdojo_gen.scenes.kit.structures import Point, block
-from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number
+from aerialdojo_gen.scenes.kit.structures import Point, block, columns
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
+from aerialdojo_gen.scenes.plans.values import Area, Box, Line, Material, Number, Spacing
 from aerialdojo_gen.scenes.shapes import box as cuboid
 from aerialdojo_gen.scenes.shapes import cylinder, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -103,7 +101,7 @@ def rail_platform(site: Site, *, box: Box, top_m: Number, floor: Material, foot_
 @part_builder
 def butterfly_roof(
     *, box: Box, z_m: Number, foot_m: Number, roof: Material, frame: Material,
-    spacing_m: Annotated[Number, Field(ge=0.5)] = 8.0, rows: Sequence[Number] = (),
+    spacing_m: Spacing = 8.0, rows: Sequence[Number] = (),
 ) -> Parts:  # fmt: skip
     """Make a platform's roof that falls to a gutter in its middle, on posts in `rows` (y, metres)."""
     x0, y0, x1, y1 = box
@@ -113,26 +111,18 @@ def butterfly_roof(
     half = (y1 - y0) / 2
     pitch = math.degrees(math.atan2(rise, half))
     leaf = cuboid(size=(x1 - x0, float(np.hypot(half, rise)), 0.14))
-    wing = [
-        translated(
-            rotated(leaf, rotation(s * pitch, 0.0, 0.0)), ((x0 + x1) / 2, middle + s * half / 2, z_m + rise / 2)
-        )
-        for s in (-1.0, 1.0)
-    ]
+    x, z = (x0 + x1) / 2, z_m + rise / 2
+    wing = [posed(leaf, rotation(s * pitch, 0.0, 0.0), (x, middle + s * half / 2, z)) for s in (-1.0, 1.0)]
     count = max(round((x1 - x0 - 2.0) / spacing_m), 1)
     steps = [x0 + 1.0 + (x1 - x0 - 2.0) * k / count for k in range(count + 1)]
-    posts = [
-        translated(cylinder(radius=0.13, height=z_m + 0.1 - foot_m, segments=8), (x, y, foot_m))
-        for x in steps
-        for y in (rows or (middle,))
-    ]  # fmt: skip
+    posts = columns([(x, y) for x in steps for y in (rows or (middle,))], foot_m, z_m + 0.1, 0.13)
     ends = (y0 + 0.3, middle, y1 - 0.3)
     arms = [
         sweep(path=[(x, y, z_m + rise * abs(y - middle) / (y1 - middle) - 0.08) for y in ends], section=(0.14, 0.16))
         for x in steps
     ]
     rim = [block(x0, y - 0.06, x1, y + 0.06, z_m + rise - 0.25, z_m + rise + 0.2) for y in (y0, y1)]
-    return [(roof, merge(wing)), (frame, merge([*posts, *arms, *rim]))]
+    return [(roof, merge(wing)), (frame, merge([posts, *arms, *rim]))]
 
 
 @site_builder

@@ -20,7 +20,7 @@ from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import block, letters
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, mesh, posed, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Material, Materials, Number
 from aerialdojo_gen.scenes.shapes import box, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -95,7 +95,7 @@ _STRIPES = Stripes()
 
 @site_builder
 def stand(
-    site: Site, *, tier: Tier, seats: Annotated[list[Material], Field(min_length=1)], node: str | None = None,
+    site: Site, *, tier: Tier, seats: Materials, node: str | None = None,
     stripes: Stripes = _STRIPES, gangway_m: Annotated[Number, Field(ge=2.0)] = 8.2, clear: Area | None = None,
     concrete: Material = "concrete", step: Material = "concrete", more: Bodies | None = None,
 ) -> None:  # fmt: skip

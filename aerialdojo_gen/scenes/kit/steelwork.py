@@ -16,7 +16,18 @@ from aerialdojo_gen.scenes.ground import edge_strip, rectangle, without
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.kit.structures import Point, block, rail_legs, stairs
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, translated
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number, Point3
+from aerialdojo_gen.scenes.plans.values import (
+    Area,
+    Areas,
+    At,
+    Box,
+    Line,
+    Material,
+    Materials,
+    Number,
+    Point3,
+    Spacing,
+)
 from aerialdojo_gen.scenes.shapes import box, lathe, sweep
 from aerialdojo_gen.scenes.site import Site
 
@@ -142,9 +153,8 @@ _PIPES = (
 
 @site_builder
 def pipe_bridge(
-    site: Site, *, line: Line, z_m: Number, pipes: Annotated[list[Material], Field(min_length=1)],
-    steel: Material = "steel", bay_m: Annotated[Number, Field(ge=0.5)] = 8.0,
-) -> None:  # fmt: skip
+    site: Site, *, line: Line, z_m: Number, pipes: Materials, steel: Material = "steel", bay_m: Spacing = 8.0
+) -> None:
     """Lay a bridge of six pipes on two decks along a line of axis-parallel legs; the lower ones lie at `z_m`.
 
     The pipes take the materials in turn; trestles stand about `bay_m` apart and take their ground.

@@ -193,7 +193,8 @@ def _junctions(roads: Sequence[Street]) -> list[Polygon]:
 
 
 def _lane_marks(road: Street, line: LineString) -> list[BaseGeometry]:
-    lane, out = road.width_m / road.lanes, []
+    lane = road.width_m / road.lanes
+    out: list[BaseGeometry] = []
     for k in range(1, road.lanes):
         whole = road.lanes >= 4 and not road.oneway and 2 * k == road.lanes
         out += marks_along(line, k * lane - road.width_m / 2, None if whole else _GAP_M)

@@ -18,13 +18,12 @@ from aerialdojo_gen.scenes.grammar import Frame, leg, plates, slab
 from aerialdojo_gen.scenes.ground import edge_strip, rectangle, without
 from aerialdojo_gen.scenes.kit import part_builder, site_builder
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotation, translated
-from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number
+from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Box, Line, Material, Number, Spacing
 from aerialdojo_gen.scenes.shapes import box, cylinder, profile
 from aerialdojo_gen.scenes.site import Site
 from aerialdojo_gen.scenes.vocabulary import text
 
 Point = tuple[float, float]
-_Spacing = Annotated[Number, Field(ge=0.5)]
 
 
 def rail_legs(path: Sequence[Point], spacing_m: float) -> Iterator[tuple[float, np.ndarray, Point, list[Point]]]:
@@ -80,7 +79,7 @@ def railing(
 @part_builder
 def deck(
     plan: Area, z_m: Number, *, floor: Material, under: Material = "plaster", thickness_m: Number = 0.3,
-    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: _Spacing = 6.0, foot_m: Number = 0.0,
+    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: Spacing = 6.0, foot_m: Number = 0.0,
     post: Material = "plaster", post_radius_m: Number = 0.28,
 ) -> Parts:  # fmt: skip
     """Make a floor at `z_m` (its top) on round columns that stand on `foot_m`, in rows or one by one."""
@@ -135,7 +134,7 @@ def flights(
 @part_builder
 def canopy(
     box: Box, z_m: Number, *, roof: Material, post: Material = "chrome",
-    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: _Spacing = 6.0, foot_m: Number = 0.0,
+    posts: Sequence[At] = (), post_rows: Sequence[Line] = (), post_every_m: Spacing = 6.0, foot_m: Number = 0.0,
 ) -> Parts:  # fmt: skip
     """Make a flat roof with its underside at `z_m`, a fascia around it, and slender posts, in rows or one by one."""
     ring = rectangle(*box).exterior.buffer(0.09, join_style="mitre", cap_style="flat")

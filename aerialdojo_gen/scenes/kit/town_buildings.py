@@ -125,9 +125,8 @@ PARAPET_M, _PARAPET_THICK_M = 0.45, 0.3
 
 @part_builder
 def gable_roof(
-    box: Box, z: Number, rise_m: Number, wall: Material, roof: Material,
-    hip: bool = False, overhang_m: Number = 0.4,
-) -> Parts:  # fmt: skip
+    box: Box, z: Number, rise_m: Number, wall: Material, roof: Material, hip: bool = False, overhang_m: Number = 0.4
+) -> Parts:
     """Make a gable or hip roof over a rectangle, the ridge along its longer side."""
     return pitched_roof(rectangle(*box), z, rise_m, wall, roof, hip=hip, overhang_m=overhang_m)
 

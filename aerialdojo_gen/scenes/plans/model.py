@@ -30,7 +30,6 @@ from aerialdojo_gen.scenes.plans.values import (
 from aerialdojo_gen.scenes.recipe import SceneHead
 from aerialdojo_gen.scenes.site import Site
 
-VERSION = 1
 MAX_ENTRIES = 2000
 _Text = Annotated[str, Field(min_length=1, max_length=200)]
 _Table = Annotated[dict[str, Any], Field(default_factory=dict)]

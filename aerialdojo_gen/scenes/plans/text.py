@@ -48,18 +48,8 @@ def _listed(entry: Mapping[str, Any]) -> list[str]:
 
 
 _TABLES = (
-    "world",
-    "palette",
-    "inventory",
-    "origin",
-    "moves",
-    "floor_m",
-    "lines",
-    "areas",
-    "fields",
-    "placing",
-    "ground",
-)
+    "world", "palette", "inventory", "origin", "moves", "floor_m", "lines", "areas", "fields", "placing", "ground",
+)  # fmt: skip
 
 
 def _pair(key: str, value: Any) -> Iterator[str]:

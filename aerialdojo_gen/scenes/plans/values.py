@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import shapely
-from pydantic import BeforeValidator, PlainValidator, ValidationInfo, WithJsonSchema
+from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, WithJsonSchema
 from shapely.affinity import rotate, scale
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -302,6 +302,9 @@ Number = Annotated[
     float, BeforeValidator(lambda value, info: names_of(info).number(value)), WithJsonSchema(_NUMBER_SCHEMA)
 ]
 """A number, or an expression over the plan's heights such as ``"quay + 0.2"``."""
+Positive = Annotated[Number, Field(gt=0)]
+Spacing = Annotated[Number, Field(ge=0.5)]
+"""A distance of things that are repeated, or a size of cells, metres: none so small that there are too many."""
 Formula = Annotated[ArrayFunction, _by(PlanNames.formula), WithJsonSchema(_NUMBER_SCHEMA)]
 """An expression over arrays, such as ``"2*eased(inland, 12, 26)*(1 + 0.8*noise)"``; see `evaluate_arrays`."""
 At = Annotated[Point, _by(PlanNames.point), WithJsonSchema(_POINT_SCHEMA)]
@@ -324,3 +327,4 @@ Areas = Annotated[
 """An area, or a list of areas."""
 Material = Annotated[str, _by(PlanNames.material), WithJsonSchema({"type": "string"})]
 """A name of the palette, or a material such as ``"brick:#8a4638"``."""
+Materials = Annotated[list[Material], Field(min_length=1)]
