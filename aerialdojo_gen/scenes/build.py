@@ -14,7 +14,7 @@ from aerialdojo_gen.geometry.portable import unit
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.colours import colour_words, shown_colours
 from aerialdojo_gen.scenes.glb import read_glb
-from aerialdojo_gen.scenes.materials import read_toml
+from aerialdojo_gen.scenes.materials import parse_colour, read_toml
 from aerialdojo_gen.scenes.model import Instance, Part, Scene
 from aerialdojo_gen.scenes.plans.build import build_tables
 from aerialdojo_gen.scenes.recipe import Cut, Imported, imported_of
@@ -24,25 +24,10 @@ _NOW_PLANS = {"town": "add-map", "relief": "add-terrain"}
 
 
 def build_scene(path: Path, catalogue: Catalogue) -> Scene:
-    """Build the scene of a file: of a plan, or of a mesh that ``add-scene`` imported.
+    """Build the scene of a file, whose stem names it: of a plan, or of a mesh that ``add-scene`` imported.
 
-    Parameters
-    ----------
-    path : Path
-        ``scene_assets/scenes/<scene>.toml``; the file's stem names the scene.
-    catalogue : Catalogue
-        Props and materials.
-
-    Returns
-    -------
-    Scene
-        Exact in float32, and the same for the same files on every run.
-
-    Raises
-    ------
-    AssetError
-        The file is wrong, names something that the catalogue or the kit lacks, or the built scene has fewer instances
-        of a category than `inventory` asks for.
+    It is exact in float32, and the same for the same files on every run. An `AssetError` says what is wrong with the
+    file, what it names that the catalogue or the kit lacks, or of which category it has fewer than `inventory` asks.
     """
     body = read_toml(path)
     imported = imported_of(path, body)
@@ -61,11 +46,10 @@ def _imported(path: Path, imported: Imported) -> Scene:
     scene = read_glb(path.with_suffix(".glb"))
     bounds = scene.bounds.copy()
     bounds[1, 2] = imported.ceiling_m
-    sun = unit(np.array(imported.sun))
-    red, green, blue = (int(imported.sky[k : k + 2], 16) for k in (1, 3, 5))
+    x, y, z = unit(np.array(imported.sun)).tolist()
     whole = Scene(
-        path.stem, scene.instances, scene.materials, bounds, (red, green, blue),
-        (float(sun[0]), float(sun[1]), float(sun[2])), imported=True, backdrop=scene.backdrop,
+        path.stem, scene.instances, scene.materials, bounds, parse_colour(imported.sky), (x, y, z), imported=True,
+        backdrop=scene.backdrop,
     )  # fmt: skip
     return cut_out(whole, imported.cuts) if imported.cuts else whole
 

@@ -34,14 +34,9 @@ _VERSION = 1
 
 
 def write_glb(scene: Scene, path: Path) -> None:
-    """Write a scene; the same scene always makes the same bytes.
+    """Write a scene in place; the same scene always makes the same bytes.
 
-    Parameters
-    ----------
-    scene : Scene
-        Coordinates and texture coordinates must be exact in float32, as those of built scenes are.
-    path : Path
-        Written in place; callers that need atomicity write to a temporary name and rename.
+    Its coordinates and texture coordinates must be exact in float32, as those of built scenes are.
     """
     writer = _Writer()
     shown = (*scene.instances, *scene.backdrop)
@@ -66,18 +61,8 @@ def write_glb(scene: Scene, path: Path) -> None:
 def read_glb(path: Path, sha256: str = "") -> Scene:
     """Read a scene that `write_glb` wrote; it equals the written one to the last bit.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    sha256 : str
-        Expected digest, hexadecimal: ``mesh_sha256`` of the scene's row. Not checked where empty.
-
-    Raises
-    ------
-    AssetError
-        The file is missing, cut short, not a scene of this program (import other meshes by ``add-scene``), or has
-        another digest.
+    Its digest must be `sha256`, a row's ``mesh_sha256``, where one is given. An `AssetError` says that the file is
+    missing, cut short or no scene of this program (import other meshes by ``add-scene``), or has another digest.
     """
     try:
         raw = path.read_bytes()

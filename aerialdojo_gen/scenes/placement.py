@@ -125,20 +125,8 @@ _LEVEL = frozenset({"building", "landmark"})
 def rest_on_ground(instance: Instance, kind: str, ground: Heights) -> tuple[Instance, Mesh | None]:
     """Bring a thing into contact with the ground, and give it a plinth where nothing less does.
 
-    Parameters
-    ----------
-    instance : Instance
-    kind : str
-        Of its category: buildings and landmarks stand level, plants upright.
-    ground : callable
-        Heights of the ground.
-
-    Returns
-    -------
-    instance : Instance
-        The same one where it touches the ground already, or stands on something else.
-    plinth : Mesh or None
-        What bears it, from its feet into the ground.
+    The kind is that of its category: buildings and landmarks stand level, plants upright. It is the same one where it
+    touches the ground already, or stands on something else; the plinth reaches from its feet into the ground.
     """
     feet = _feet(instance)
     gaps = _gaps(instance, feet, ground)

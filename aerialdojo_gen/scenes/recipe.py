@@ -110,8 +110,8 @@ class SceneHead(BaseModel, frozen=True, extra="forbid"):
         light = self.light
         if light.latitude_deg is not None:
             return sun_at(light.latitude_deg, light.date, light.hour)
-        x, y, z = unit(np.array(self.sun))
-        return float(x), float(y), float(z)
+        x, y, z = unit(np.array(self.sun)).tolist()
+        return x, y, z
 
 
 class Cut(BaseModel, frozen=True, extra="forbid"):

@@ -134,14 +134,10 @@ class Site:
     def place(self, thing: Placement, fit: Fit) -> Instance | None: ...
 
     def place(self, thing: Placement, fit: Fit = "as_is") -> Instance | None:
-        """Place a prop of the catalogue; None where it has no room and `fit` is ``"skip"``.
+        """Place a prop of the catalogue.
 
-        Parameters
-        ----------
-        thing : Placement
-        fit : str
-            Without room on the site for its footprint: ``"as_is"`` places it all the same, ``"skip"`` leaves it out,
-            ``"must"`` raises an `AssetError`.
+        Without room on the site for its footprint, ``"as_is"`` places it all the same, ``"skip"`` leaves it out and
+        returns None, ``"must"`` raises an `AssetError`.
         """
         z, at = thing.z, (thing.x, thing.y)
         if z is None and thing.settle_m is not None:

@@ -29,7 +29,7 @@ from aerialdojo_gen.scenes.kit.houses import HouseStyle, house
 from aerialdojo_gen.scenes.kit.quays import pier
 from aerialdojo_gen.scenes.kit.rail import RAIL_M, ballast, tracks
 from aerialdojo_gen.scenes.kit.rubble import slab_pile, strew_things
-from aerialdojo_gen.scenes.kit.ruins import put_up
+from aerialdojo_gen.scenes.kit.ruins import damaged_building
 from aerialdojo_gen.scenes.kit.stands import Tier, gangways, passage, tier_parts
 from aerialdojo_gen.scenes.kit.steelwork import guard_rails
 from aerialdojo_gen.scenes.kit.wreckage import Bite, Style, Wreck, broken_edge, torn_floor, torn_wall
@@ -129,16 +129,16 @@ def test_floors_end_where_bars_stick_out():
 
 def test_a_leaning_building_tips_over_its_front():
     site = blank()
-    straight = put_up(site, Wreck(Frame(-15.0, 0.0), 12.0, 8.0, 4, Style()), 0.0)
-    leaning = put_up(site, Wreck(Frame(15.0, 0.0), 12.0, 8.0, 4, Style(), lean_deg=8.0), 0.0)
+    for x, lean_deg in ((-15.0, 0.0), (15.0, 8.0)):
+        one = {"node": f"lean_{lean_deg:.0f}", "at": (x, 0.0), "size_m": (12.0, 8.0), "storeys": 4, "style": Style()}
+        assert damaged_building(site, **one, lean_deg=lean_deg, sunk_m=0.5) == -0.5
+    straight, leaning = site.instances
     assert leaning.bounds[0, 1] < straight.bounds[0, 1] - 1.0
     assert leaning.bounds[1, 2] > straight.bounds[1, 2]
 
 
 def test_a_floor_bears_nothing_where_it_is_gone():
-    site = blank()
     wreck = Wreck(Frame(0.0, 0.0, 90.0), 16.0, 10.0, 3, Style(), (Bite(0.0, -5.0, 3.0, 6.0, seed=5),))
-    put_up(site, wreck, 0.0)
     assert wreck.bears(6.0, 3.0, 2)
     assert not wreck.bears(0.0, -4.0, 2)
 

@@ -51,27 +51,22 @@ class Builder:
 _BUILDERS: dict[str, Builder] = {}
 
 
-def site_builder(function: Function) -> Function:
-    """Register ``build(site, *, …)``, which adds structure and things to the site."""
-    return _register(function, "site")
+def _registering(kind: str) -> Callable[[Function], Function]:
+    """Make the decorator of a kind of builders."""
+
+    def register(function: Function) -> Function:
+        name = function.__name__
+        if name in _BUILDERS and _BUILDERS[name].function.__module__ != function.__module__:
+            raise ValueError(f"two builders are called {name!r}")
+        _BUILDERS[name] = Builder(name, kind, function)
+        return function
+
+    return register
 
 
-def ground_builder(function: Function) -> Function:
-    """Register ``build(site, terrain, *, …)``, which returns another terrain."""
-    return _register(function, "ground")
-
-
-def part_builder(function: Function) -> Function:
-    """Register ``build(*, …)``, which returns parts: materials with meshes in the structure's frame."""
-    return _register(function, "parts")
-
-
-def _register(function: Function, kind: str) -> Function:
-    name = function.__name__
-    if name in _BUILDERS and _BUILDERS[name].function.__module__ != function.__module__:
-        raise ValueError(f"two builders are called {name!r}")
-    _BUILDERS[name] = Builder(name, kind, function)
-    return function
+site_builder = _registering("site")  # Of ``build(site, *, …)``, which adds structure and things to the site
+ground_builder = _registering("ground")  # Of ``build(site, terrain, *, …)``, which returns another terrain
+part_builder = _registering("parts")  # Of ``build(*, …)``, which returns meshes in the structure's frame
 
 
 @cache

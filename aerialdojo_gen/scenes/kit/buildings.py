@@ -68,14 +68,11 @@ def town_blocks(
         )  # fmt: skip
 
 
-ROOFS = ("flat", "gable", "hip")
-
-
 class Roof(NamedTuple):
-    """A building's roof: of `ROOFS`, the rise and overhang of a pitched one, the parapet of a flat one, metres."""
+    """A building's roof: the rise and overhang of a pitched one, the parapet of a flat one, metres."""
 
     material: str
-    kind: str = "flat"
+    kind: _RoofKind = "flat"
     rise_m: float = 2.5
     parapet_m: float = 0.6
     overhang_m: float = 0.4
@@ -90,8 +87,6 @@ def put_up_building(
 
     The windows of a façade are stretched to whole ones on every wall.
     """
-    if roof.kind not in ROOFS:
-        raise ValueError(f"kind of roof {roof.kind!r} is none of {', '.join(ROOFS)}")
     base = min(site.ground_z(x, y) for x, y in plan.exterior.coords) if z is None else z
     top = base + height_m
     parts: list[tuple[str, Mesh]] = [(wall, facade(plan, base, top, site.catalogue.materials.tile_m(wall)))]

@@ -33,7 +33,6 @@ from aerialdojo_gen.scenes.kit.wreckage import (
     torn_wall,
 )
 from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, posed, rotated, rotation, translated
-from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.plans.values import Area, At, Material, Number
 from aerialdojo_gen.scenes.shapes import box, extrude, sweep
 from aerialdojo_gen.scenes.site import Site
@@ -51,32 +50,24 @@ def damaged_building(
     sunk_m: Number = 0.0,
 ) -> float:  # fmt: skip
     """Put up what a disaster left of a building, `sunk_m` deep; gives its ground floor's height; see `Wreck`."""
-    frame = Frame(*at, yaw_deg)
     base = site.ground_z(*at) - sunk_m
-    wreck = Wreck(frame, *size_m, storeys, style, bites, lean_deg, ridge_m, rooms_m, balconies)
-    put_up(site, wreck, base, node, category)
-    return base
-
-
-def put_up(
-    site: Site, wreck: Wreck, base_m: float, node: str | None = None, category: str = "damaged_building"
-) -> Instance:
-    """Put a building up, its ground floor at `base_m`; it takes the ground that it did not lose."""
-    rng = site.rng_for("wreck", round(wreck.frame.x, 2), round(wreck.frame.y, 2))
+    wreck = Wreck(Frame(*at, yaw_deg), *size_m, storeys, style, bites, ridge_m, rooms_m)
+    rng = site.rng_for("wreck", round(at[0], 2), round(at[1], 2))
     parts = [*_shell(wreck, rng), *_floors(wreck, rng), *_partitions(wreck, rng)]
     if wreck.style.columns:
         parts += _columns(wreck)
     if wreck.ridge_m:
         parts += _pitched(wreck, rng)
-    if wreck.balconies:
+    if balconies:
         parts += _balconies(wreck, rng)
-    if wreck.lean_deg:
+    if lean_deg:
         # It tips over its front edge and digs in there.
         edge = np.array([0.0, wreck.depth_m / 2, 0.0])
-        turn = rotation(wreck.lean_deg, 0.0, 0.0)
+        turn = rotation(lean_deg, 0.0, 0.0)
         parts = [(m, posed(translated(b, edge), turn, -edge)) for m, b in parts]
     footprint = wreck.frame.area(remains(wreck.plan, 0.5, wreck.bites))
-    return site.add(node, category, wreck.frame.parts(parts, base_m), footprint=footprint)
+    site.add(node, category, wreck.frame.parts(parts, base), footprint=footprint)
+    return base
 
 
 @site_builder
@@ -254,7 +245,7 @@ def _columns(wreck: Wreck) -> Parts:
             for k in range(wreck.storeys):
                 z = k * style.storey_m
                 # A column stands while the floor that it carries does.
-                if wreck.bears(float(x), float(y), k + 1, 0.02):
+                if wreck.bears(float(x), float(y), k + 1):
                     bodies.append(block(x - 0.2, y - 0.2, x + 0.2, y + 0.2, z - 0.02, z + style.storey_m - 0.24))
     return [(style.floor, merge(bodies))]
 
@@ -274,7 +265,7 @@ def _pitched(wreck: Wreck, rng: np.random.Generator) -> Parts:
                 covers.append(Mesh(v, flat.faces))
         # Rafters outlast the tiles: some still span the gap.
         for u in np.arange(-x + over + 0.6, x - over, 0.9):
-            hole = not wreck.bears(float(u), side * y / 2, wreck.storeys, 0.02)
+            hole = not wreck.bears(float(u), side * y / 2, wreck.storeys)
             if hole and rng.uniform() < 0.6:
                 length = float(np.hypot(y, rise)) * float(rng.uniform(0.5, 1.0))
                 beam = box(size=[0.12, length, 0.16])

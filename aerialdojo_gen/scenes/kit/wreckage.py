@@ -223,10 +223,8 @@ class Wreck:
     storeys: int
     style: Style = field(default_factory=Style)
     bites: tuple[Bite, ...] = ()  # In its own frame
-    lean_deg: float = 0.0  # How far the whole of it leans to its front
     ridge_m: float = 0.0  # Height of a pitched roof's ridge over the eaves; 0 makes a flat roof
     rooms_m: float = 6.8  # Distance of the partitions across it
-    balconies: bool = False  # Whether the front has them
 
     @property
     def plan(self) -> Polygon:
@@ -239,7 +237,7 @@ class Wreck:
         """Height of the eaves, metres."""
         return self.storeys * self.style.storey_m
 
-    def bears(self, x: float, y: float, storey: int, radius_m: float = 0.6) -> bool:
-        """Whether a floor (`storeys`: the roof) carries a disc about a point of its own frame."""
+    def bears(self, x: float, y: float, storey: int) -> bool:
+        """Whether a floor (`storeys`: the roof) is there at a point of its own frame."""
         floor = remains(self.plan, storey * self.style.storey_m, self.bites)
-        return bool(floor.buffer(-radius_m).contains(Point(x, y)))
+        return bool(floor.buffer(-0.02).contains(Point(x, y)))
