@@ -130,9 +130,9 @@ def _geotiff(path: Path) -> Dem:
 def _ascii(path: Path) -> Dem:
     grid = read_ascii_grid(path, _MAX_CELLS, _MAX_TEXT_BYTES, _MAX_HEIGHT_M)
     rows, columns = grid.heights_m.shape
-    west, north, cell = grid.west, grid.south + (rows - 1) * grid.cell, grid.cell
+    west, north, cell = grid.x0_m, grid.y0_m + (rows - 1) * grid.cell_m, grid.cell_m
     geographic = cell * max(rows, columns) < 5 and abs(west) <= 180 and abs(north) <= 90 and cell < _DEGREES / 10
-    return Dem(path, grid.heights_m, west, north, cell, cell, geographic, _identity if geographic else None)
+    return Dem(path, grid.heights_m[::-1], west, north, cell, cell, geographic, _identity if geographic else None)
 
 
 def _npz(path: Path) -> Dem:

@@ -82,13 +82,13 @@ def colour_words(colours: NDArray[np.uint8], weights: NDArray[np.float64]) -> st
         word = colour_name(rgb)
         shares[word] = shares.get(word, 0.0) + weight
         means[word] = means.get(word, np.zeros(3)) + weight * rgb
-    ranked = sorted(shares, key=lambda word: (-shares[word], word))
-    if not ranked:
+    by_share = sorted(shares, key=lambda word: (-shares[word], word))
+    if not by_share:
         return ""
     # Shades of one colour, as of a wall in light and shade, are none of two.
     at = {word: _lab((mean / max(shares[word], 1e-300))[None])[0] for word, mean in means.items()}
-    others = [word for word in ranked[1:] if norm(at[word] - at[ranked[0]]) >= _APART]
-    first, second = ranked[0], others[0] if others else ""
+    others = [word for word in by_share[1:] if norm(at[word] - at[by_share[0]]) >= _APART]
+    first, second = by_share[0], others[0] if others else ""
     # Neutral colours come second if both are about equal: "blue and white".
     if first in _NEUTRAL and second not in _NEUTRAL and second and shares[first] < _AS_MUCH * shares[second]:
         first, second = second, first

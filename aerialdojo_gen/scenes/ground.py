@@ -93,10 +93,8 @@ def _snapped(area: BaseGeometry) -> BaseGeometry:
 
 def _flat_mesh(layer: Surface, terrain: Terrain) -> Mesh:
     z = float(terrain.heights_m[0, 0]) + layer.rise_m
-    pieces = []
-    for flat, faces in map(triangulate, polygons_of(layer.area)):
-        pieces.append(_from_above(mesh(np.column_stack([flat, np.full(len(flat), z)]), faces)))
-    return merge(pieces) if pieces else mesh([], [])
+    plans = map(triangulate, polygons_of(layer.area))
+    return merge([_from_above(mesh(np.column_stack([xy, np.full(len(xy), z)]), faces)) for xy, faces in plans])
 
 
 @dataclass(frozen=True, eq=False)

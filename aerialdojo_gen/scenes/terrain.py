@@ -184,18 +184,8 @@ _NODATA = -9999.0
 _MAX_CELLS, _MAX_TEXT_BYTES, _MAX_M = 4_000_000, 64 << 20, 2000.0
 
 
-@dataclass(frozen=True, eq=False)
-class AsciiGrid:
-    """Heights as the file has them; rows run from north to south, NaN for what has none."""
-
-    heights_m: Floats
-    west: float  # Position of the south-western height
-    south: float
-    cell: float
-
-
-def read_ascii_grid(path: Path, max_cells: int, max_bytes: int, max_height_m: float) -> AsciiGrid:
-    """Read an ESRI ASCII grid."""
+def read_ascii_grid(path: Path, max_cells: int, max_bytes: int, max_height_m: float) -> Terrain:
+    """Read an ESRI ASCII grid, NaN where it has no height."""
     if path.stat().st_size > max_bytes:
         raise AssetError(f"{path} has more than {max_bytes >> 20} MiB: cut a part out of it first")
     head: dict[str, float] = {}
@@ -221,12 +211,11 @@ def read_ascii_grid(path: Path, max_cells: int, max_bytes: int, max_height_m: fl
     if numbers is None or numbers.size != columns * rows or not (cell > 0 and math.isfinite(cell)):
         found = "too many" if numbers is None else f"{numbers.size:,}"
         raise AssetError(f"{path} says {columns:,} by {rows:,} heights and has {found}: is it truncated?")
-    z = numbers.reshape(rows, columns)
+    z = numbers.reshape(rows, columns)[::-1]
     z[(z == head.get("nodata_value", _NODATA)) | ~(np.abs(z) < max_height_m)] = np.nan
     half = 0.0 if "xllcenter" in head else cell / 2
-    west = head.get("xllcenter", head.get("xllcorner", 0.0)) + half
-    south = head.get("yllcenter", head.get("yllcorner", 0.0)) + half
-    return AsciiGrid(z, west, south, cell)
+    x, y = (head.get(f"{axis}llcenter", head.get(f"{axis}llcorner", 0.0)) + half for axis in "xy")
+    return Terrain(x, y, cell, z)
 
 
 def read_heights(path: Path) -> Terrain:
@@ -238,9 +227,9 @@ def read_heights(path: Path) -> Terrain:
     except OSError as error:
         raise AssetError(f"{path} cannot be read ({error.strerror}): it belongs beside the plan") from None
     grid = read_ascii_grid(path, _MAX_CELLS, _MAX_TEXT_BYTES, _MAX_M)
-    if min(grid.heights_m.shape) < 2 or np.isnan(grid.heights_m).any() or not 0.1 <= grid.cell <= 100.0:
+    if min(grid.heights_m.shape) < 2 or np.isnan(grid.heights_m).any() or not 0.1 <= grid.cell_m <= 100.0:
         raise AssetError(f"{path} must have 2 by 2 heights or more, 0.1 to 100 m apart, each within {_MAX_M:,.0f} m")
-    return Terrain(grid.west, grid.south, grid.cell, grid.heights_m[::-1].copy())
+    return grid
 
 
 def heights_text(rows_m: Floats, cell_m: float) -> str:

@@ -66,8 +66,7 @@ def text(*, text: str, height: float, depth: float = 0.0) -> Mesh:
             x += _SPACE
             continue
         plates, width = _glyph(character)
-        for plate in plates:
-            letters.append(translated(_plate(plate, depth / height * 6.0), (x, 0.0, 0.0)))
+        letters += [translated(_plate(plate, depth / height * 6.0), (x, 0.0, 0.0)) for plate in plates]
         x += width + _GAP
     if not letters:
         raise ShapeError(f"text {text!r} has no letter")

@@ -154,9 +154,19 @@ def test_the_land_goes_on_to_the_horizon(scene: Scene) -> None:
 
 def test_its_props_stand_on_something(scene: Scene) -> None:
     reach_m = REACH_M.get(type_of(scene.name), 0.9)
-    # On steep slopes some lean out: test_layouts_nature looks at every one.
+    # On steep slopes some lean out: the next test looks at every one.
     hung = HUNG | {"boulder"} if type_of(scene.name) in ("N_Forest", "N_Mountain") else HUNG
     assert floating(scene, hung, reach_m, BEARERS) == []
+
+
+@each_scene(["N_Mountain_0", "N_Mountain_1", "N_Forest_1"])
+def test_boulders_touch_the_ground(scene_of, name):
+    scene = scene_of(name)
+    ground = Scene(name, (scene["ground"],), scene.materials, scene.bounds)
+    for boulder in (i for i in scene.instances if i.category == "boulder"):
+        high = boulder.vertices * [1.0, 1.0, 0.0] + [0.0, 0.0, 500.0]
+        above = boulder.vertices[:, 2] - (500.0 - distances(ground, high, (0.0, 0.0, -1.0)))
+        assert above.min() < 0.0 < above.max(), boulder.node
 
 
 def test_its_props_do_not_stand_in_one_another(scene: Scene) -> None:
@@ -222,7 +232,7 @@ def mall(request: pytest.FixtureRequest, scene_of: Callable[[str], Scene]) -> Sc
 
 
 @pytest.fixture(scope="module")
-def world(mall: Scene) -> CollisionWorld:
+def mall_world(mall: Scene) -> CollisionWorld:
     return CollisionWorld(mall)
 
 
@@ -238,32 +248,25 @@ def test_props_do_not_stand_in_each_other(mall: Scene) -> None:
 
 
 @pytest.mark.parametrize(
-    ("p", "q"),
+    ("p", "q", "free"),
     [
-        ((-10.5, 15.0, 3.2), (-10.5, 60.0, 3.2)),
-        ((-29.0, 17.7, 4.3), (8.0, 17.7, 4.3)),
-        ((-33.65, 3.0, 3.9), (-33.65, 14.0, 3.9)),
-        ((-11.0, -20.0, 3.3), (-11.0, -1.5, 3.3)),
-        ((-59.6, 0.0, 4.4), (-59.6, 40.0, 4.4)),
-        ((47.0, 18.6, 2.4), (90.0, 18.6, 2.4)),
-        ((51.0, 37.0, 6.3), (90.0, 37.0, 6.3)),
-        ((57.0, -30.0, 2.9), (57.0, -12.0, 2.9)),
-        ((38.0, -14.0, 7.0), (38.0, 50.0, 7.0)),
+        ((-10.5, 15.0, 3.2), (-10.5, 60.0, 3.2), True),
+        ((-29.0, 17.7, 4.3), (8.0, 17.7, 4.3), True),
+        ((-33.65, 3.0, 3.9), (-33.65, 14.0, 3.9), True),
+        ((-11.0, -20.0, 3.3), (-11.0, -1.5, 3.3), True),
+        ((-59.6, 0.0, 4.4), (-59.6, 40.0, 4.4), True),
+        ((47.0, 18.6, 2.4), (90.0, 18.6, 2.4), True),
+        ((51.0, 37.0, 6.3), (90.0, 37.0, 6.3), True),
+        ((57.0, -30.0, 2.9), (57.0, -12.0, 2.9), True),
+        ((38.0, -14.0, 7.0), (38.0, 50.0, 7.0), True),
+        ((-20.0, 10.0, 2.0), (-20.0, 55.0, 2.0), False),
+        ((0.0, 30.0, 12.0), (0.0, 30.0, 3.0), False),
+        ((65.0, 30.0, 2.0), (65.0, 30.0, 9.0), False),
     ],
-    ids=["passage", "north arcade", "west arcade", "gate", "west canopy", "deck", "middle floor", "terrace", "drive"],
-)
-def test_a_drone_can_fly_under_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
-    assert not world.segment_in_collision(np.array(p), np.array(q), 0.25)
-
-
-@pytest.mark.parametrize(
-    ("p", "q"),
-    [
-        ((-20.0, 10.0, 2.0), (-20.0, 55.0, 2.0)),
-        ((0.0, 30.0, 12.0), (0.0, 30.0, 3.0)),
-        ((65.0, 30.0, 2.0), (65.0, 30.0, 9.0)),
+    ids=[
+        "passage", "north arcade", "west arcade", "gate", "west canopy", "deck", "middle floor", "terrace", "drive",
+        "hall", "roof", "slab",
     ],
-    ids=["hall", "roof", "slab"],
-)
-def test_walls_and_floors_stop_it(world: CollisionWorld, p: tuple[float, ...], q: tuple[float, ...]) -> None:
-    assert world.segment_in_collision(np.array(p), np.array(q), 0.25)
+)  # fmt: skip
+def test_a_drone_can_fly_through_passages_but_not_through_walls_and_floors(mall_world, p, q, free):
+    assert mall_world.segment_in_collision(np.array(p), np.array(q), 0.25) is not free

@@ -35,7 +35,7 @@ def built(tmp_path, extra):
     return build_scene(recipe, catalogue())
 
 
-def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
+def test_a_move_moves_one_prop_that_is_placed_and_nothing_else(tmp_path):
     before = yard()
     node = next(i.node for i in before.instances if i.anatomy is not None)
     after = built(tmp_path, f'\n[moves]\n{node} = {{ by_m = [0.5, -0.25], up_m = 0.5, place = "elsewhere" }}\n')
@@ -45,11 +45,6 @@ def test_a_move_moves_one_prop_and_nothing_else(tmp_path):
         np.testing.assert_allclose(new.vertices - old.vertices, np.broadcast_to(by, old.vertices.shape), atol=1e-4)
         assert new.variant == old.variant
         assert new.attributes == (old.attributes | {"place": "elsewhere"} if old.node == node else old.attributes)
-
-
-def test_a_move_of_what_is_not_placed_names_the_nearest_node(tmp_path):
-    before = yard()
-    node = next(i.node for i in before.instances if i.anatomy is not None)
     with pytest.raises(AssetError, match=f"moves: no prop '{node}0' is placed: did you mean '{node}'"):
         built(tmp_path, f"\n[moves]\n{node}0 = {{ by_m = [1.0, 0.0] }}\n")
 

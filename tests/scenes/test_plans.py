@@ -252,18 +252,14 @@ def test_any_order_builds_or_ends_in_one_line(tmp_path_factory, catalogue, order
     assert {"barn", "hive", "ground"} <= {instance.node for instance in scene.instances}
 
 
-def test_an_area_is_made_of_another(catalogue):
-    names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 4, 2)})
+def test_areas_are_made_of_others_points_and_lines_and_have_ragged_outlines(catalogue):
+    names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 4, 2), "park": rectangle(0, 0, 40, 20)})
     assert names.area({"area": "yard", "offset_m": 1}).equals(rectangle(-1, -1, 5, 3))
     assert names.area({"area": "yard", "minus": [0, 0, 1, 2]}).equals(rectangle(1, 0, 4, 2))
     assert names.area({"box": [-1, 1, 2, 9], "within": "yard"}).equals(rectangle(0, 1, 2, 2))
-
-
-def test_areas_lie_around_points_and_lines_and_have_ragged_outlines(catalogue):
-    names = PlanNames(catalogue.materials, areas={"yard": rectangle(0, 0, 40, 20)})
     assert names.area({"around": [3, 4], "width_m": 6}).equals(Point(3, 4).buffer(3))
     assert names.area({"around": [[0, 0], [8, 0]], "width_m": 2}).bounds == pytest.approx((-1, -1, 9, 1))
-    ragged = names.area({"area": "yard", "ragged": [1, 5, 2]})
+    ragged = names.area({"area": "park", "ragged": [1, 5, 2]})
     assert 700 < ragged.area < 900
     assert len(ragged.exterior.coords) > 60
 

@@ -54,8 +54,8 @@ def blasted_hall(site: Site, *, node: str, at: At, yaw_deg: Number = 0.0, hall: 
     stations = np.linspace(-hall.length_m / 2, hall.length_m / 2, count + 1)
     frames = [_portal(hall, float(x), rng) for x in stations]
     steel = [sweep(path=[tuple(p) for p in line], section=(0.26, 0.34)) for line in frames]
-    for k in range(1, len(frames[0]) - 1):
-        steel.append(sweep(path=[tuple(line[k]) for line in frames], section=(0.14, 0.16)))
+    purlins = list(zip(*frames, strict=True))[1:-1]
+    steel += [sweep(path=[tuple(point) for point in line], section=(0.14, 0.16)) for line in purlins]
     sheets: list[Mesh] = []
     for left, right in pairwise(frames):
         for k in range(len(left) - 1):
@@ -190,8 +190,8 @@ def broken_bridge(
         steel += [sweep(path=[(s0, v, z_m - 0.22), (s1, v, z_m - 0.22)], section=(0.14, 0.24)) for v in (-w, w)]
         for s in np.linspace(s0 + 0.6, s1 - 0.6, max(round((s1 - s0) / 5.5), 1) + 1):
             foot = site.ground_z(*frame.at(float(s), 0.0)) - 0.4
-            for v in (-w, w):
-                steel.append(sweep(path=[(float(s), v * 1.25, foot), (float(s), v, z_m - 0.2)], section=(0.2, 0.2)))
+            legs = [[(float(s), v * 1.25, foot), (float(s), v, z_m - 0.2)] for v in (-w, w)]
+            steel += [sweep(path=line, section=(0.2, 0.2)) for line in legs]
             steel.append(block(float(s) - 0.08, -w, float(s) + 0.08, w, z_m - 0.42, z_m - 0.2))
             site.occupy(frame.area(Point(float(s), 0.0).buffer(1.6)), -100.0, z_m - 0.5)
         start, torn, toward = (s0, s1, 1.0) if s0 == 0.0 else (s1, s0, -1.0)

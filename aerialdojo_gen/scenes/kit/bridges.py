@@ -180,8 +180,8 @@ def stone_viaduct(
         upper = rectangle(middle - 9, spring, middle + 9, spring + 9)
         ring = disc(middle, spring, radius + 0.6, 32).difference(disc(middle, spring, radius, 32))
         rings.append(upright(polygons_of(ring.intersection(upper)), 5.3))
-        for x in (middle - radius - 0.35, middle + radius + 0.35):
-            rings.append(block(x - 0.5, -2.7, x + 0.5, 2.7, spring - 0.45, spring))
+        ends = (middle - radius - 0.35, middle + radius + 0.35)
+        rings += [block(x - 0.5, -2.7, x + 0.5, 2.7, spring - 0.45, spring) for x in ends]
     walls = [block(x0 - 1.5, s - 0.2, x1 + 1.5, s + 0.2, 0.0, 1.25) for s in _SIDES]
     caps = [block(x0 - 1.6, s - 0.3, x1 + 1.6, s + 0.3, 1.25, 1.4) for s in _SIDES]
     course = [block(x0 - 1.5, s - 0.35, x1 + 1.5, s + 0.35, -0.35, 0.0) for s in _SIDES]

@@ -16,7 +16,7 @@ from aerialdojo_gen.scenes.grammar import Frame, Polyline, along, box_between, l
 from aerialdojo_gen.scenes.ground import rectangle
 from aerialdojo_gen.scenes.kit import site_builder
 from aerialdojo_gen.scenes.kit.structures import block, railing
-from aerialdojo_gen.scenes.mesh import Parts, merge, rotated, rotation, translated
+from aerialdojo_gen.scenes.mesh import Mesh, Parts, merge, rotated, rotation, translated
 from aerialdojo_gen.scenes.model import Instance
 from aerialdojo_gen.scenes.placement import DRAWN, Placement
 from aerialdojo_gen.scenes.plans.values import Area, Areas, At, Bodies, Line, Material, Number, Positive
@@ -219,10 +219,13 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
     body = colour or material
     z = min(site.ground_z(x, y) for x, y in path)
     parts: Parts = []
+
+    def rail(up: float, section: tuple[float, float]) -> Mesh:
+        return sweep(path=[(x, y, z + up) for x, y in path], section=section)
+
     if kind in ("picket", "railing"):
-        step, width = (0.28, 0.14) if kind == "picket" else (0.2, 0.035)
-        for level in (0.3, 0.78) if kind == "picket" else (0.15, height - 0.05):
-            parts.append((body, sweep(path=[(x, y, z + level) for x, y in path], section=(0.05, 0.08))))
+        step, width, levels = (0.28, 0.14, (0.3, 0.78)) if kind == "picket" else (0.2, 0.035, (0.15, height - 0.05))
+        parts += [(body, rail(level, (0.05, 0.08))) for level in levels]
         for a, b in pairwise(path):
             length, yaw = leg(a, b)
             count = max(round(length / step), 1)
@@ -232,12 +235,9 @@ def fence(site: Site, path: Polyline, kind: str, colour: str | None = None) -> I
             ]
             parts += Frame(a[0], a[1], yaw).parts([(body, merge(bars))], z + 0.03)
     else:
-        line = [(x, y, z + height / 2) for x, y in path]
-        parts.append((body, sweep(path=line, section=(thickness, height))))
+        parts.append((body, rail(height / 2, (thickness, height))))
         if kind != "hedge":
-            cap = "concrete" if kind == "wall" else body
-            lid = [(x, y, z + height + 0.03) for x, y in path]
-            parts.append((cap, sweep(path=lid, section=(thickness + 0.1, 0.08))))
+            parts.append(("concrete" if kind == "wall" else body, rail(height + 0.03, (thickness + 0.1, 0.08))))
         if kind == "board":
             middle = LineString(path)
             for s in np.linspace(0.0, middle.length, max(int(middle.length / 2.4), 1) + 1):

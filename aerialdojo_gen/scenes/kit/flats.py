@@ -74,8 +74,8 @@ def long_balconies(
     for level in z:
         floors.append(block(x0, edge, x1, y, level, level + 0.15))
         rails.append(block(x0, edge, x1, edge + 0.06, level + 0.95, level + 1.05))
-        for x in np.arange(x0, x1 + 0.1, (x1 - x0) / bays):
-            rails.append(block(float(x) - 0.02, edge, float(x) + 0.03, edge + 0.06, level + 0.15, level + 0.95))
+        rails += [block(x - 0.02, edge, x + 0.03, edge + 0.06, level + 0.15, level + 0.95)
+                  for x in np.arange(x0, x1 + 0.1, (x1 - x0) / bays).tolist()]  # fmt: skip
     return [(floor, merge(floors)), (rail, merge(rails))]
 
 

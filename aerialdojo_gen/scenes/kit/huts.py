@@ -111,12 +111,10 @@ def drying_racks(
 ) -> None:
     """Put up racks of trestles and poles, 3 m high, with fish hung up to dry; one can fly through below."""
     half, high = length_m / 2, 2.9
-    wood: list[Mesh] = []
-    for u in (-half, 0.0, half):
-        for s in (-1, 1):
-            wood.append(sweep(path=[(u, s * 1.2, -0.3), (u, -s * 0.15, high + 0.2)], radius=0.06, sides=5))
-    for v, h in ((0.0, high), (-0.45, 2.1), (0.45, 2.1)):
-        wood.append(sweep(path=[(-half - 0.4, v, h), (half + 0.4, v, h)], radius=0.045, sides=5))
+    wood = [sweep(path=[(u, s * 1.2, -0.3), (u, -s * 0.15, high + 0.2)], radius=0.06, sides=5)
+            for u in (-half, 0.0, half) for s in (-1, 1)]  # fmt: skip
+    wood += [sweep(path=[(-half - 0.4, v, h), (half + 0.4, v, h)], radius=0.045, sides=5)
+             for v, h in ((0.0, high), (-0.45, 2.1), (0.45, 2.1))]  # fmt: skip
     hung = [
         translated(box(size=(0.05, 0.14, 0.42), taper=(1.0, 0.4)), (-half + (k + 0.5) * 0.4, v, 2.1 - 0.44))
         for k in range(int(length_m / 0.4))
@@ -190,9 +188,8 @@ def _raised_cabin(site: Site, cabin: Cabin, roof: str) -> float:
     parts.append(("#e9b52a", sweep(path=rail, radius=0.04, sides=5)))
     posts = [*((x, y) for x, y, _ in rail), (u + 2.35, 0.0), (u + 2.35, v)]
     parts.append(("#e9b52a", columns(posts, 0.0, _RAIL_M, 0.035, 5)))
-    for k in range(5):
-        at = (u + 2.55 + 0.28 * k, v - 0.7, -0.26 * (k + 1))
-        parts.append(("steel", translated(box(size=(0.28, 1.2, 0.06)), at)))
+    step = box(size=(0.28, 1.2, 0.06))
+    parts += [("steel", translated(step, (u + 2.55 + 0.28 * k, v - 0.7, -0.26 * (k + 1)))) for k in range(5)]
     parts += _front(depth, width)
     site.add(None, "hut", cabin.frame.parts(parts, floor), footprint=cabin.plan(4.2))
     return floor + height + _SNOW_M
@@ -262,13 +259,12 @@ def _mudbrick_house(site: Site, house: MudbrickHouse) -> float:
             parts.append(("wood:#6b4a30", put(box(size=(0.12, 0.85, 0.12)), front, float(v), 1.9)))
             if height > 5.0:
                 parts.append(("#3a2c20", put(box(size=(0.06, 0.55, 0.8)), front, float(v), 4.1)))
-    for v in np.arange(-width / 2 + 0.6, width / 2 - 0.4, 0.9):
-        beam = rotated(cylinder(radius=0.1, height=0.55, segments=6), rotation(0.0, 90.0, 0.0))
-        parts.append(("wood:#7a5838", put(beam, front - 0.1, float(v), height - 0.45)))
+    beam = rotated(cylinder(radius=0.1, height=0.55, segments=6), rotation(0.0, 90.0, 0.0))
+    beams_at = np.arange(-width / 2 + 0.6, width / 2 - 0.4, 0.9).tolist()
+    parts += [("wood:#7a5838", put(beam, front - 0.1, v, height - 0.45)) for v in beams_at]
     parts += [(wall, put(box(size=(0.8, 0.45, 0.45)), a, b, height + _PARAPET_M))
               for a, b in ((depth / 2 - 0.4, width / 2 - 0.23), (depth / 2 - 0.4, 0.23 - width / 2))]  # fmt: skip
-    steps = int(height / 0.32)
-    for k in range(steps):
+    for k in range(int(height / 0.32)):
         u = -depth / 2 + 0.3 + k * 0.3
         if u < depth / 2 - 0.3:
             parts.append((wall, put(box(size=(0.3, 0.9, 0.32 * (k + 1))), u, width / 2 + 0.46, 0.0)))

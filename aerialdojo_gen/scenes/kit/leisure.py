@@ -123,12 +123,10 @@ def festoons(site: Site, *, poles: list[At], height_m: Number = 4.6, node: str |
     """Put up poles, and hang strings of coloured bulbs from one to the next."""
     tones = ("#e9b52a", "#d8342c", "#2f6fc0", "#3f9a5a")
     bulbs: dict[str, list[Mesh]] = {tone: [] for tone in tones}
-    wires, masts = [], []
+    wires = []
     tops = [(x, y, site.ground_z(x, y) + height_m) for x, y in poles]
-    for x, y, z in tops:
-        masts.append(
-            translated(cylinder(radius=0.08, height=height_m + 0.1, segments=8), (x, y, z - height_m - 0.05))
-        )
+    mast = cylinder(radius=0.08, height=height_m + 0.1, segments=8)
+    masts = [translated(mast, (x, y, z - height_m - 0.05)) for x, y, z in tops]
     for a, b in pairwise(tops):
         t = np.linspace(0.0, 1.0, 9)
         sag = 0.9 * 4.0 * t * (1.0 - t)

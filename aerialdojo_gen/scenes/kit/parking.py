@@ -235,9 +235,8 @@ def lockup_garages(
         ("concrete", block(x0 - 0.25, y0 - 0.5, x1 + 0.25, back + 0.2, high, high + 0.25)),
         (roof, block(x0, y0 - 0.2, x1, back, high + 0.25, high + 0.32)),
     ]
-    for k in range(count + 1):
-        u = x0 + k * width
-        parts.append((wall, block(u - 0.12, y0 + 0.24, u + 0.12, back - 0.24, 0.0, high)))
+    edges = [x0 + k * width for k in range(count + 1)]
+    parts += [(wall, block(u - 0.12, y0 + 0.24, u + 0.12, back - 0.24, 0.0, high)) for u in edges]
     for k in range(count):
         a, b = x0 + k * width + 0.4, x0 + (k + 1) * width - 0.4
         slats = [block(a - 0.04, y0 + 0.06, b + 0.04, y0 + 0.16 + 0.04 * (i % 2), 0.02 + 0.4 * i, 0.4 + 0.4 * i)

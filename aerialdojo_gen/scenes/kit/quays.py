@@ -66,10 +66,8 @@ def mooring_lines(
     site: Site, *, ropes: list[tuple[Point3, Point3]], sag_m: Number = 0.3, material: Material = "#c9a96a"
 ) -> None:
     """Stretch ropes from ships to the quay, each from a point to another, with a sag below the lower one."""
-    bodies = []
-    for a, b in ropes:
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, min(a[2], b[2]) - sag_m)
-        bodies.append(sweep(path=[a, middle, b], radius=0.06, sides=4))
+    lows = [((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, min(a[2], b[2]) - sag_m) for a, b in ropes]
+    bodies = [sweep(path=[a, low, b], radius=0.06, sides=4) for (a, b), low in zip(ropes, lows, strict=True)]
     site.add(None, "mooring_lines", [(material, merge(bodies))])
 
 
@@ -159,9 +157,8 @@ def pier(
         wood.append(columns([(u, -w + 0.3), (u, w - 0.3)], foot, z - 0.2, 0.17))
         wood.append(translated(box(size=(0.24, width_m, 0.26)), (u, 0.0, z - 0.68)))
         if z - ground > 2.4:
-            for s in (-1, 1):
-                brace = [(u, s * (w - 0.3), ground + 0.4), (u, -s * (w - 0.3), z - 0.7)]
-                wood.append(sweep(path=brace, radius=0.07, sides=4))
+            braces = [[(u, s * (w - 0.3), ground + 0.4), (u, -s * (w - 0.3), z - 0.7)] for s in (-1, 1)]
+            wood += [sweep(path=brace, radius=0.07, sides=4) for brace in braces]
     parts.append((pile, merge(wood)))
     if rail:
         for side in (-w + 0.08, w - 0.08):
@@ -205,9 +202,8 @@ def sea_wall(
         (wall, slab(rectangle(x0, y0, x1, y1), low, high - 0.25)),
         (cap, slab(rectangle(x0 - 0.02, y0 - 0.15, x1 + 0.02, y1), high - 0.25, high + 0.04)),
     ]
-    for x in np.arange(x0 + 4.0, x1 - 1.0, 8.0):
-        foot = cuboid(size=(0.7, 0.5, high - low - 0.3), taper=(1.0, 0.5))
-        parts.append((wall, translated(foot, (float(x), y0 - 0.1, low))))
+    foot = cuboid(size=(0.7, 0.5, high - low - 0.3), taper=(1.0, 0.5))
+    parts += [(wall, translated(foot, (float(x), y0 - 0.1, low))) for x in np.arange(x0 + 4.0, x1 - 1.0, 8.0)]
     if rail:
         for a, b in between_gates(x0, x1, gates, 0.3):
             parts += bars([(a, y0 + 0.1), (b, y0 + 0.1)], high + 0.04, rail, 1.0)

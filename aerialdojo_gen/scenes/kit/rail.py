@@ -57,14 +57,13 @@ def _track(line: Sequence[Point], on: float, clear: Area | None, sleeper: str, r
     middle = LineString(line)
     top = on + RAIL_M - BED_M
     tie = translated(cuboid(size=_SLEEPER_M), (0.0, 0.0, on - 0.15))
-    ties = []
-    for pose in along(line, _SPACING_M, start_m=0.2, end_m=0.2):
-        if clear is None or not shapely.contains_xy(clear, pose.x, pose.y):
-            ties.append(posed(tie, rotation(0.0, 0.0, pose.yaw_deg), (pose.x, pose.y, 0.0)))
-    rails = []
-    for side in (-1, 1):
-        run = middle.offset_curve(side * _GAUGE_M / 2, join_style="mitre")
-        rails.append(sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)))
+    ties = [
+        posed(tie, rotation(0.0, 0.0, yaw), (x, y, 0.0))
+        for x, y, yaw in along(line, _SPACING_M, start_m=0.2, end_m=0.2)
+        if clear is None or not shapely.contains_xy(clear, x, y)
+    ]
+    runs = [middle.offset_curve(side * _GAUGE_M / 2, join_style="mitre") for side in (-1, 1)]
+    rails = [sweep(path=[(x, y, top - 0.08) for x, y in run.coords], section=(0.14, 0.16)) for run in runs]
     return [(sleeper, merge(ties)), (rail, merge(rails))]
 
 

@@ -107,8 +107,8 @@ def guard_rails(
         for length, turn, middle, spots in rail_legs(line.coords, post_m):
             if length < 0.4:
                 continue
-            for level in (0.52, 1.04):
-                steel.append(posed(box(size=[length, 0.06, 0.06]), turn, (*middle, z_m + level)))
+            rail = box(size=[length, 0.06, 0.06])
+            steel += [posed(rail, turn, (*middle, z_m + level)) for level in (0.52, 1.04)]
             boards.append(posed(box(size=[length, 0.04, 0.2]), turn, (*middle, z_m)))
             steel += [translated(box(size=[0.07, 0.07, 1.1]), (*spot, z_m)) for spot in spots]
     parts: Parts = [(material, merge(steel))]
