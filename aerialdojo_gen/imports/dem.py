@@ -172,9 +172,7 @@ def _check_npz_sizes(path: Path) -> None:
                 continue
             with archive.open(name) as file:
                 version = np.lib.format.read_magic(file)
-                read = (
-                    np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                )
+                read = {(1, 0): np.lib.format.read_array_header_1_0}.get(version, np.lib.format.read_array_header_2_0)
                 shape, _, dtype = read(file)
             if math.prod(shape) * dtype.itemsize > 8 * _MAX_CELLS:
                 raise ValueError(f"{name} has {math.prod(shape):,} numbers, the maximum is {_MAX_CELLS:,}")

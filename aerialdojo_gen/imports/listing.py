@@ -92,7 +92,7 @@ def describe_mesh(
     bodies = [(b, *connected_bodies(b.faces, len(b.vertices))) for b in source.bodies]
     pieces = sum(int(label.max()) + 1 for _, label, _ in bodies)
     colours = len(np.unique(np.concatenate([b.colours for b in source.bodies]) // 16, axis=0))
-    low, high = source.low, source.high
+    low, high = source.bounds
     sure = "" if inferred.up_sure else ", not by much: look at it in a viewer"
     lines = [
         f"{len(nodes):,} node{'s' * (len(nodes) != 1)} with {triangles:,} triangle{'s' * (triangles != 1)} in "

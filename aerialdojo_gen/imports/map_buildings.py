@@ -53,10 +53,10 @@ def plans_of(shape: BaseGeometry, tolerance_m: float, summary: Counter[str]) -> 
     return out
 
 
-def rings_of(plan: Polygon) -> dict[str, Any]:
-    """Return the keys of an area: `outline`, and `holes` if any."""
+def area_of(plan: Polygon) -> dict[str, Any]:
+    """Return an area as plans write it."""
     outline, *holes = ([list(at) for at in ring.coords[:-1]] for ring in (plan.exterior, *plan.interiors))
-    return {"outline": outline, **({"holes": holes} if holes else {})}
+    return {"polygon": outline, **({"minus": [{"polygon": hole} for hole in holes]} if holes else {})}
 
 
 def _to_centimetres(plan: Polygon) -> Polygon:
@@ -143,7 +143,7 @@ def _bodies(
             continue
         base, top, roof, rise = _heights(area, plan, usual, None if part else summary)
         out.append({
-            **rings_of(plan), **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
+            "plan": plan, **({"base_m": round(base, 2)} if base else {}), "top_m": round(top, 2), "roof": roof,
             **({"roof_m": round(rise, 2)} if rise else {}),
         })  # fmt: skip
     return out

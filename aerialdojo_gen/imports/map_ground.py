@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from aerialdojo_gen.imports.map_bridges import BRIDGE
-from aerialdojo_gen.imports.map_buildings import plans_of, rings_of
+from aerialdojo_gen.imports.map_buildings import plans_of
 from aerialdojo_gen.imports.map_tags import SURFACES, TABLES, Tags, below_ground, by_word, count, metres
 from aerialdojo_gen.imports.osm import Feature
 
@@ -152,7 +152,7 @@ def _areas(
 ) -> list[dict[str, Any]]:
     optional = {k: v for k, v in {"grows": grows, "parking": parking, "name": name}.items() if v}
     plans = (plan for plan in plans_of(shape, 0.1, summary) if plan.area >= _LEAST_AREA_M2)
-    return [{"material": material, **optional, **rings_of(plan)} for plan in plans]
+    return [{"material": material, **optional, "plan": plan} for plan in plans]
 
 
 def _sea(lines: Sequence[Feature], window: Polygon) -> list[Polygon]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from aerialdojo_gen.base.errors import AssetError, UsageError
@@ -16,7 +17,7 @@ from aerialdojo_gen.imports.map_plan import TownOptions, town_plan
 from aerialdojo_gen.imports.osm import read_maps
 from aerialdojo_gen.imports.placing import Placer
 from aerialdojo_gen.imports.project import PIPELINE, make_project
-from aerialdojo_gen.imports.relief import PlacePlan, ReliefOptions, ground_sampler, relief_plan
+from aerialdojo_gen.imports.relief import PlacePlan, ReliefOptions, relief_plan, town_ground
 from aerialdojo_gen.scenes.catalogue import load_catalogue
 from aerialdojo_gen.scenes.model import Scene
 from aerialdojo_gen.scenes.plans import HEIGHTS_SUFFIX
@@ -60,7 +61,7 @@ def add_map(
         raise UsageError(f"{len(boxes):,} scenes requested, the maximum is {_MAX_SCENES}: use larger tiles")
     names = [name] if len(boxes) == 1 else [f"{name}-{k}" for k in range(1, len(boxes) + 1)]
     check_free(names, project, force)
-    heights = None if dem is None else ground_sampler(read_dem(dem), options.cell_m)
+    heights = None if dem is None else partial(town_ground, read_dem(dem), options.cell_m)
     wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
     towns = []

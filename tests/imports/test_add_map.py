@@ -18,7 +18,6 @@ from aerialdojo_gen.annotations.vocabulary import Vocabulary
 from aerialdojo_gen.base.errors import AssetError, MissingPackage, UsageError
 from aerialdojo_gen.imports import map_buildings, map_ground
 from aerialdojo_gen.imports.earth import size_m, tile_bboxes
-from aerialdojo_gen.imports.map_furniture import plan_of
 from aerialdojo_gen.imports.map_plan import TownOptions
 from aerialdojo_gen.imports.map_props import _thing
 from aerialdojo_gen.imports.map_tags import bearing_deg
@@ -296,13 +295,13 @@ def test_what_is_built_is_simple_polygons_that_cover_what_the_map_has(seed):
     summary, rings = Counter(), maps.crowded(seed)
     town = [Feature(f"{k:03d}", Polygon(ring), tags) for k, (ring, tags) in enumerate(rings)]
     bodies = [b for one in map_buildings.buildings(town, [], SITE, summary) for b in one["bodies"]]
-    assert all(plan_of(b).is_valid for b in bodies)
+    assert all(b["plan"].is_valid for b in bodies)
     mapped = shapely.union_all([f.shape for f in town]).intersection(SITE)
-    assert shapely.union_all([plan_of(b) for b in bodies]).symmetric_difference(mapped).area < 0.05 * mapped.area
+    assert shapely.union_all([b["plan"] for b in bodies]).symmetric_difference(mapped).area < 0.05 * mapped.area
     parks = [Feature(f.key, f.shape, {"leisure": "park"}) for f in town]
     areas = map_ground.areas(parks, [], SITE, summary)
-    assert all(plan_of(a).is_valid for a in areas)
-    assert shapely.union_all([plan_of(a) for a in areas]).symmetric_difference(mapped).area < 0.05 * mapped.area
+    assert all(a["plan"].is_valid for a in areas)
+    assert shapely.union_all([a["plan"] for a in areas]).symmetric_difference(mapped).area < 0.05 * mapped.area
     assert not [line for line in summary if "left out" in line]
 
 

@@ -107,7 +107,7 @@ def _topmost(side: int, land: Sequence[_Piece], sheets: Sequence[_Piece]) -> lis
 
 def _joined(side: int, pieces: Sequence[_Piece]) -> list[Stretch]:
     axis, way, _ = _SIDES[side]
-    out: list[Stretch] = []
+    joined: list[tuple[list[Floats], str]] = []
     points: list[Floats] = []
     material, reached = "", -np.inf
     for start, ends, spec in pieces:
@@ -117,11 +117,8 @@ def _joined(side: int, pieces: Sequence[_Piece]) -> list[Stretch]:
         reached = end
         gap = points and np.abs(points[-1] - ends[0]).max() > _ON_M
         long = points and abs(points[-1][axis] - points[0][axis]) + (end - start) > _LONGEST_M
-        if points and (spec != material or gap or long):
-            out.append(Stretch(side, np.array(points), material))
-            points = []
-        material = spec
-        points += [ends[1]] if points else [ends[0], ends[1]]
-    if points:
-        out.append(Stretch(side, np.array(points), material))
-    return out
+        if spec != material or gap or long:
+            points, material = [ends[0]], spec
+            joined.append((points, material))
+        points.append(ends[1])
+    return [Stretch(side, np.array(points), material) for points, material in joined]
