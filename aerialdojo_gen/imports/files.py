@@ -41,9 +41,8 @@ def read_mesh(path: Path, max_memory_bytes: int = MAX_MEMORY_BYTES, texture_px: 
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
     if size > MAX_FILE_BYTES:
-        raise AssetError(
-            f"{path}: {size >> 20} MiB, the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
-        )
+        most = f"the maximum is {MAX_FILE_BYTES >> 20}: simplify or split the mesh"
+        raise AssetError(f"{path}: {size >> 20} MiB, {most}")
     if fault:
         raise AssetError(f"{path}: {fault}")
     with scratch_folder() as folder:

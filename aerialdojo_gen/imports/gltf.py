@@ -194,9 +194,8 @@ class _File:
         """Return the first `width` numbers of an attribute of `n` vertices."""
         values = self._array(attributes[name])
         if values.shape[1] < width or (n is not None and len(values) != n):
-            raise AssetError(
-                f"is a damaged glTF file: {name} has {values.shape[1]} numbers for {len(values)} vertices"
-            )
+            has = f"{values.shape[1]} numbers for {len(values)} vertices"
+            raise AssetError(f"is a damaged glTF file: {name} has {has}")
         return values[:, :width].astype(np.float64)
 
     def _array(self, accessor: int) -> NDArray[Any]:

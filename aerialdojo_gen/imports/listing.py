@@ -33,7 +33,7 @@ class FileAxes:
 
     up: str  # The axis along which more surface is level
     up_sure: bool  # Whether the difference is large
-    units: tuple[tuple[float, str], ...]  # tuple of (float, str)
+    units: tuple[tuple[float, str], ...]  # Metres per unit, and its name; likeliest first
 
 
 def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
@@ -57,8 +57,8 @@ def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
     weight = [level[k] / max(float(size[k]), 1e-9) ** 0.5 for k in (1, 2)]
     up = "y" if weight[0] > weight[1] else "z"
     sure = max(weight) >= _SURE * min(weight)
-    tall = float(size[1] if up == "y" else size[2])
-    wide = float(max(size[0], size[2] if up == "y" else size[1]))
+    other, tall = (size[2], size[1]) if up == "y" else (size[1], size[2])
+    wide = max(size[0], other)
     fit = tuple(
         (scale, unit)
         for scale, unit in _UNITS
@@ -109,9 +109,8 @@ def describe_mesh(
         f"heights: z is {low[2]:.7g} to {high[2]:.7g} m",
     ]
     if max(high - low) > LARGEST_M:
-        lines.append(
-            f"wider than {LARGEST_M:g} m: --tiles 200 makes scenes of its parts, --crop or --box one of a part"
-        )
+        parts = "--tiles 200 makes scenes of its parts, --crop or --box one of a part"
+        lines.append(f"wider than {LARGEST_M:g} m: {parts}")
     lines += [f"dome: {d.name or 'a node without a name'}, {len(d.faces):,} triangles" for d in source.domes]
     lines += [f"note: {line}" for line in source.repairs.lines]
     largest = sorted(bodies, key=lambda row: -float(areas(row[0].vertices, row[0].faces.astype(np.int32)).sum()))

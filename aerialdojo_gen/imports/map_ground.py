@@ -74,9 +74,8 @@ def _street(tags: Tags) -> dict[str, Any] | None:
     tagged = count(tags, "lanes")
     lanes = min(tagged or (max(lanes - 1, 1) if oneway else lanes), 8)
     parking = kind == "side" and _parks(tags, by_rule=kind_of in ("residential", "unclassified", "living_street"))
-    width = metres(tags, "width", "est_width") or (
-        (lanes * _LANE_M if tagged or oneway else width) + (2 * _PARKED_M if parking else 0.0)
-    )
+    usual = (lanes * _LANE_M if tagged or oneway else width) + (2 * _PARKED_M if parking else 0.0)
+    width = metres(tags, "width", "est_width") or usual
     sidewalk = tags.get("sidewalk", tags.get("sidewalk:both", ""))
     pavement = 0.0 if sidewalk in ("no", "none") else min(pavement, 1.2) if sidewalk == "separate" else pavement
     surface = surface or ("dirt" if kind_of == "track" else "asphalt")
@@ -94,14 +93,9 @@ def _wide(width: float) -> float:
 
 
 def _parks(tags: Tags, *, by_rule: bool) -> bool:
-    values = [
-        v
-        for k, v in tags.items()
-        if k.startswith("parking:") and k.count(":") <= 2 and not k.endswith(("fee", "conditional"))
-    ]
-    if values:
-        return any(v in _PARKED for v in values)
-    return by_rule
+    keys = [k for k in tags if k.startswith("parking:") and k.count(":") <= 2]
+    values = [tags[k] for k in keys if not k.endswith(("fee", "conditional"))]
+    return any(v in _PARKED for v in values) if values else by_rule
 
 
 def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[list[float]]]:

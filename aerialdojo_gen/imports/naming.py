@@ -140,8 +140,7 @@ def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
         "colour": word_list("colours"), "size": word_list("sizes"), "material": materials,
         "state": word_list("states"),
     }  # fmt: skip
-    said: dict[str, str] = {}
-    rest: list[str] = []
+    said, rest = dict[str, str](), list[str]()
     for k, word in enumerate(words):
         spelt = spelling.get(word, word)
         key = next((key for key, known in kinds.items() if spelt in known), "")

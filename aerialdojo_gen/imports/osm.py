@@ -79,8 +79,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
         args = [str(out), json.dumps(boxes)]
         read_in_sandbox(__name__, path, args, MAX_MEMORY_BYTES, _extract_advice(path, boxes))
         found = json.loads(out.read_text(encoding="utf-8"))
-    west, south, east, north = found["extent"]
-    extent = (west, south, east, north)
+    west, south, east, north = extent = tuple(found["extent"])
     maps = []
     for box, own in zip(boxes, found["boxes"], strict=True):
         if not any(own.values()):
@@ -133,7 +132,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
     for shape in (windows, extent_box):
         shapely.prepare(shape)
     found: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
-    low, high = [1e9, 1e9], [-1e9, -1e9]
+    low, high = (1e9, 1e9), (-1e9, -1e9)
     factory = osmium.geom.WKBFactory()
 
     def keep(kind: str, shape: Any, part: Any, tags: Tags) -> None:
@@ -145,7 +144,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
     for thing in osmium.FileProcessor(str(path)).with_locations().with_areas():
         if thing.is_node():
             lon, lat = thing.location.lon, thing.location.lat
-            low, high = [min(low[0], lon), min(low[1], lat)], [max(high[0], lon), max(high[1], lat)]
+            low, high = (min(low[0], lon), min(low[1], lat)), (max(high[0], lon), max(high[1], lat))
             if thing.tags:
                 point = shapely.Point(lon, lat)
                 keep("points", point, point, dict(thing.tags))
@@ -167,8 +166,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
             for part in shapely.get_parts(whole):
                 if isinstance(part, Polygon):
                     keep("areas", whole, part, tags)
-    extent = None if low[0] > high[0] else (low[0], low[1], high[0], high[1])
-    return found, extent
+    return found, None if low[0] > high[0] else (*low, *high)
 
 
 def _is_area(tags: Tags) -> bool:

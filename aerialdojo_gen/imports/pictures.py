@@ -130,7 +130,7 @@ def _channels(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.u
 def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
     """Reduce textures until each one, and all together, are within the limits."""
     different = {s.digest: s for s in made if s.texture is not None}
-    sides = {d: s.texture.shape[:2] for d, s in different.items() if s.texture is not None}
+    sides = {s.digest: s.texture.shape[:2] for s in made if s.texture is not None}
     size = {d: _fit_size(shape, texture_px) for d, shape in sides.items()}
     while sum(h * w for h, w in size.values()) > TEXELS:
         largest = max(max(shape) for shape in size.values())
@@ -139,27 +139,21 @@ def _limit_sizes(made: list[RawSurface], texture_px: int) -> list[RawSurface]:
     return [resized.get(s.digest, s) for s in made]
 
 
-def _fit_size(shape: tuple[int, ...], most: int) -> tuple[int, int]:
-    height, width = shape[0], shape[1]
-    longest = max(height, width)
-    if longest <= most:
-        return height, width
-    return max(1, round(height * most / longest)), max(1, round(width * most / longest))
+def _fit_size(shape: tuple[int, ...], most: int) -> tuple[int, ...]:
+    longest = max(shape)
+    return shape if longest <= most else tuple(max(1, round(side * most / longest)) for side in shape)
 
 
-def _resize(surface: RawSurface, size: tuple[int, int]) -> RawSurface:
+def _resize(surface: RawSurface, size: tuple[int, ...]) -> RawSurface:
     assert surface.texture is not None
     height, width = surface.texture.shape[:2]
     smaller = cv2.resize(surface.texture, size[::-1], interpolation=cv2.INTER_AREA)
     mask = surface.mask
     if mask is not None:
         mask = cv2.resize(mask.astype(np.float32), size[::-1], interpolation=cv2.INTER_AREA) >= CUTOFF
-    note = (
-        f"{surface.name or 'a material'}: its texture of {width} x {height} pixels is kept at {size[1]} x {size[0]}"
-    )
-    return replace(
-        surface, texture=np.asarray(smaller, dtype=np.uint8), mask=mask, jpeg=b"", notes=(*surface.notes, note)
-    )
+    kept = f"its texture of {width} x {height} pixels is kept at {size[1]} x {size[0]}"
+    notes = (*surface.notes, f"{surface.name or 'a material'}: {kept}")
+    return replace(surface, texture=np.asarray(smaller, dtype=np.uint8), mask=mask, jpeg=b"", notes=notes)
 
 
 def _srgb_to_linear(srgb: NDArray[np.float64]) -> NDArray[np.float64]:

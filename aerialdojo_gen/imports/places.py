@@ -126,8 +126,7 @@ def _summary_lines(counts: dict[str, int]) -> list[str]:
         f"{n:,} {key}" for key in ("buildings", "streets", "paths", "things of the map") if (n := counts.pop(key, 0))
     ]
     by = {"height": "by their height", "levels": "by their levels", "rule": "by rule, without either"}
-    known = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
+    sources = [f"{n:,} {word}" for key, word in by.items() if (n := counts.pop(key, 0))]
     lines = [", ".join(what) or "nothing that stands"]
-    if known:
-        lines.append(f"heights of buildings: {', '.join(known)}")
+    lines += [f"heights of buildings: {', '.join(sources)}"] if sources else []
     return lines + [f"{n:,} {key}" for key, n in sorted(counts.items())]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import chain, product
 
 import numpy as np
 import scipy.ndimage
@@ -84,9 +85,8 @@ def split_components(bodies: Sequence[RawNode]) -> tuple[list[RawNode], SplitSta
                 ground_bodies += [ground] if len(ground.faces) else []
                 things += attached
             elif (np.ptp(piece.vertices[:, :2], axis=0) > _WIDE_M).any() and ((kind := _materials(piece)) > 0).any():
-                parts = [
-                    p for k in np.unique(kind) for p in _connected(extract_faces(piece, np.flatnonzero(kind == k)))
-                ]
+                same = (extract_faces(piece, np.flatnonzero(kind == k)) for k in np.unique(kind))
+                parts = [part for one in same for part in _connected(one)]
                 stats.materials += len(parts)
                 things += parts
             else:
@@ -231,6 +231,5 @@ def _cells(body: RawNode) -> Cells | None:
     spans = np.unique(np.column_stack([first, last]), axis=0)
     if ((spans[:, 2] - spans[:, 0] + 1) * (spans[:, 3] - spans[:, 1] + 1)).sum() > _MAX_MAPPED:
         return None
-    return frozenset(
-        (i, j) for x0, y0, x1, y1 in spans.tolist() for i in range(x0, x1 + 1) for j in range(y0, y1 + 1)
-    )
+    blocks = (product(range(x0, x1 + 1), range(y0, y1 + 1)) for x0, y0, x1, y1 in spans.tolist())
+    return frozenset(chain.from_iterable(blocks))

@@ -71,8 +71,8 @@ def vary(
     """
     options = options or VaryOptions({})
     names = choose_scenes(list(types), type_names(home() / "scene_assets"), "type")
-    if count(names, seeds) > _MAX_WORLDS:
-        raise UsageError(f"{count(names, seeds):,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
+    if (n := count(names, seeds)) > _MAX_WORLDS:
+        raise UsageError(f"{n:,} worlds are asked for, at most {_MAX_WORLDS:,} are made at once")
     worlds = [World(name, seed, options.knobs, options.held_out) for name in names for seed in seeds]
     names_of = {world.name: k for k, world in enumerate(worlds)}
     make_project(project)
