@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import shapely
 
-from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, town
+from aerialdojo_gen.scenes.worlds.blocks import about_square, avenue, estate, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.shapes import Box, heading, point, smoothed
 from aerialdojo_gen.scenes.worlds.wrecked import (
@@ -71,6 +69,6 @@ def _ruin(draft: Draft, lot: Box, k: int, fault: shapely.LineString) -> None:
         wreck(draft, box, name, storeys, draft.whole(1, 2, "torn", k))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+_TOPOLOGIES = {
     "town": town, "square": about_square, "avenue": avenue, "scarp": town, "estate": estate,
 }  # fmt: skip

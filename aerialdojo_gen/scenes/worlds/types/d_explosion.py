@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import shapely
 
@@ -105,6 +104,6 @@ def _yard(draft: Draft, w: float, d: float) -> Layout:
     return lots, lanes, [Box(-w + side + 1, y0 + 1, w - side - 1, d - deep - 1)]
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+_TOPOLOGIES = {
     "street": avenue, "square": about_square, "blocks": town, "yard": _yard, "flats": estate,
 }  # fmt: skip

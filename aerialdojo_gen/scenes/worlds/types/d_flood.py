@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
@@ -230,6 +230,6 @@ def _mounds(draft: Draft, w: float, d: float) -> _Land:
     return _Land([[a, middle, b]], mounds, houses, flats, [])
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], _Land]] = {
+_TOPOLOGIES = {
     "street": _street, "polder": _polder, "town": _town, "river": _river, "mounds": _mounds,
 }  # fmt: skip

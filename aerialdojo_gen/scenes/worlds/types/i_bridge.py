@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import shapely
@@ -217,6 +217,6 @@ def _truss(draft: Draft, valley: _Valley, x0: float, x1: float) -> None:
     _piers(draft, parts, at, 1.8, 6.0)
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, _Valley, float, float], None]] = {
+_TOPOLOGIES = {
     "arch": _arch, "beam": _beam, "stone": _stone, "hung": _hung, "truss": _truss,
 }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import shapely
@@ -337,7 +337,7 @@ def _causeway(port: _Port, w: float, d: float) -> list[Pose]:
     return [(*port.at(x1 - 8, y1 - 9), port.yaw(0))]
 
 
-_TOPOLOGIES: dict[str, Callable[[_Port, float, float], list[Pose]]] = {
+_TOPOLOGIES = {
     "terminal": _terminal, "basin": _basin, "fingers": _fingers, "marina": _marina, "channel": _channel,
     "causeway": _causeway,
 }  # fmt: skip

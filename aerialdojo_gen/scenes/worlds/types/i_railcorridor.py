@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
@@ -280,6 +280,6 @@ def _crossing_line(draft: Draft, d: float) -> Layout:
     return _rest(draft, bands, d, "green", "green"), draft.number(28, 36, "crossing"), draft.number(-16, 4, "bridge")
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float], Layout]] = {
+_TOPOLOGIES = {
     "halt": _halt, "station": _island, "goods": _goods, "terminus": _terminus, "town": _crossing_line,
 }  # fmt: skip

@@ -205,6 +205,6 @@ def _fjord(draft: Draft, shore: _Shore) -> Isle:
     return Isle(land, village, shore.yaw(270.0), heads, cliffs=_beside(shore, at, half * 1.1 + 6.0))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, _Shore], Isle]] = {
+_TOPOLOGIES = {
     "beach": _beach, "cove": _cove, "cliffs": _cliffs, "estuary": _estuary, "spit": _spit, "fjord": _fjord,
 }  # fmt: skip

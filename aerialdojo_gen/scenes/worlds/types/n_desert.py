@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import shapely
@@ -251,6 +250,6 @@ def _serai(draft: Draft, w: float, d: float) -> list[Point]:
     return spots
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], list[Point]]] = {
+_TOPOLOGIES = {
     "erg": _erg, "oasis": _oasis, "canyon": _canyon, "dig": _dig, "pan": _pan, "serai": _serai,
 }  # fmt: skip

@@ -129,6 +129,6 @@ def _ruin(draft: Draft, w: float, d: float) -> None:
     _sites(draft, [_camp], 11.0)
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], None]] = {
+_TOPOLOGIES = {
     "creek": _creek, "glades": _glades, "hill": _hill, "pond": _pond, "ruin": _ruin,
 }  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import shapely
 
@@ -163,6 +162,6 @@ def _fort(draft: Draft, w: float, d: float) -> Isle:
     return Isle(land, village, bay, heads, shapely.Point(at).buffer(21.0))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Isle]] = {
+_TOPOLOGIES = {
     "volcano": _volcano, "atoll": _atoll, "ridge": _ridge, "twins": _twins, "skerries": _skerries, "fort": _fort,
 }  # fmt: skip

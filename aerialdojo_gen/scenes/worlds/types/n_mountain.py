@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import shapely
@@ -251,6 +251,6 @@ def _caldera(draft: Draft, w: float, d: float, high: float) -> _Massif:
     return _Massif([_Crest(ring, 19.0)], [ring[2][:2]], [_edge(gap, w, d)], lake)
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float, float], _Massif]] = {
+_TOPOLOGIES = {
     "cirque": _cirque, "pass": _pass, "peaks": _peaks, "valley": _valley, "horn": _horn, "caldera": _caldera,
 }  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import shapely
 
@@ -266,6 +265,6 @@ def _icefield(draft: Draft, w: float, d: float) -> list[Point]:
     return spots
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], list[Point]]] = {
+_TOPOLOGIES = {
     "station": _station, "slope": _slope, "glacier": _glacier, "lake": _ice, "hamlet": _hamlet, "icefield": _icefield,
 }  # fmt: skip

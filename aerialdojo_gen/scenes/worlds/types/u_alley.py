@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from aerialdojo_gen.scenes.worlds.blocks import (
     dressed,
     inner_sides,
@@ -123,6 +121,6 @@ def _ring(draft: Draft, w: float, d: float) -> Layout:
     return [*houses, *inner], [*ring(outer, core), *lanes, *ways], squares
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+_TOPOLOGIES = {
     "grid": _grid, "spine": _spine, "piazza": _piazza, "street": _street, "ring": _ring,
 }  # fmt: skip

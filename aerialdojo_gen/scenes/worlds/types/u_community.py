@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
@@ -239,6 +239,6 @@ def _towers(draft: Draft, w: float, d: float) -> _Estate:
     return _Estate(flats, lanes, bays, point(-0.1 * w, 0.08 * d))
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], _Estate]] = {
+_TOPOLOGIES = {
     "court": _court_estate, "rows": _rows, "comb": _comb, "crescent": _crescent, "towers": _towers,
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import shapely
@@ -229,6 +228,6 @@ def _station(draft: Draft, large: Box, small: Box) -> None:
     _tower(draft, large, small)
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Box, Box], None]] = {
+_TOPOLOGIES = {
     "tower": _tower, "pit": _dig, "twins": _twins, "housing": _housing, "station": _station,
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import cycle, product
 from typing import Any
 
@@ -257,14 +256,14 @@ def _court(draft: Draft, site: Box) -> Layout:
     return [*front, yard, *sides, *back], [*ring(inner, yard), gate, *ways]
 
 
-_TOPOLOGIES: dict[str, tuple[Callable[[Draft, Box], Layout], tuple[str, ...]]] = {
+_TOPOLOGIES = {
     "works": (_works, ("yard", "hall", "store", "process", "office", "tanks", "power", "green")),
     "spine": (_spine, ("hall", "store", "yard", "power", "hall", "office", "process")),
     "refinery": (_works, ("tanks", "process", "tanks", "process", "yard", "office", "store", "power")),
     "court": (_court, ("yard", "hall", "store", "hall", "office", "power", "store")),
     "mill": (_spine, ("power", "hall", "yard", "green", "store", "office", "tanks")),
 }
-_USES: dict[str, Callable[[Draft, Box, int], None]] = {
+_USES = {
     "hall": _hall, "store": _store, "tanks": _tanks, "process": _process, "power": _power, "office": _office,
     "yard": _yard, "green": _green,
 }  # fmt: skip

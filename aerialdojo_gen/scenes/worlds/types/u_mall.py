@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from aerialdojo_gen.scenes.worlds.blocks import dressed, split, strung
@@ -195,6 +195,6 @@ def _islands(draft: Draft, area: Box) -> _Mall:
     return _Mall(shops, stores, [walk], [], [Box(area.x0, area.y0, area.x1, y - 12.0)])
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Box], _Mall]] = {
+_TOPOLOGIES = {
     "strip": _strip, "promenade": _promenade, "lanes": _lanes, "court": _court, "islands": _islands,
 }  # fmt: skip

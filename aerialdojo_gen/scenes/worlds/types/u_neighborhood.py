@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -298,7 +297,7 @@ def _courts(draft: Draft, w: float, d: float) -> Layout:
     return [*walks, *ways], spots
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, float, float], Layout]] = {
+_TOPOLOGIES = {
     "culdesac": _culdesac, "village": _village, "crossroads": _crossroads, "crescent": _crescent,
     "terraces": _terraces, "courts": _courts,
 }  # fmt: skip

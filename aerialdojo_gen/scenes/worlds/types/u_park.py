@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
@@ -312,6 +312,6 @@ def _hills(draft: Draft, park: Park) -> list[Pad]:
     return pads
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Park], list[Pad]]] = {
+_TOPOLOGIES = {
     "midway": _midway, "lake": _lake, "star": _star, "fairground": _fairground, "hills": _hills,
 }  # fmt: skip

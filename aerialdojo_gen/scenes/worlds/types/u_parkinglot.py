@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from aerialdojo_gen.scenes.kit.parking import VEHICLES
@@ -171,6 +170,6 @@ def _solar(draft: Draft, lot: Box) -> None:
         y, k = y + DOUBLE_ROW_M, k + 1
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, Box], None]] = {
+_TOPOLOGIES = {
     "rows": _rows, "fishbone": _fishbone, "deck": _deck, "court": _court, "solar": _solar,
 }  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import shapely
@@ -226,6 +226,6 @@ def _courts(draft: Draft) -> None:
                 break
 
 
-_TOPOLOGIES: dict[str, Callable[[Draft, _Ground, int], list[shapely.Polygon]]] = {
+_TOPOLOGIES = {
     "bowl": _bowl, "facing": _facing, "athletics": _athletics, "village": _village, "horseshoe": _horseshoe,
 }  # fmt: skip
