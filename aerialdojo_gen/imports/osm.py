@@ -48,6 +48,10 @@ class Feature:
     shape: Any  # Point, LineString or Polygon, degrees; parts of a multipolygon are features with the same key
     tags: Tags  # As mapped
 
+    def order(self) -> tuple[str, list[tuple[str, str]], bytes]:
+        """Key by which features are sorted, whatever their order in the file."""
+        return self.key, sorted(self.tags.items()), shapely.to_wkb(self.shape)
+
 
 @dataclass(frozen=True)
 class Map:
@@ -87,7 +91,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
             why = "lies outside the extract" if disjoint else "contains no map data"
             raise UsageError(f"--bbox {format_bbox(box)} {why}: {path.name} covers {format_bbox(extent)}")
         points, lines, areas = (
-            tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=_order))
+            tuple(sorted((Feature(k, shapely.from_wkb(shape), t) for k, shape, t in own[kind]), key=Feature.order))
             for kind in _KINDS
         )
         maps.append(Map(points, lines, areas, extent))
@@ -116,15 +120,6 @@ def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
     return ""
 
 
-def _order(feature: Feature) -> tuple[str, list[tuple[str, str]], bytes]:
-    return feature.key, sorted(feature.tags.items()), shapely.to_wkb(feature.shape)
-
-
-def _key(shape: Any) -> str:
-    # OpenStreetMap coordinates have seven decimals.
-    return " ".join(f"{degrees:.7f}" for degrees in shape.bounds)
-
-
 def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str, list[_RawFeature]]], Bbox | None]:
     """Read a file once; the extent is computed from its points, as a header need not state it."""
     windows = shapely.box(*np.asarray(boxes, dtype=np.float64).T)
@@ -138,8 +133,9 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
     def keep(kind: str, shape: Any, part: Any, tags: Tags) -> None:
         if not extent_box.intersects(part):
             return
+        key = " ".join(f"{degrees:.7f}" for degrees in shape.bounds)  # as many decimals as the map has
         for k in np.flatnonzero(shapely.intersects(windows, part)):
-            found[k][kind].append((_key(shape), str(shapely.to_wkb(part, hex=True)), tags))
+            found[k][kind].append((key, str(shapely.to_wkb(part, hex=True)), tags))
 
     for thing in osmium.FileProcessor(str(path)).with_locations().with_areas():
         if thing.is_node():

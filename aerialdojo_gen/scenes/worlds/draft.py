@@ -18,7 +18,7 @@ from aerialdojo_gen.base.rng import generator, pick, rank
 from aerialdojo_gen.scenes.catalogue import Catalogue
 from aerialdojo_gen.scenes.light import sun_at
 from aerialdojo_gen.scenes.plans.text import plan_text
-from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType, Slots
+from aerialdojo_gen.scenes.worlds.kinds import Palette, SceneType
 from aerialdojo_gen.scenes.worlds.paints import extents_m, repainted
 from aerialdojo_gen.scenes.worlds.shapes import SIDES, Box, Point, Pose
 from aerialdojo_gen.scenes.worlds.world import World
@@ -254,7 +254,7 @@ class Draft:
             slots.sort(key=lambda s: rank(self.world.seed, STAGE, self._trial, kind, s.x, s.y, s.on))
             share = self.number(*self.kind.slots[kind].share, "share", kind) if slots else 0.0
             for slot in slots[: round(share * len(slots))]:
-                what = self._draw_category(self.kind.slots[kind], slot, used)
+                what = self._draw_category(slot, used)
                 if what is not None:
                     rng = self.rng("thing", kind, slot.x, slot.y, slot.on)
                     thing = repainted(self.catalogue, what, (slot.x, slot.y, slot.yaw_deg), rng)
@@ -274,12 +274,19 @@ class Draft:
     def _levelled(self, on: float | str | None) -> Entry:
         return {"level": True} if self.level_things and on is None else {}
 
-    def _draw_category(self, slots: Slots, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
+    def available(self, kind: str, used: Counter[tuple[str, str]]) -> dict[str, float]:
+        """Weights of what may still stand at slots of a kind: not too often, and not what is held out."""
+        slots, held_out = self.kind.slots[kind], self.world.held_out
+        return {
+            what: weight for what, weight in slots.of.items()
+            if used[kind, what] < slots.most and (held_out or what not in slots.held_out)
+        }  # fmt: skip
+
+    def _draw_category(self, slot: Slot, used: Counter[tuple[str, str]]) -> str | None:
         """Draw what stands at a slot; None where nothing that is left has room."""
         weights = {
-            what: weight for what, weight in slots.of.items()
-            if used[slot.kind, what] < slots.most and (what not in slots.held_out or self.world.held_out)
-            and all(e <= r for e, r in zip(extents_m(self.catalogue, what), slot.room_m, strict=True))
+            what: weight for what, weight in self.available(slot.kind, used).items()
+            if all(e <= r for e, r in zip(extents_m(self.catalogue, what), slot.room_m, strict=True))
         }  # fmt: skip
         if not weights:
             return None

@@ -142,23 +142,19 @@ def _rooms(
     """Offer slots in rooms beside the first hole: each floor's nearest whole one."""
     long, deep = size_m
     count = max(round(long / 6.8), 1)
+    middles = [(k + 0.5) * long / count - long / 2 for k in range(count)]
     for floor in range(1, storeys):
         z = floor * STOREY_M
-        middles = [(k + 0.5) * long / count - long / 2 for k in range(count)]
 
         def whole(u: float, z: float = z) -> bool:
-            return all(math.hypot(u - b["x"], b["y"]) > _radius(b, z) + 2.2 for b in bites)
+            holes = ((b, np.interp(z, [b["z0_m"], b["z1_m"]], [b["foot_m"], b["head_m"]])) for b in bites)
+            return all(math.hypot(u - b["x"], b["y"]) > radius + 2.2 for b, radius in holes)
 
         rooms = sorted((u for u in middles if whole(u)), key=lambda u: abs(u - bites[0]["x"]))
         if rooms and draft.chance(0.7, name, "floor", floor):
             side = 1.0 if bites[0]["y"] > 0 else -1.0
             spot = beside(pose, rooms[0], side * deep * 0.12)
             draft.slot("torn", *spot, draft.number(0, 360, name, floor), (2.2, 2.2), on=f"{name} + {z:.1f} + 0.03")
-
-
-def _radius(bite: dict[str, float], z: float) -> float:
-    share = min(max((z - bite["z0_m"]) / (bite["z1_m"] - bite["z0_m"]), 0.0), 1.0)
-    return bite["foot_m"] + share * (bite["head_m"] - bite["foot_m"])
 
 
 def pancaked(draft: Draft, box: Box, name: str, floors: int) -> None:

@@ -4,37 +4,27 @@ from __future__ import annotations
 
 import shapely
 
+from aerialdojo_gen.scenes.worlds import wrecked
 from aerialdojo_gen.scenes.worlds.blocks import about_square, avenue, estate, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.shapes import Box, heading, point, smoothed
-from aerialdojo_gen.scenes.worlds.wrecked import (
-    built_up,
-    camp,
-    flattened,
-    littered,
-    open_landmarks,
-    pancaked,
-    poles,
-    shallow,
-    wreck,
-)
 
 
 def write(draft: Draft) -> None:
     """Lay the town out, let the fault run through it, then wreck its buildings, and set up camp where it is open."""
-    lots, lanes, open_ = built_up(draft, _TOPOLOGIES[draft.topology], 0.3, (26, 36))
+    lots, lanes, open_ = wrecked.built_up(draft, _TOPOLOGIES[draft.topology], 0.3, (26, 36))
     fault = _fault(draft, *draft.half)
     for lane in lanes:
         draft.take(lane.shape())
-    open_landmarks(draft, open_, fault.buffer(5.0))
+    wrecked.open_landmarks(draft, open_, fault.buffer(5.0))
     draft.section("What is left of the buildings")
     for k, lot in enumerate(draft.shuffled(lots, "lots")):
         _ruin(draft, lot, k, fault)
-    camp(draft, open_)
+    wrecked.camp(draft, open_)
     draft.fill_slots()
     draft.section("Poles and loose pieces")
-    poles(draft, lanes)
-    littered(draft)
+    wrecked.poles(draft, lanes)
+    wrecked.littered(draft)
 
 
 def _fault(draft: Draft, w: float, d: float) -> shapely.LineString:
@@ -58,15 +48,15 @@ def _fault(draft: Draft, w: float, d: float) -> shapely.LineString:
 def _ruin(draft: Draft, lot: Box, k: int, fault: shapely.LineString) -> None:
     """Put what is left of a building on a lot, or rubble alone where the fault runs."""
     name, storeys = f"block_{k}", max(2, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k))
-    box = shallow(draft, lot, k, 12.5, draft.chance(0.5, "front", k))
+    box = wrecked.shallow(draft, lot, k, 12.5, draft.chance(0.5, "front", k))
     if fault.distance(box.shape()) < 1.5:
-        flattened(draft, box, k, name, 0.45, bool(k % 2))
+        wrecked.flattened(draft, box, k, name, 0.45, bool(k % 2))
     elif draft.chance(0.22, "fallen", k):
-        pancaked(draft, box, name, storeys + 1)
+        wrecked.pancaked(draft, box, name, storeys + 1)
     elif draft.chance(0.25, "leans", k):
-        wreck(draft, box, name, storeys, 1, lean_deg=draft.number(3, 8, "lean", k))
+        wrecked.wreck(draft, box, name, storeys, 1, lean_deg=draft.number(3, 8, "lean", k))
     else:
-        wreck(draft, box, name, storeys, draft.whole(1, 2, "torn", k))
+        wrecked.wreck(draft, box, name, storeys, draft.whole(1, 2, "torn", k))
 
 
 _TOPOLOGIES = {

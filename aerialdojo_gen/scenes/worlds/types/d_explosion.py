@@ -6,26 +6,26 @@ import math
 
 import shapely
 
+from aerialdojo_gen.scenes.worlds import wrecked
 from aerialdojo_gen.scenes.worlds.blocks import Layout, about_square, avenue, estate, split, town
 from aerialdojo_gen.scenes.worlds.draft import Draft
 from aerialdojo_gen.scenes.worlds.shapes import Box, Point, ahead, point
-from aerialdojo_gen.scenes.worlds.wrecked import built_up, camp, flattened, littered, open_landmarks, shallow, wreck
 
 
 def write(draft: Draft) -> None:
     """Lay streets and lots out, blast a crater, then tear the buildings open, the more the nearer they stand."""
-    lots, lanes, open_ = built_up(draft, _TOPOLOGIES[draft.topology], 0.25, (22, 32))
+    lots, lanes, open_ = wrecked.built_up(draft, _TOPOLOGIES[draft.topology], 0.25, (22, 32))
     at = _where(draft, lanes, open_)
     radius = draft.knob("crater_m")
     _crater(draft, at, radius)
     for lane in lanes:
         draft.take(lane.shape())
     large = [lot for lot in lots if lot.width * lot.depth > 320]
-    open_landmarks(draft, [*open_, *large], shapely.Point(at).buffer(9.0))
+    wrecked.open_landmarks(draft, [*open_, *large], shapely.Point(at).buffer(9.0))
     draft.section("What is left of the buildings")
     for k, lot in enumerate(draft.shuffled(lots, "lots")):
         _lot(draft, lot, k, at, radius)
-    camp(draft, open_)
+    wrecked.camp(draft, open_)
     _cordon(draft, at, radius)
     draft.fill_slots()
     draft.section("Loose pieces")
@@ -64,14 +64,14 @@ def _lot(draft: Draft, lot: Box, k: int, at: Point, radius_m: float) -> None:
     name, storeys = f"block_{k}", max(2, round(draft.knob("storeys")) - draft.whole(0, 2, "storeys", k))
     # The front stands at the side that looks to the blast.
     low = at[0] < lot.middle[0] if lot.upright else at[1] < lot.middle[1]
-    box = shallow(draft, lot, k, 13.0, low)
+    box = wrecked.shallow(draft, lot, k, 13.0, low)
     away = box.shape().distance(shapely.Point(at))
     free = draft.is_free(box.shape())
     if free and away >= radius_m * 1.1:
         torn = 2 if away < 16.0 else 1 if away < 34.0 else draft.whole(0, 1, "torn", k)
-        wreck(draft, box, name, storeys, torn, toward=at, soot=round(max(0.0, 0.7 - away / 45.0), 2))
+        wrecked.wreck(draft, box, name, storeys, torn, toward=at, soot=round(max(0.0, 0.7 - away / 45.0), 2))
     else:
-        flattened(draft, box, k, name, 0.42, free)
+        wrecked.flattened(draft, box, k, name, 0.42, free)
 
 
 def _cordon(draft: Draft, at: Point, radius_m: float) -> None:
@@ -91,7 +91,7 @@ def _scattered(draft: Draft, at: Point, radius_m: float) -> None:
         turn, away = draft.number(0, 360, "beam", k), radius_m * draft.number(1.8, 3.4, "beam", k, "away")
         beams.append([*ahead(at, turn, away), draft.number(2, 5, "beam", k, "m")])
     draft.make("twisted_steel", beams=beams, stream="beams")
-    littered(draft)
+    wrecked.littered(draft)
 
 
 def _yard(draft: Draft, w: float, d: float) -> Layout:

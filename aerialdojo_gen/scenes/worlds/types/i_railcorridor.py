@@ -53,7 +53,10 @@ def write(draft: Draft) -> None:
         if kind == "street":
             draft.section("The street")
             street_along(draft, box.middle[1])
-    _landmarks(draft, [box for kind, box in boxes if kind in ("yard", "town", "green")])
+    draft.section("Landmarks")
+    open_ = [box for kind, box in boxes if kind in ("yard", "town", "green")]
+    spots = draft.shuffled((p for box in open_ for p in box.grown(-2.8).grid(5.0)), "spots")
+    draft.landmark([(*p, draft.pick(SIDES, "landmark", *p)) for p in spots])
     for n, (kind, box) in enumerate(boxes):
         if kind == "town":
             _town(draft, box, n, 270.0 if min(ys) < box.middle[1] else 90.0)
@@ -169,12 +172,6 @@ def _footbridge(draft: Draft, x: float, platforms: Sequence[Box]) -> None:
     draft.make("keep_free", areas=areas, z=[0, "deck"])
     for k in range(int((high - low) // 5.0)):
         draft.slot("bridge", x, low + 2.5 + 5.0 * k, 0.0, (1.4, 2.6), on="deck")
-
-
-def _landmarks(draft: Draft, boxes: Sequence[Box]) -> None:
-    draft.section("Landmarks")
-    spots = [p for box in boxes for p in box.grown(-2.8).grid(5.0)]
-    draft.landmark([(*p, draft.pick(SIDES, "landmark", *p)) for p in draft.shuffled(spots, "spots")])
 
 
 def _town(draft: Draft, box: Box, n: int, toward: float) -> None:

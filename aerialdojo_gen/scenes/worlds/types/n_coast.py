@@ -44,12 +44,9 @@ class _Shore(NamedTuple):
 
 def write(draft: Draft) -> None:
     """Raise the land, and build a village on it."""
-    build_village(draft, _TOPOLOGIES[draft.topology](draft, _shore(draft)))
-
-
-def _shore(draft: Draft) -> _Shore:
     quarter, (w, d) = draft.whole(0, 3, "quarter"), draft.half
-    return _Shore(quarter, draft.pick([1, -1], "flip"), *((d, w) if quarter % 2 else (w, d)))
+    shore = _Shore(quarter, draft.pick([1, -1], "flip"), *((d, w) if quarter % 2 else (w, d)))
+    build_village(draft, _TOPOLOGIES[draft.topology](draft, shore))
 
 
 def _beside(shore: _Shore, at: float, by_m: float) -> BaseGeometry:

@@ -142,11 +142,7 @@ def _draw_categories(
     draft: Draft, kind: str, n: int, key: tuple[object, ...], used: Counter[tuple[str, str]]
 ) -> list[str]:
     """Draw different categories of a kind of slots, which a builder of the kit finds the places of."""
-    slots = draft.kind.slots[kind]
-    left = {
-        what: weight for what, weight in slots.of.items()
-        if used[kind, what] < slots.most and (what not in slots.held_out or draft.world.held_out)
-    }  # fmt: skip
+    left = draft.available(kind, used)
     drawn = sorted(left, key=lambda what: -math.log(draft.rng("deal", kind, *key, what).random()) / left[what])[:n]
     used.update((kind, what) for what in drawn)
     return drawn
