@@ -181,8 +181,8 @@ def _annotations(path: Path, name: str) -> str:
         raise AnnotationError(f"{path} is not UTF-8: {error}") from None
     source = parse_annotations(text)
     if source.scene and source.scene != name:
-        found = brief(repr(source.scene), 60)
-        raise AnnotationError(f"{path} is of scene {found}, not of {name!r}: its key scene says so")
+        named = brief(repr(source.scene), 60)
+        raise AnnotationError(f"{path} is of scene {named}, not of {name!r}: its key scene says so")
     if source.faults:
         raise AnnotationError(f"{path}: {source.faults[0]}")
     return text

@@ -70,12 +70,12 @@ class _File:
         else:
             children = {c for n in nodes for c in n.get("children", ())}
             roots = [k for k in range(len(nodes)) if k not in children]
-        stack, seen = [(int(k), np.eye(4)) for k in reversed(roots)], set()
+        stack, visited = [(int(k), np.eye(4)) for k in reversed(roots)], set()
         while stack:
             k, parent = stack.pop()
-            if k in seen or not 0 <= k < len(nodes):
+            if k in visited or not 0 <= k < len(nodes):
                 continue
-            seen.add(k)
+            visited.add(k)
             world = parent @ _local(nodes[k])
             yield k, world
             stack += [(int(child), world) for child in reversed(nodes[k].get("children", ()))]
@@ -172,10 +172,10 @@ class _File:
         entry = self._document["textures"][texture]
         source = entry.get("source")
         if source is None:
-            found = [e["source"] for e in entry.get("extensions", {}).values() if "source" in e]
-            if not found:
+            sources = [e["source"] for e in entry.get("extensions", {}).values() if "source" in e]
+            if not sources:
                 return None, "without an image"
-            source = found[0]
+            source = sources[0]
         image = self._document["images"][source]
         if "bufferView" in image:
             return bytes(self._view(image["bufferView"])), ""

@@ -109,8 +109,8 @@ def _inherited(whole: Feature, part: Feature) -> Feature:
 def category(tags: Tags) -> str:
     """Return the category of a building, by its kind or its use."""
     keys = ("building", "amenity", "tourism", "shop", "office", "building:use")
-    if known := [_CATEGORY[tags[key]] for key in keys if tags.get(key) in _CATEGORY]:
-        return known[0]
+    if categories := [_CATEGORY[tags[key]] for key in keys if tags.get(key) in _CATEGORY]:
+        return categories[0]
     if tags.get("amenity") == "place_of_worship":
         return "church"
     return "shop_building" if "shop" in tags else "office_building" if "office" in tags else "building"

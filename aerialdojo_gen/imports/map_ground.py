@@ -106,11 +106,11 @@ def rails(lines: Sequence[Feature], window: Polygon, on: str = "") -> list[list[
 
 
 def areas(
-    found: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
+    features: Iterable[Feature], lines: Sequence[Feature], window: Polygon, summary: Counter[str]
 ) -> list[dict[str, Any]]:
     """Make the plan's areas, larger ones first, water above land."""
     out: list[tuple[bool, float, str, dict[str, Any]]] = []
-    for feature in found:
+    for feature in features:
         rule = _ground(feature.tags)
         if rule is None or below_ground(feature.tags) or "building" in feature.tags:
             continue

@@ -60,14 +60,14 @@ def _place_things(placer: Placer, town: Mapping[str, list[Any]], drive_on: str) 
         road for road, street in zip(town["roads"], streets, strict=True)
         if street.kind != "path" and layout.on_ground(street)
     ]  # fmt: skip
-    found = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
-    furniture = Furniture(placer, town, found, drive_on)
+    level_streets = Streets(tuple(level), tuple(LineString(road["line"]) for road in level), layout)
+    furniture = Furniture(placer, town, level_streets, drive_on)
     furniture.place_mapped()
     furniture.place_by_rule()
 
 
 def town_plan(
-    found: Map, bbox: Bbox, source: str, options: TownOptions,
+    mapped: Map, bbox: Bbox, source: str, options: TownOptions,
     heights: Callable[[LocalFrame, tuple[float, float]], HeightTable] | None,
 ) -> tuple[PlacePlan, Counter[str]]:  # fmt: skip
     """Make the plan of a town; its origin is the centre of the bounding box (degrees)."""
@@ -80,10 +80,10 @@ def town_plan(
     frame, site = LocalFrame.about(bbox), rectangle(-width / 2, -depth / 2, width / 2, depth / 2)
     table = None if heights is None else heights(frame, (width, depth))
     summary: Counter[str] = Counter()
-    town, built_share = _town(found, frame, site, table, summary)
+    town, built_share = _town(mapped, frame, site, table, summary)
     if not any(town[key] for key in ("buildings", "roads", "areas", "things")):
         raise UsageError(
-            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(found.extent)}"
+            f"--bbox {format_bbox(bbox)} contains no map data: {source} covers {format_bbox(mapped.extent)}"
         )
     entries, sections = _entries(town, site)
     tops = [b["top_m"] for one in town["buildings"] for b in one["bodies"]]
@@ -108,11 +108,11 @@ def town_plan(
 
 
 def _town(
-    found: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: Counter[str]
+    mapped: Map, frame: LocalFrame, site: shapely.Polygon, table: HeightTable | None, summary: Counter[str]
 ) -> tuple[dict[str, list[Any]], float]:
     """Collect what the map has, in metres, and the share of the site that is built up."""
     window = site.buffer(_BEYOND_M, join_style="mitre")
-    points, lines, areas = (_in_metres(frame, features) for features in (found.points, found.lines, found.areas))
+    points, lines, areas = (_in_metres(frame, some) for some in (mapped.points, mapped.lines, mapped.areas))
     inner = site.buffer(-0.3, join_style="mitre")
     shops = map_props.shop_points(points, areas)
     buildings = map_buildings.buildings([a for a in areas if a.shape.intersects(site)], shops, inner, summary)

@@ -36,22 +36,22 @@ class MaterialBuilder:
 
     def parts(self, body: RawNode, double_sided: bool) -> tuple[Part, ...]:
         """Make a body's parts, one per material, sorted by material name."""
-        found: list[tuple[Material, Part]] = []
+        made: list[tuple[Material, Part]] = []
         kind = _face_kinds(body)
         plain = kind == _PLAIN
         for rgb in np.unique(body.colours[plain], axis=0):
             rows = plain & (body.colours == rgb).all(axis=1)
             red, green, blue = (int(c) for c in rgb)
             name = f"#{red:02x}{green:02x}{blue:02x}"
-            found += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
+            made += self._build_parts(body, rows, Material(name, (red, green, blue), double_sided=double_sided))
         painted = kind == _PAINTED
         if painted.any():
             # White: vertex colours replace it, or are multiplied by it without effect.
             paint = Material(_MIXED, (255, 255, 255), atlas=True, double_sided=double_sided, unlit=self.baked)
-            found += self._build_parts(body, painted, paint)
+            made += self._build_parts(body, painted, paint)
         for k in np.unique(kind[kind >= 0]):
-            found += self._build_parts(body, kind == k, self._textured(body.surfaces[k], double_sided))
-        return tuple(part for _, part in sorted(found, key=lambda pair: pair[0].name))
+            made += self._build_parts(body, kind == k, self._textured(body.surfaces[k], double_sided))
+        return tuple(part for _, part in sorted(made, key=lambda pair: pair[0].name))
 
     def measure_texture_scales(self, nodes: Sequence[RawNode]) -> None:
         """Measure the metres that each texture's width covers, over all nodes that show it; vertices in metres."""

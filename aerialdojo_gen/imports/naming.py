@@ -143,7 +143,7 @@ def _parse(words: Sequence[str]) -> tuple[str, dict[str, str]]:
     said, rest = dict[str, str](), list[str]()
     for k, word in enumerate(words):
         spelt = spelling.get(word, word)
-        key = next((key for key, known in kinds.items() if spelt in known), "")
+        key = next((key for key, vocabulary in kinds.items() if spelt in vocabulary), "")
         shade = [spelling.get(w, w) for w in words[k + 1 : k + 2]]
         if key == "state" and said.get(key) not in (None, "old"):
             continue

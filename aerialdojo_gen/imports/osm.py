@@ -82,10 +82,10 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
         out = folder / "found.json"
         args = [str(out), json.dumps(boxes)]
         read_in_sandbox(__name__, path, args, MAX_MEMORY_BYTES, _extract_advice(path, boxes))
-        found = json.loads(out.read_text(encoding="utf-8"))
-    west, south, east, north = extent = tuple(found["extent"])
+        content = json.loads(out.read_text(encoding="utf-8"))
+    west, south, east, north = extent = tuple(content["extent"])
     maps = []
-    for box, own in zip(boxes, found["boxes"], strict=True):
+    for box, own in zip(boxes, content["boxes"], strict=True):
         if not any(own.values()):
             disjoint = box[0] > east or box[2] < west or box[1] > north or box[3] < south
             why = "lies outside the extract" if disjoint else "contains no map data"
@@ -108,10 +108,10 @@ def _extract_advice(path: Path, boxes: Sequence[Bbox]) -> str:
 def read_into(path: Path, out: Path, boxes: Sequence[Bbox]) -> str:
     """Read an extract in the sandboxed child process; returns the error message, or an empty string."""
     try:
-        found, extent = _read(importlib.import_module("osmium"), path, boxes)
+        content, extent = _read(importlib.import_module("osmium"), path, boxes)
         if extent is None:
             return "holds no points"
-        out.write_text(json.dumps({"extent": extent, "boxes": found}), encoding="utf-8")
+        out.write_text(json.dumps({"extent": extent, "boxes": content}), encoding="utf-8")
     except Exception as error:  # untrusted files can make a reader fail in any way: report it
         if isinstance(error, MemoryError) or is_out_of_memory(str(error)):
             raise MemoryError from None
@@ -126,7 +126,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
     extent_box = shapely.box(*shapely.total_bounds(windows))
     for shape in (windows, extent_box):
         shapely.prepare(shape)
-    found: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
+    content: list[dict[str, list[_RawFeature]]] = [{kind: [] for kind in _KINDS} for _ in boxes]
     low, high = (1e9, 1e9), (-1e9, -1e9)
     factory = osmium.geom.WKBFactory()
 
@@ -135,7 +135,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
             return
         key = " ".join(f"{degrees:.7f}" for degrees in shape.bounds)  # as many decimals as the map has
         for k in np.flatnonzero(shapely.intersects(windows, part)):
-            found[k][kind].append((key, str(shapely.to_wkb(part, hex=True)), tags))
+            content[k][kind].append((key, str(shapely.to_wkb(part, hex=True)), tags))
 
     for thing in osmium.FileProcessor(str(path)).with_locations().with_areas():
         if thing.is_node():
@@ -162,7 +162,7 @@ def _read(osmium: Any, path: Path, boxes: Sequence[Bbox]) -> tuple[list[dict[str
             for part in shapely.get_parts(whole):
                 if isinstance(part, Polygon):
                     keep("areas", whole, part, tags)
-    return found, None if low[0] > high[0] else (*low, *high)
+    return content, None if low[0] > high[0] else (*low, *high)
 
 
 def _is_area(tags: Tags) -> bool:

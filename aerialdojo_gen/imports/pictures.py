@@ -84,8 +84,8 @@ def _surface(material: SourceMaterial, decoded: dict[bytes, tuple[NDArray[Any] |
             grey = _channels(other)[0].max(axis=2)
             alpha = cv2.resize(grey, (rgb.shape[1], rgb.shape[0]), interpolation=cv2.INTER_AREA).astype(np.uint8)
     mask = _mask(alpha, material)
-    seen = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
-    red, green, blue = (int(c) for c in seen.mean(axis=0, dtype=np.float64).round())
+    opaque = rgb.reshape(-1, 3) if mask is None or not mask.any() else rgb[mask]
+    red, green, blue = (int(c) for c in opaque.mean(axis=0, dtype=np.float64).round())
     is_jpeg = material.image[:3] == b"\xff\xd8\xff" and image.ndim == 3
     jpeg = material.image if white and mask is None and is_jpeg else b""
     return replace(plain, colour=(red, green, blue), texture=rgb, mask=mask, jpeg=jpeg)

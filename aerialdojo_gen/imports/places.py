@@ -65,8 +65,8 @@ def add_map(
     wide, high = _MARGIN_DEG, _MARGIN_DEG / 2
     maps = read_maps(extract, [(w - wide, s - high, e + wide, n + high) for w, s, e, n in boxes])
     towns = []
-    for one, box, found in zip(names, boxes, maps, strict=True):
-        town, summary = town_plan(found, box, extract.name, options, heights)
+    for one, box, mapped in zip(names, boxes, maps, strict=True):
+        town, summary = town_plan(mapped, box, extract.name, options, heights)
         towns.append((one, town, tuple(_summary_lines(dict(summary)))))
     return [_write_place(one, town, project, notes) for one, town, notes in towns]
 

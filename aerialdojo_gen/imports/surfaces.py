@@ -33,11 +33,11 @@ _GROUND = (122, 132, 108)
 
 def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[int]:
     """Find sky domes, largest first: large hollow shells that enclose everything else."""
-    found: list[int] = []
+    domes: list[int] = []
     low = np.array([b.vertices.min(axis=0) for b in bodies])
     high = np.array([b.vertices.max(axis=0) for b in bodies])
     for k in np.argsort(-np.prod(high - low, axis=1), kind="stable").tolist():
-        rest = [j for j in range(len(bodies)) if j != k and j not in found]
+        rest = [j for j in range(len(bodies)) if j != k and j not in domes]
         if not rest:
             break
         words = [word for word in words_in(bodies[k].name) if word not in word_list("sky_perhaps")]
@@ -54,8 +54,8 @@ def find_domes(bodies: Sequence[RawNode], table_names: Sequence[str]) -> list[in
         caster = TriangleRayCaster(bodies[k].vertices, bodies[k].faces.astype(np.int32))
         if _vertical_hits(caster, inner_low, inner_high, inner_high[2] - 1e-6, 1.0, 12) < _ROOFED:
             break
-        found.append(k)
-    return found
+        domes.append(k)
+    return domes
 
 
 def _is_hollow(body: RawNode) -> bool:

@@ -63,14 +63,14 @@ def _pieces(part: Part, bounds: Floats, side: int) -> list[_Piece]:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     corners = corners[normal[:, 2] > 0.05 * norm(normal)]
     on = np.abs(corners[:, :, across] - bounds[int(upper), across]) < _ON_M
-    found = []
+    pieces = []
     for a, b in ((0, 1), (1, 2), (2, 0)):
         rows = np.flatnonzero(on[:, a] & on[:, b])
         ends = np.stack([corners[rows, a], corners[rows, b]], axis=1)
         # Upward faces are counter-clockwise from above, and so is the way round: others are seams.
         along = (ends[:, 1, axis] - ends[:, 0, axis]) * way
-        found += [(float(one[0, axis] * way), one, part.material) for one in ends[along > _SHORT_M]]
-    return found
+        pieces += [(float(one[0, axis] * way), one, part.material) for one in ends[along > _SHORT_M]]
+    return pieces
 
 
 def _topmost(side: int, land: Sequence[_Piece], sheets: Sequence[_Piece]) -> list[_Piece]:

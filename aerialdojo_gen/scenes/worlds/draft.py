@@ -151,8 +151,8 @@ class Draft:
 
     def material(self, role: str, *key: object) -> str:
         """Material of a role of the palette; of several one, drawn for the key."""
-        found = self.palette.materials[role]
-        return found if isinstance(found, str) else self.pick(found, "material", role, *key)
+        choices = self.palette.materials[role]
+        return choices if isinstance(choices, str) else self.pick(choices, "material", role, *key)
 
     # Entries
 

@@ -157,8 +157,8 @@ def _stores(draft: Draft) -> None:
 def _cranes(draft: Draft) -> None:
     """Set up cranes where there is room, on feet that nothing is near to."""
     draft.section("Landmarks")
-    found = ((k, spot_for(draft, 4.2, "crane", k)) for k in range(40))
-    spots = [(*at, float(draft.whole(0, 359, "crane", k))) for k, at in found if at is not None]
+    feet = ((k, spot_for(draft, 4.2, "crane", k)) for k in range(40))
+    spots = [(*at, float(draft.whole(0, 359, "crane", k))) for k, at in feet if at is not None]
     if draft.chance(0.85, "tower_crane"):
         draft.landmark(spots, of=["tower_crane"])
     draft.landmark(spots)
