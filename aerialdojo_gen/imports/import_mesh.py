@@ -212,8 +212,8 @@ def make_scene(
     things = [i for i in scene.instances if i.category not in NON_OBJECTS]
     if things and all(is_unnamed(i.node, i.category) for i in things):
         repairs.lines.append(
-            "no thing has a name, all are identified by colour and form: name them by a table of patterns of nodes or "
-            "materials (--names names.csv), or on the page of annotate"
+            "no thing has a name, all are identified by colour and form: name them by a table of patterns of nodes "
+            "or materials (--names names.csv), or on the page of annotate"
         )
     return replace(scene, imported=False), repairs
 
