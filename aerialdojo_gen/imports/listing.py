@@ -41,16 +41,13 @@ def infer_axes(nodes: Sequence[RawNode]) -> FileAxes:
     level = np.zeros(3)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for node in nodes:
-        corners = node.vertices[node.faces]
-        corners = corners[np.isfinite(corners).all(axis=(1, 2))]
-        if not len(corners):
+        finite = node.select_faces(np.asarray(np.isfinite(node.vertices[node.faces]).all(axis=(1, 2))))
+        if not len(finite.faces):
             continue
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1)
-        for k in range(3):
-            # Hills are only partly level: use the projected area.
-            steep = np.abs(normal[:, k]) < 0.3 * area
-            level[k] += np.abs(normal[~steep, k]).sum()
+        corners, normal = finite.vertices[finite.faces], np.abs(finite.normals)
+        # Hills are only partly level: use the projected area.
+        steep = normal < 0.3 * np.linalg.norm(normal, axis=1, keepdims=True)
+        level += np.where(steep, 0.0, normal).sum(axis=0)
         low, high = np.minimum(low, corners.min(axis=(0, 1))), np.maximum(high, corners.max(axis=(0, 1)))
     size = np.where(np.isfinite(high - low), high - low, 0.0)
     # Scenes are wider than high: prefer the shorter axis.
@@ -124,6 +121,4 @@ def describe_mesh(
     heads = [Column("called", words=True), *map(Column, ("triangles", "pieces", "closed", "x, m", "y, m", "z, m"))]
     lines += ["", *TextTable("node", heads, rows).lines(width)]
     rest = len(largest) - _SHOWN
-    if rest > 0:
-        lines.append(f"and {rest:,} smaller node{'s' if rest > 1 else ''}")
-    return lines
+    return lines + ([f"and {rest:,} smaller node{'s' if rest > 1 else ''}"] if rest > 0 else [])

@@ -99,9 +99,7 @@ def read_maps(path: Path, boxes: Sequence[Bbox]) -> list[Map]:
 
 
 def _extract_advice(path: Path, boxes: Sequence[Bbox]) -> str:
-    west, south = (min(box[k] for box in boxes) for k in (0, 1))
-    east, north = (max(box[k] for box in boxes) for k in (2, 3))
-    where = f"{west:g},{south:g},{east:g},{north:g}"
+    where = ",".join(f"{v:g}" for v in (*np.min(boxes, axis=0)[:2], *np.max(boxes, axis=0)[2:]))
     return f"cut a part out of it first, e.g. osmium extract --bbox {where} {path.name} -o part.osm.pbf"
 
 

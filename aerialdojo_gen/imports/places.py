@@ -110,12 +110,11 @@ def _write_place(name: str, place: PlacePlan, project: Path, notes: tuple[str, .
         notes += (f"{placer.left_out:,} things left out: a scene has {MAX_NODES:,} instances at most",)
     make_project(project)
     heights = f"scenes/{name}{HEIGHTS_SUFFIX}"
-    if table is not None:
-        with atomic_file(project, heights) as path:
-            path.write_text(table.text(), encoding="ascii")
-    with atomic_file(project, f"scenes/{name}.toml") as path:
-        path.write_text(text, encoding="utf-8")
-    for left in (f"scenes/{name}.glb", *([heights] if table is None else [])):
+    files = {} if table is None else {heights: table.text()}
+    for file, content in (files | {f"scenes/{name}.toml": text}).items():
+        with atomic_file(project, file) as path:
+            path.write_text(content, encoding="utf-8")
+    for left in {f"scenes/{name}.glb", heights} - files.keys():
         (project / left).unlink(missing_ok=True)
     return AddedPlace(name, scene, project / "scenes" / f"{name}.toml", project / PIPELINE, notes)
 
